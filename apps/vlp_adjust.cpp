@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// vlp-adjust: any sets of captures -> everything they share, solved together.
+/// vlp-adjust: jointly adjusts calibration and lamp map to any sets of captures.
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -27,7 +27,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct Options {
-  CaptureOptions images;  // but for the sets
+  CaptureOptions images;  // without the sets
   std::vector<std::string> sets, turns;
   std::string refined_map;
   std::optional<double> map_sd_m, place_sd_m, lens_sd_px;
@@ -35,7 +35,7 @@ struct Options {
   std::optional<double> yaw_rate_sd_deg_per_s;
 };
 
-/// A folder of images, or a table, and the captures.csv in its folder.
+/// Reads a set: a folder of images or a table of detections, and the captures.csv in its folder.
 AdjustSet read_set(const Options& options, const std::string& set, bool turn, const LampMap& lamps,
                    const Calibration& calibration) {
   const fs::path path(set);
@@ -151,7 +151,7 @@ int main(int argc, char** argv) {
                  "parameters may be off, as the shift of the image that it makes, rms; such a lens "
                  "is then estimated (default: it is exact)")
       ->check(vlp::finite_positive())
-      ->check(CLI::Range(1e-3, 1e3));  // px: less is exact, more no lens at all
+      ->check(CLI::Range(1e-3, 1e3));  // px; smaller: exact lens, larger: unusable lens
   vlp::add_motion_options(
       app, options.motion,
       "The camera drives, so fast at most: its velocity is estimated in each capture (default: as "

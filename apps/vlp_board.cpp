@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// vlp-board: a board to print.
+/// vlp-board: makes a printable calibration board.
 #include <fmt/core.h>
 
 #include <CLI/CLI.hpp>

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// vlp-calibrate: a session's folder -> calibration, fixes, report: the whole procedure.
+/// vlp-calibrate: runs the whole procedure on the folder of a session: calibration, fixes, report.
 
 #include <CLI/CLI.hpp>
 #include <optional>
@@ -90,7 +90,7 @@ int calibrate(int argc, char** argv) {
   add_threads_option(app, how.frontend.threads);
   app.add_flag(
       "--each", [](std::int64_t) { throw CLI::ValidationError("--each", "stands alone"); },
-      "Alone: do what stdin says, a line of JSON for each session; see apps/README.md");
+      "Alone: do what stdin says, a line of JSON for each session; see apps/vlp-calibrate.md");
   app.footer("Gates:\n" + gate_descriptions(session_metrics()));
   return run_app(app, argc, argv, [&] { run(options); });
 }
@@ -102,7 +102,7 @@ int main(int argc, char** argv) {
   if (argc != 2 || std::string_view(argv[1]) != "--each") return vlp::calibrate(argc, argv);
   CLI::App app("", vlp::kName);
   return vlp::run_app(app, 1, argv, [] {
-    vlp::prepare_tag_family("tag36h11");  // that of most boards
+    vlp::prepare_tag_family("tag36h11");  // family of most boards
     vlp::run_each(vlp::kName, vlp::calibrate);
   });
 }

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// vlp-convert: a camera in the file of one tool to that of another.
+/// vlp-convert: converts the file of a camera from the format of one tool to that of another.
 #include <fmt/core.h>
 
 #include <CLI/CLI.hpp>
@@ -29,7 +29,7 @@ std::string text_of(const Options& options, const Camera& camera, const ImageReg
   return options.to == "ros" ? ros_camera_info(camera) : kalibr_camchain(camera);
 }
 
-/// Of the calibration only where the lens is known.
+/// Returns a report with the calibrated region of the lens only; std::nullopt without a region.
 std::optional<IntrinsicsReport> report_of(const ImageRegion& region) {
   if (region.empty()) return std::nullopt;
   IntrinsicsReport report{};

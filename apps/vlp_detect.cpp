@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// vlp-detect: where the lamps are in images, and which they are.
+/// vlp-detect: detects and identifies the lamps in images.
 #include <fmt/core.h>
 
 #include <CLI/CLI.hpp>

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// vlp-dispersion: captures at a known station -> what their fixes still lack.
+/// vlp-dispersion: estimates the dispersion offset from captures at known places.
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
@@ -32,14 +32,13 @@ const std::map<std::string, DispersionCircle> kCircles{{"mean", DispersionCircle
 struct Options {
   CaptureOptions images;
   std::optional<std::array<double, 2>> station_m;
-  /// captures.csv; empty: that of the folder.
+  /// File captures.csv; empty: the one in the folder.
   std::string captures;
   std::string plot;
   std::string method = "camera", circle = "mean", of = "camera";
 };
 
-/// What is known of the captures besides their images; without their places where --station says
-/// them.
+/// Reads the table of the captures, without their places if --station gives them.
 CapturesTable captures_of(const Options& options) {
   CapturesTable captures;
   if (!options.captures.empty()) {

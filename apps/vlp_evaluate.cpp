@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// vlp-evaluate: what fixes are worth, against a truth, a path or a commanded line.
+/// vlp-evaluate: evaluates fixes against ground truth, a path or a commanded line.
 #include <fmt/core.h>
 #include <CLI/CLI.hpp>
 
@@ -36,7 +36,7 @@ namespace {
 
 constexpr const char* kName = "vlp-evaluate";
 
-/// The report that vlp-evaluate writes; none without a file.
+/// Options of the report; no report without a file.
 struct ReportOption {
   std::string file;
   std::vector<std::string> pictures;
@@ -55,7 +55,7 @@ struct Options {
   ReportOption report;
 };
 
-/// X0, Y0, X1, Y1.
+/// Checks the coordinates X0, Y0, X1, Y1 of a commanded line, m. Throws std::invalid_argument.
 void check_line(const std::string& option, const std::array<double, 4>& line_m) {
   if (line_m[0] == line_m[2] && line_m[1] == line_m[3]) {
     throw std::invalid_argument(option + ": the line begins where it ends");
@@ -71,20 +71,20 @@ std::vector<MetricKind> known_metrics() {
   return metric_kinds({MetricSource::evaluation, MetricSource::reference});
 }
 
-/// The gates of the file, and those of the command line, which hold where both say something.
+/// Returns the gates of the file and of the command line, which takes precedence.
 std::vector<Gate> gates_of(const Options& options) {
   std::vector<Gate> gates;
   if (!options.gates_file.empty()) gates = read_gates(options.gates_file, known_metrics());
   return with_changes(std::move(gates), gates_of(options.gates, known_metrics()));
 }
 
-/// The files that are read, without those of the report; some names may be empty.
+/// Returns the input files, without those of the report; names may be empty.
 std::vector<std::string> inputs_of(const Options& options) {
   return {options.fixes, options.truth,       options.path,      options.compare,
           options.lamps, options.calibration, options.gates_file};
 }
 
-/// Checks that no file is written twice, or read as well.
+/// Checks that no output is given twice or is also an input.
 void check_files(const Options& options) {
   std::vector<std::string> inputs = inputs_of(options);
   const ReportOption& report = options.report;
@@ -131,7 +131,7 @@ double station_m(const Options& options) {
 
 EvaluationInput input_of(const Options& options) {
   EvaluationInput input;
-  // The two large tables side by side; of two that are bad the fixes are told of.
+  // The two large tables are read in parallel; if both are bad, the error is that of the fixes.
   auto truth = std::async(options.threads > 1 ? std::launch::async : std::launch::deferred, [&] {
     return options.truth.empty() ? std::vector<TruthRow>() : read_truth(options.truth);
   });
@@ -183,8 +183,8 @@ std::string make_proposed_gates(const EvaluationInput& input, const Evaluation& 
   return format_gates(gates, evaluation);
 }
 
-/// Returns the tests of the gates. A comparison without enough captures for evidence has a warning,
-/// because its gate is met.
+/// Returns the tests of the gates. A comparison with too few captures for evidence has a warning,
+/// because its gate passes.
 std::vector<JUnitTest> make_evaluation_tests(const EvaluateResult& found) {
   std::vector<JUnitTest> tests = make_junit_tests(found.gates);
   const auto& comparison = found.evaluation.comparison;

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// vlp-intrinsics: the lens of a camera from images of a board.
+/// vlp-intrinsics: estimates the lens of a camera from images of a board.
 #include <fmt/core.h>
 
 #include <CLI/CLI.hpp>
@@ -49,7 +49,7 @@ struct Options {
 Camera known_camera(const Options& options) {
   Camera camera;
   camera.id = options.camera_id;
-  // One that is chosen takes its place.
+  // With --lens auto, the chosen model replaces it later.
   camera.lens_model = lens_model_from_name(options.lens).value_or(LensModel::opencv8);
   camera.pixel_pitch_m = options.pixel_pitch_m;
   camera.row_time_s = options.frontend.row_time_s;
@@ -57,7 +57,7 @@ Camera known_camera(const Options& options) {
   return camera;
 }
 
-/// The one file of corners that is given instead of images; empty when images are given.
+/// Returns the file of corners that is given instead of images; empty if images are given.
 std::string corner_file(const CLI::App& app, const Options& options) {
   const auto found = std::find_if(options.images.begin(), options.images.end(),
                                   [](const auto& name) { return holds_corners(name); });
@@ -96,7 +96,7 @@ Observations observe(const std::vector<std::filesystem::path>& images, const Boa
                         [&](std::size_t done, std::size_t total) { progress.update(done, total); });
 }
 
-/// camera.yaml and ".cameramodel" to camera.cameramodel.
+/// Replaces the extension: camera.yaml and ".cameramodel" give camera.cameramodel.
 std::string beside(const std::string& output, const char* ending) {
   return std::filesystem::path(output).replace_extension(ending).string();
 }
@@ -109,7 +109,8 @@ void write_exports(const Options& options, const Camera& camera) {
 
 bool chooses_lens(const Options& options) { return options.lens == kChosenLens; }
 
-/// A table of corners tells images by their names.
+/// Throws std::invalid_argument if two images have the same name, which identifies an image in a
+/// table of corners.
 void check_names(const std::vector<std::filesystem::path>& images) {
   std::set<std::string> names;
   for (const auto& image : images) {
@@ -119,8 +120,8 @@ void check_names(const std::vector<std::filesystem::path>& images) {
   }
 }
 
-/// Throws std::invalid_argument for a format that has no lens model like the camera's, before
-/// anything is written.
+/// Throws std::invalid_argument if a format does not support the lens model of the camera, before
+/// any output is written.
 void check_exports(const Options& options, Camera camera) {
   camera.imager_px = {1, 1};
   camera.intrinsics.assign(parameter_count(camera.lens_model), 1);
@@ -129,12 +130,12 @@ void check_exports(const Options& options, Camera camera) {
   if (!options.opencv.empty()) opencv_camera(camera);
 }
 
-/// Those that there are in any case, with the limits of the command line.
+/// Returns the default gates with the changes of the command line.
 std::vector<Gate> gates_of(const Options& options) {
   return with_changes(lens_gates(), gates_of(options.gates, metric_kinds({MetricSource::lens})));
 }
 
-/// Whether it is the lens that misses a gate, and not only the views.
+/// Returns true if a gate of the lens fails, not only gates of the views.
 bool fits_badly(const std::vector<CheckedMetric>& gates) {
   return std::ranges::any_of(gates, [](const CheckedMetric& gate) {
     return !gate.met() &&
@@ -162,7 +163,7 @@ void run(const CLI::App& app, const Options& options) {
                 inputs);
   if (!options.corners.empty()) check_names(images);
   const Board board = read_board(options.board);
-  possible_warp(board, options.warp);  // refused before the images are looked at
+  possible_warp(board, options.warp);  // throws before the images are read
   LensInput input{observe(images, board, corners, options),
                   board,
                   options.board,
@@ -170,7 +171,7 @@ void run(const CLI::App& app, const Options& options) {
                   options.held_out,
                   options.warp,
                   chooses_lens(options)};
-  // After the images: of those that cannot be used none is read for its digest.
+  // After the images: unusable files are not read for their digests.
   const LensResult result = solve_lens(std::move(input), history_entry(app, inputs));
   tell(result);
   const LensEstimate& lens = result.lens;
@@ -178,12 +179,12 @@ void run(const CLI::App& app, const Options& options) {
     write_corner_table(options.corners, lens.views, board);
   }
   require(result);
-  check_exports(options, result.calibration.camera);  // of a lens that was chosen
+  check_exports(options, result.calibration.camera);  // the selected lens model
   write_calibration(options.output, result.calibration);
   if (has_mrcal(result.calibration.camera.lens_model)) {
     write_cameramodel(beside(options.output, ".cameramodel"), lens.solution);
   } else {
-    // One of an earlier run would be of another lens.
+    // A file of an earlier run would belong to another lens.
     std::filesystem::remove(beside(options.output, ".cameramodel"));
   }
   write_corners(beside(options.output, ".corners.vnl"), lens.solution, lens.images);

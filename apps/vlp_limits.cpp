@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// vlp-limits: what accuracy a room, a camera and their errors allow.
+/// vlp-limits: computes the accuracy limits of a room, a camera and their errors.
 #include <fmt/core.h>
 #include <spdlog/spdlog.h>
 
@@ -47,7 +47,7 @@ std::string title_of(const Options& options) {
   return title;
 }
 
-/// What calibration and map state of themselves.
+/// Returns the errors that calibration and map report.
 UnitErrors stated_errors(const Options& options, const LampMap& lamps,
                          const Calibration& calibration) {
   UnitErrors unit(lamps, calibration);
@@ -73,7 +73,7 @@ UnitErrors stated_errors(const Options& options, const LampMap& lamps,
   return unit;
 }
 
-/// What is not known of motion and lean.
+/// Returns the prior of velocity, yaw rate, roll and pitch.
 BodyPrior prior_of(const Options& options, const Camera& camera) {
   BodyPrior prior;
   if (const auto motion = options.motion.motion()) {

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// vlp-locate: identified lamps in images -> positions.
+/// vlp-locate: estimates camera positions from identified lamps in images.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
@@ -33,7 +33,7 @@ const std::map<std::string, Correction> kCorrections{{"none", Correction::none},
 
 struct Options {
   CaptureOptions images;
-  /// captures.csv; empty: that of the folder, if it is there.
+  /// File captures.csv; empty: the one in the folder, if it exists.
   std::string captures;
   std::string correction = "all";
   std::optional<double> sigma_px;
@@ -46,7 +46,7 @@ struct Options {
   int frames_together = 1;
 };
 
-/// Of the file that is named, or of the folder of images.
+/// Reads the table of the captures: the named file, or the one in the folder of images.
 CapturesTable captures_of(const Options& options) {
   if (!options.captures.empty()) return read_captures(options.captures);
   const bool folder = std::filesystem::is_directory(options.images.images);
@@ -81,7 +81,7 @@ CapturesTable captures_of(const Options& options) {
   return captures;
 }
 
-/// Returns everything that the options state except the frames.
+/// Returns the input from the options, without the frames.
 LocateInput make_input(const Options& options, const CapturesTable& captures) {
   LocateInput input{{},
                     read_lamps_of_room(options.images.lamps, options.images.frontend.room),
@@ -145,7 +145,7 @@ void run(Options options) {
   require(found);
 }
 
-/// Adds the options of motion, lean and mount, and of figures that captures.csv states.
+/// Adds the options of motion, roll and pitch, mount, and of the values in captures.csv.
 void add_sensor_options(CLI::App& app, Options& options) {
   app.add_option(
          "--inclination-sigma-deg", options.inclination_sigma_deg,

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// vlp-rotation: captures of a turn on the spot, or of a drive -> the rotation centre, the camera's
-/// tilt.
+/// vlp-rotation: estimates rotation center and tilt of the camera from captures of a rotation in
+/// place or of a drive.
 #include <CLI/CLI.hpp>
 #include <stdexcept>
 #include <string>

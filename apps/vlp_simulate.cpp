@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// vlp-simulate: renders the captures of a scene, with their truth.
+/// vlp-simulate: renders the captures of a scene, with their ground truth.
 #include <fmt/core.h>
 #include <spdlog/spdlog.h>
 
@@ -36,7 +36,7 @@ void run(const Options& options) {
     seed = scene.seed = static_cast<std::uint64_t>(*options.seed);
     draw_random_parts(scene);
   }
-  cv::setNumThreads(1);  // the captures themselves go in parallel
+  cv::setNumThreads(1);  // captures are rendered in parallel
   const std::string what = options.archive ? "sessions" : "captures";
   const SimulationOptions how{options.folders, options.threads,
                               origin_of(options.scene, seed, "vlp-simulate", VLP_VERSION)};

@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// vlp-station: a factory's calibration station: units to a verdict, and their records.
+/// vlp-station: calibrates units at the station of a factory, gives their verdicts and keeps
+/// records.
 #include <CLI/CLI.hpp>
 #include <string>
 
@@ -73,7 +74,7 @@ std::string find_password(const std::string& where) {
                                 : "";
 }
 
-/// Where records are.
+/// Adds a command with the options for the location of records.
 CLI::App* add_where(CLI::App& app, const char* name, const char* what,
                     StationRecordsOptions& options) {
   CLI::App* command = app.add_subcommand(name, what);
@@ -85,7 +86,7 @@ CLI::App* add_where(CLI::App& app, const char* name, const char* what,
   return command;
 }
 
-/// What the commands on records share.
+/// Adds a command with the options common to all commands on records.
 CLI::App* add_records(CLI::App& app, const char* name, const char* what,
                       StationRecordsOptions& options) {
   CLI::App* command = add_where(app, name, what, options);
@@ -111,7 +112,7 @@ CLI::App* add_records(CLI::App& app, const char* name, const char* what,
   return command;
 }
 
-/// Adds the commands that print or write what is recorded of a run.
+/// Adds the commands that print or write the record of a run.
 void add_commands_of_a_run(CLI::App& app, StationRecordsOptions& options) {
   add_records(app, "list", "A line for each run", options);
   auto* show = add_records(app, "show", "All of one run, the last unless it is named", options);
@@ -215,7 +216,7 @@ void add_statistics(CLI::App& app, StationRecordsOptions& options) {
       ->needs("--reference");
 }
 
-/// Runs the command that was given.
+/// Runs the given command.
 void run_command(const CLI::App& app, const StationRunOptions& run,
                  const StationRecordsOptions& records) {
   if (app.got_subcommand("run")) {

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// vlp-train: labelled captures -> the lamp classifier; captures -> the row time.
+/// vlp-train: trains the lamp classifier from labeled captures, or estimates the row time.
 #include <CLI/CLI.hpp>
 #include <filesystem>
 #include <optional>
@@ -32,17 +32,17 @@ struct Options {
   FrontendOptions frontend = default_frontend();
 };
 
-/// What the options name, read.
+/// Inputs read from the files of the options.
 struct Inputs {
   LampMap lamps;
   std::optional<Calibration> calibration;
-  /// Of each folder; empty without a table.
+  /// Labels of each folder; empty without a table.
   std::vector<std::vector<Frame>> labels;
   SeenLights seen;
 };
 
-/// The table beside the images of a folder: of that name, or, when none is named and labels are
-/// needed, detections.csv or true_detections.csv, the first that is there.
+/// Reads the labels in the folder of the images: the named table. If none is named and labels are
+/// needed, reads the first existing one of detections.csv and true_detections.csv.
 std::vector<Frame> labels_in(const fs::path& folder, const std::string& table, bool needed) {
   if (!table.empty()) return read_detections(folder / table);
   if (!needed) return {};

@@ -8,24 +8,28 @@
 
 #include "geometry/types.h"
 
-/// What a step in a row makes of the errors of the steps before it, which it takes as exact: what
-/// by_intrinsics, by_zenith and the like of RotationCenter and Dispersion say.
+/// Propagation of errors from earlier calibration steps, which a step assumes to be exact, to its
+/// result. Used for by_intrinsics, by_zenith and similar members of RotationCenter and Dispersion.
 namespace vlp {
 
-/// The numbers that are solved for, when what the solve takes as exact is off by `error`; nothing
-/// when it finds none.
+/// Function that returns the solution if the assumed inputs have the errors `error`; std::nullopt
+/// if there is no solution.
 using SolvedWith = std::function<std::optional<Eigen::VectorXd>(const Eigen::VectorXd& error)>;
 
-/// d solved / d error, a column for each error. From one solve for each column of the lower
-/// Cholesky factor L of the errors' covariance,
-///   J = (f(L_1) - f(0), f(L_2) - f(0), ...) L^-1,
-/// so that errors are tried as large as they are, and those that are known only together, as
-/// coefficients of a lens are, move together. A column that has no solution is tried once more at a
-/// sixteenth of its size: a solve may select other data at a larger error (the noise of the solve
-/// counts 16 times there, and is far smaller). Returns std::nullopt if
-/// that has none either, or if the covariance is not positive definite.
+/// Estimates the derivative of a solution with respect to errors of its inputs, one column per
+/// error.
 ///
-/// @param exact  f(0)
+/// @param exact       solution without errors, f(0)
+/// @param covariance  covariance of the errors
+/// @return            d solution / d error; std::nullopt if a solve fails or the covariance is not
+///     positive definite
+///
+/// Solves once for each column of the lower Cholesky factor L of the covariance:
+///   J = (f(L_1) - f(0), f(L_2) - f(0), ...) L^-1
+/// The trial errors so have their actual size. Correlated errors, such as those of lens
+/// coefficients, change together. If a column has no solution, it is tried once more at 1/16 of its
+/// size, because a solve may select other data at a larger error. Noise of the solve is then
+/// amplified 16 times, which is still far below the result.
 std::optional<MatrixX> jacobian_of(const SolvedWith& solved, const Eigen::VectorXd& exact,
                                    const MatrixX& covariance);
 

@@ -62,8 +62,10 @@ Eigen::Matrix<double, 2, 12> Distortion::coefficient_jacobian(const Eigen::Vecto
 }
 
 double Distortion::valid_radius() const {
-  // Along a ray of the plane in direction u the point moves outwards at the rate
-  // L + 2 r2 L' + r u.w, with w from the tangential and prism terms. The worst u is -w / |w|.
+  // Rate at which the distorted point moves outwards along a line through the origin in direction
+  // u:
+  //   L + 2 r2 L' + r u.w,
+  // with w from the tangential and prism terms. It is smallest for u = -w / |w|.
   const auto grows = [this](double r) {
     const Radial l = radial(k, r * r);
     const double w_x = 6 * k[3] + 2 * k[8] + 4 * r * r * k[9];

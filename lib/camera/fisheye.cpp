@@ -25,7 +25,7 @@ double Fisheye::valid_angle_rad() const {
 }
 
 double Fisheye::angle_rad(double at_distance, double valid_rad, double start_rad) const {
-  constexpr double rounding = 1e-14;  // of the distance at the very end, from which it came
+  constexpr double rounding = 1e-14;  // relative, for distances at the very end
   if (!(at_distance <= distance(valid_rad) * (1 + rounding))) {
     return std::numeric_limits<double>::quiet_NaN();
   }
@@ -39,7 +39,7 @@ double Fisheye::angle_rad(double at_distance, double valid_rad, double start_rad
     if (!by_newton) next = (low + high) / 2;
     const double moved = std::abs(next - angle);
     angle = next;
-    if (moved <= (by_newton ? 1e-7 : 1e-14) * angle) break;  // Newton squares it
+    if (moved <= (by_newton ? 1e-7 : 1e-14) * angle) break;  // Newton's error is the square of it
   }
   return std::clamp(angle, 0.0, valid_rad);
 }
@@ -53,7 +53,7 @@ FisheyeAngles::FisheyeAngles(const Fisheye& fisheye)
     const double start = std::min(from + from_slope, valid_rad_);
     const double to =
         i + 1 == kIntervals ? valid_rad_ : fisheye.angle_rad((i + 1) * interval, valid_rad_, start);
-    // At a fold the angle goes up at once.
+    // At a fold the slope of the angle is infinite.
     const double way = to - from, steepest = 3 * way;
     const double slope = fisheye.slope(to);
     const double to_slope = slope > 0 ? std::min(interval / slope, steepest) : steepest;
@@ -68,7 +68,7 @@ double FisheyeAngles::start_for(double distance) const {
   const int interval = at < kIntervals ? static_cast<int>(at) : kIntervals - 1;
   const double x = at - interval;
   const auto& [a, b, c, d] = starts_[static_cast<std::size_t>(interval)];
-  // In this order 0 where it is not a number.
+  // This order returns 0 for NaN.
   return std::min(valid_rad_, std::max(0.0, a + x * (b + x * (c + x * d))));
 }
 

@@ -6,41 +6,48 @@
 
 namespace vlp {
 
-/// How far from the centre a ray lands that makes the angle a with the axis, as a focal length's
-/// share:
+/// Radial projection of a fisheye lens: distance d from the principal point, in focal lengths, of a
+/// ray at the angle a to the optical axis:
 ///   d(a) = a (1 + k1 a^2 + k2 a^4 + k3 a^6 + k4 a^8)
 /// Source: Kannala and Brandt, "A generic camera model and calibration method for conventional,
 /// wide-angle, and fish-eye lenses", 2006; OpenCV's fisheye module; Kalibr's "equidistant".
 struct Fisheye {
-  /// k1 k2 k3 k4.
+  /// Coefficients in the order k1 k2 k3 k4.
   std::array<double, 4> k{};
 
+  /// Returns d(a).
   double distance(double angle_rad) const {
     const double t = angle_rad * angle_rad;
     return angle_rad * (1 + t * (k[0] + t * (k[1] + t * (k[2] + t * k[3]))));
   }
+  /// Returns the derivative of d at a.
   double slope(double angle_rad) const {
     const double t = angle_rad * angle_rad;
     return 1 + t * (3 * k[0] + t * (5 * k[1] + t * (7 * k[2] + t * 9 * k[3])));
   }
 
-  /// The smallest angle at which the distance stops growing, pi at most. Beyond it two rays share a
-  /// pixel, and the model describes no lens.
+  /// Computes the angle up to which the model is one to one: the smallest angle at which the
+  /// distance stops growing, at most pi. Beyond it two rays share a pixel, and the model describes
+  /// no lens.
   double valid_angle_rad() const;
 
-  /// The angle up to valid_rad that lands there, by Newton's method in a shrinking bracket from
-  /// start_rad; not a number when none does. Preconditions: distance >= 0, valid_rad =
-  /// valid_angle_rad(), the start is within 0 and that.
+  /// Inverts d(a) by Newton's method within a shrinking bracket.
+  ///
+  /// @param at_distance  distance to invert, in focal lengths, >= 0
+  /// @param valid_rad    valid_angle_rad()
+  /// @param start_rad    initial angle, 0 to valid_rad
+  /// @return             angle in [0, valid_rad]; NaN if the distance exceeds that of valid_rad
   double angle_rad(double at_distance, double valid_rad, double start_rad) const;
 };
 
-/// The angles of a lens, from a table that leaves Newton's method a step.
+/// Inverse of the radial projection of one lens. A table of initial angles reduces Newton's method
+/// to one step.
 class FisheyeAngles {
  public:
   explicit FisheyeAngles(const Fisheye& fisheye);
 
   double valid_rad() const { return valid_rad_; }
-  /// As Fisheye::angle_rad().
+  /// Returns the angle of a distance as Fisheye::angle_rad() does.
   double operator()(double distance) const {
     return fisheye_.angle_rad(distance, valid_rad_, start_for(distance));
   }
@@ -50,10 +57,10 @@ class FisheyeAngles {
 
   Fisheye fisheye_;
   double valid_rad_;
-  /// Of equal intervals of the distance, the angle as a cubic polynomial of the share of it, the
-  /// constant first.
   static constexpr int kIntervals = 64;
   double intervals_per_distance_;
+  /// Initial angle in each of kIntervals equal intervals of the distance: coefficients of a cubic
+  /// polynomial of the position in the interval (0 to 1), the constant first.
   std::array<std::array<double, 4>, kIntervals> starts_;
 };
 

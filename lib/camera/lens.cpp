@@ -87,7 +87,8 @@ std::optional<Eigen::Vector2d> Opencv::undistort(const Eigen::Vector2d& distorte
       Distortion::searched_radius * Distortion::searched_radius;
   const double reach_squared = std::min(valid_radius_squared_, searched_radius_squared);
   const double squared_norm = distorted.squaredNorm();
-  // Undoing the radial part where the pixel is saves a step, if that stays within reach.
+  // An initial point without the radial distortion at the distorted point saves a step. It is used
+  // if it lies within the valid radius.
   Eigen::Vector2d z = distorted / distortion_.radial_factor(squared_norm);
   if (squared_norm > reach_squared) {
     z = distorted * (0.9 * std::sqrt(reach_squared / squared_norm));
@@ -102,14 +103,14 @@ std::optional<Eigen::Vector2d> Opencv::undistort(const Eigen::Vector2d& distorte
     Eigen::Vector2d step = Eigen::Vector2d(j(0, 1) * error.y() - j(1, 1) * error.x(),
                                            j(1, 0) * error.x() - j(0, 0) * error.y()) /
                            determinant;
-    // Newton squares the error: after a step of 1e-7 of the radius 1e-14 of it is left.
+    // Newton's method converges quadratically: after a relative step of 1e-7 the error is 1e-14.
     if (step.squaredNorm() <= 1e-14 * (1e-2 + z.squaredNorm())) {
       z += step;
       d_distorted_d_z = j;
       if (!(determinant > 0) || !(z.squaredNorm() <= valid_radius_squared_)) return std::nullopt;
       return z;
     }
-    // Halved until it helps and stays where the model is one to one.
+    // Halve the step until the error decreases and the point stays where the model is one to one.
     for (int halving = 0;; ++halving, step /= 2) {
       if (halving == 30) return std::nullopt;
       const Eigen::Vector2d next = z + step;
@@ -124,7 +125,7 @@ std::optional<Eigen::Vector2d> Opencv::undistort(const Eigen::Vector2d& distorte
   return std::nullopt;
 }
 
-/// Where a point lies in the stereographic plane, and its derivative.
+/// Position of a point in the stereographic plane, and its derivative.
 struct StereographicPlace {
   explicit StereographicPlace(const Eigen::Vector3d& x)
       : norm(x.norm()), depth(norm + x.z()), plane(x.head<2>() * (2 / depth)) {}
@@ -215,7 +216,7 @@ class OpencvFisheye : public LensFamily {
   std::optional<Ray> unproject(const Eigen::Vector2d& plane) const override;
 
  private:
-  /// Nearer to the axis a direction away from it is not defined.
+  /// Distance from the axis below which the direction away from it is not defined.
   static constexpr double kOnAxis = 1e-300;
 
   Fisheye fisheye_;

@@ -8,39 +8,44 @@
 
 namespace vlp {
 
-/// What a lens does between a ray and the plane of focal length 1, whose centre is (0, 0):
+/// Mapping between rays and the image plane of focal length 1 with the principal point (0, 0):
 ///   pixel = f * plane + c
-/// with the distortions, the parameters after fx fy cx cy. Const and safe to share between threads.
+/// The distortions are the parameters after fx fy cx cy. Const and safe to share between threads.
 class LensFamily {
  public:
   virtual ~LensFamily() = default;
 
-  /// Where a point (any length unit) lies in the plane; nothing, or what is not finite, for a point
-  /// that the model does not describe.
+  /// Projects a point, in any unit, to the plane. Returns std::nullopt or a position that is not
+  /// finite for a point that the model does not describe.
   virtual std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& x_in_camera) const = 0;
 
   struct Jacobians {
     Eigen::Matrix<double, 2, 3> d_plane_d_point;
-    /// A column per distortion; none where there are more than twelve, which by_distortions() has.
+    /// One column per distortion. Empty for models with more than twelve, see by_distortions().
     Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::DontAlign, 2, 12> d_plane_d_distortions;
   };
-  /// Precondition, here and below: project() gives a finite place. Does not allocate.
+  /// Computes the Jacobians of project(). Does not allocate.
+  /// @pre project() returns a finite position.
   virtual Jacobians jacobians(const Eigen::Vector3d& x_in_camera) const = 0;
 
-  /// The share of a distortion of more than twelve in the plane's x (axis 0) or y (1).
+  /// Derivative of one coordinate of the plane, x (axis 0) or y (axis 1), with respect to one
+  /// distortion.
   struct ByDistortion {
     Eigen::Index distortion;
     int axis;
     double d_plane;
   };
-  /// By distortion, ascending; only those that the place depends on.
+  /// Computes the derivatives for models with more than twelve distortions: only those of
+  /// distortions that the position depends on, in ascending order. Empty for other models.
+  /// @pre project() returns a finite position.
   virtual std::vector<ByDistortion> by_distortions(const Eigen::Vector3d&) const { return {}; }
 
   struct Ray {
     Eigen::Vector3d direction;
     Eigen::Matrix<double, 3, 2> d_direction_d_plane;
   };
-  /// Of a finite place; nothing for one that project() gives of no point.
+  /// Computes the ray of a finite position in the plane. Returns std::nullopt if project() maps no
+  /// point to it.
   virtual std::optional<Ray> unproject(const Eigen::Vector2d& plane) const = 0;
 };
 

@@ -11,7 +11,7 @@
 namespace vlp {
 namespace {
 
-/// Names of splined lenses are made when they are asked for, and kept.
+/// Returns the name of a splined lens. Names are created at the first call and kept.
 std::string_view splined_name_of(LensModel model) {
   static std::mutex mutex;
   static std::map<LensModel, std::string> names;

@@ -9,25 +9,26 @@
 
 namespace vlp {
 
-/// A parameter after fx fy cx cy.
+/// Distortion parameter of a lens model, which follows fx fy cx cy.
 struct LensDistortion {
   std::string_view name;
-  /// With which a lens is nearly STEREOGRAPHIC, from where solves start. Not zero where that is a
-  /// stationary point.
+  /// Initial value for a solve. With the initial values the lens is nearly STEREOGRAPHIC. The value
+  /// is not 0 if 0 is a stationary point.
   double start;
 };
 
-/// What a lens model is besides its equations, which are in camera/lens.cpp.
+/// Name and parameters of a lens model. Its equations are in camera/lens.cpp.
 struct LensModelRow {
   LensModel model;
   std::string_view name;
   std::span<const LensDistortion> distortions;
 };
 
-/// Those with names of their own, in the order of the enumeration.
+/// Returns the models with fixed names (all except splined lenses), in the order of LensModel.
 std::span<const LensModelRow> lens_models();
 
-/// None of a splined lens: its control points have no names and start at zero.
+/// Returns the distortions of a model. Empty for a splined lens: its control points have no names
+/// and their initial value is 0.
 std::span<const LensDistortion> distortions_of(LensModel model);
 
 }  // namespace vlp

@@ -30,7 +30,7 @@ std::optional<SplineGrid> spline_grid_from_name(std::string_view name) {
   };
   const bool known = (grid.order == 2 || grid.order == 3) && fits(grid.nx) && fits(grid.ny) &&
                      grid.fov_x_deg >= 1 && grid.fov_x_deg <= SplineGrid::kMostFov_deg;
-  // One name for a model: no zeros ahead.
+  // A model has exactly one name: no leading zeros.
   return known && name_of(grid) == name ? std::optional(grid) : std::nullopt;
 }
 

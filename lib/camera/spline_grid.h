@@ -11,14 +11,14 @@
 
 namespace vlp {
 
-/// Where a splined lens has its control points, which mrcal's name of the model says:
+/// Grid of the control points of a splined lens, which mrcal's name of the model contains:
 ///   LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=16_Ny=14_fov_x_deg=190
 struct SplineGrid {
-  /// 2 or 3: pieces of a quadratic or a cubic polynomial.
+  /// Degree of the polynomials, 2 or 3.
   int order;
-  /// Along x and y, more than `order` and at most kMostKnots.
+  /// Number of control points along x and y, more than `order` and at most kMostKnots.
   int nx, ny;
-  /// From the left end of the grid to the right, 1 to kMostFov_deg.
+  /// Field of view from the left to the right end of the grid, 1 to kMostFov_deg.
   int fov_x_deg;
 
   static constexpr int kMostKnots = 255, kMostFov_deg = 359;
@@ -29,22 +29,27 @@ struct SplineGrid {
   bool operator==(const SplineGrid&) const = default;
 };
 
-/// A splined lens has a LensModel for each grid: above those that have names of their own, the
-/// grid's four numbers side by side. Precondition: within the bounds of SplineGrid.
+/// Returns the LensModel of the splined lens with this grid. Its value holds the four numbers of
+/// the grid in separate bits, above the enumerators of LensModel.
+/// @pre The numbers are within the bounds of SplineGrid.
 constexpr LensModel splined_lens(const SplineGrid& grid) {
   return static_cast<LensModel>(1 << 30 | (grid.order - 2) << 29 | grid.fov_x_deg << 20 |
                                 grid.nx << 10 | grid.ny);
 }
+/// Returns true for a splined lens of any grid.
 constexpr bool is_splined(LensModel model) { return static_cast<int>(model) >= 1 << 30; }
 
-/// Of a splined lens. Precondition: is_splined().
+/// Returns the grid of a splined lens.
+/// @pre is_splined(model)
 constexpr SplineGrid grid_of(LensModel model) {
   const int bits = static_cast<int>(model);
   return {2 + (bits >> 29 & 1), bits >> 10 & 1023, bits & 1023, bits >> 20 & 511};
 }
 
-/// The grid in a name; nothing when it is not as mrcal writes it, or beyond the bounds.
+/// Parses the grid in mrcal's name of a splined lens. Returns std::nullopt if mrcal would write the
+/// name differently, or if a number is out of the bounds of SplineGrid.
 std::optional<SplineGrid> spline_grid_from_name(std::string_view name);
+/// Returns mrcal's name of the splined lens with this grid.
 std::string name_of(const SplineGrid& grid);
 
 }  // namespace vlp

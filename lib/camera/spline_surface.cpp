@@ -13,8 +13,9 @@
 namespace vlp {
 namespace {
 
-/// What the control points of a piece count in it, from the first: a polynomial each, the constant
-/// first, of t in [0, 1] for cubic pieces and [-1/2, 1/2] for quadratic ones.
+/// Returns the weights of the control points of a piece, one row per control point: coefficients of
+/// a polynomial of t, the constant first. t is in [0, 1] for cubic pieces and [-1/2, 1/2] for
+/// quadratic ones.
 template <int Order>
 Eigen::Matrix<double, Order + 1, Order + 1> basis();
 
@@ -32,13 +33,13 @@ Eigen::Matrix4d basis<3>() {
   return rows / 6;
 }
 
-/// One direction's piece and the place in it.
+/// Piece along one axis and the position t in it.
 struct Piece {
   int index;
   double t;
 };
 
-/// at: in control points from the first.
+/// Returns the piece at a position, which counts in control points from the first one.
 template <int Order>
 Piece piece_at(double at, int control_points) {
   constexpr double middle = Order == 2 ? 0.5 : 0;
@@ -139,14 +140,14 @@ std::optional<Eigen::Vector2d> SplineSurface::search(Eigen::Vector2d u,
                                                      const Eigen::Vector2d& distorted,
                                                      Eigen::Matrix2d& d_distorted_d_u) const {
   constexpr int most_steps = 50, most_halvings = 12;
-  constexpr double rounding = 1e-12;  // of the reach, from which the pixel may have come
+  constexpr double rounding = 1e-12;  // relative to the reach, for pixels at its very end
   Eigen::Vector2d from = u, step(0, 0);
   double least = std::numeric_limits<double>::infinity();
   for (int steps = 0, halvings = 0; steps < most_steps;) {
-    // In one place, so that it is compiled into the loop.
+    // The only call, so that the compiler inlines it into the loop.
     const Value at = value<Order>(u);
     const Eigen::Vector2d error = at.distorted - distorted;
-    if (!(error.squaredNorm() < least)) {  // Halved until it helps.
+    if (!(error.squaredNorm() < least)) {  // halve the step until the error decreases
       if (++halvings == most_halvings) return std::nullopt;
       step /= 2;
       u = within_reach(from + step);
@@ -158,7 +159,7 @@ std::optional<Eigen::Vector2d> SplineSurface::search(Eigen::Vector2d u,
     step = Eigen::Vector2d(j(0, 1) * error.y() - j(1, 1) * error.x(),
                            j(1, 0) * error.x() - j(0, 0) * error.y()) /
            determinant;
-    // Newton squares the error: after a step of 1e-6 1e-12 is left.
+    // Newton's method converges quadratically: after a step of 1e-6 the error is 1e-12.
     if (step.squaredNorm() <= 1e-12) {
       u += step;
       if (!((u.cwiseAbs() - reach_).maxCoeff() <= rounding * reach_.maxCoeff())) {
@@ -208,10 +209,10 @@ void SplineSurface::fill_starts() {
     }
   }
   first_start_ = least;
-  constexpr double tiny = 1e-300;  // where all is thrown together
+  constexpr double tiny = 1e-300;  // if all distorted positions coincide
   starts_per_unit_ = (kStarts - 1) * (most - least).cwiseMax(tiny).cwiseInverse();
   starts_.assign(static_cast<std::size_t>(kStarts) * kStarts, Eigen::Vector2d::Zero());
-  // Each node starts from the place that comes nearest to it.
+  // The initial point of a node is extrapolated from the sample nearest to the node.
   std::vector<double> distances(starts_.size(), inf);
   for (const auto& [u, at] : places) {
     const Eigen::Vector2d node = (at.distorted - least).cwiseProduct(starts_per_unit_);
@@ -225,7 +226,7 @@ void SplineSurface::fill_starts() {
     distances[index] = distance;
     starts_[index] = within_reach(start);
   }
-  // To nodes that none comes near, from their neighbours: right and down, then left and up.
+  // Nodes without a sample take the initial point of a neighbor: right and down, then left and up.
   const auto take = [&](std::size_t to, std::size_t from) {
     if (distances[to] < inf || distances[from] == inf) return;
     distances[to] = distances[from];

@@ -13,22 +13,26 @@
 
 namespace vlp {
 
-/// What mrcal's splined lenses add to the stereographic plane u = 2 (x, y) / (|p| + z):
+/// Distortion of mrcal's splined lenses in the stereographic plane u = 2 (x, y) / (|p| + z):
 ///   distorted = u + sum over i, j of B(s ux + (Nx - 1) / 2 - i) B(s uy + (Ny - 1) / 2 - j) c_ij
-/// with the uniform B-spline B of the order, control points c_ij and s per unit of u, such that the
-/// outermost pieces end at the field of view:
-///   s = (Nx - order) / (4 tan(fov_x / 4)).
+///   B     uniform B-spline of the grid's order
+///   c_ij  control points
+///   s     control points per unit of u; the outermost pieces end at the field of view:
+///         s = (Nx - order) / (4 tan(fov_x / 4))
+/// Const and safe to share between threads.
 /// Source: mrcal documentation, "Splined stereographic lens model"; de Boor, "A Practical Guide to
-/// Splines", 1978. Const and safe to share between threads.
+/// Splines", 1978.
 class SplineSurface {
  public:
-  /// control_points: x and y in turn, row by row. Precondition: two for each of the grid's.
+  /// Creates the surface from control points, row by row, x before y.
+  /// @pre There are two numbers for each control point of the grid.
   SplineSurface(const SplineGrid& grid, std::span<const double> control_points);
 
   const SplineGrid& grid() const { return grid_; }
 
-  /// Up to where there are pieces, on all four sides; beyond it is no lens.
+  /// Half extent of the surface along x and y. Beyond it the lens is not defined.
   const Eigen::Vector2d& reach() const { return reach_; }
+  /// Returns true if the surface is defined at `u`.
   bool covers(const Eigen::Vector2d& u) const {
     return std::abs(u.x()) <= reach_.x() && std::abs(u.y()) <= reach_.y();
   }
@@ -37,20 +41,22 @@ class SplineSurface {
     Eigen::Vector2d distorted;
     Eigen::Matrix2d d_distorted_d_u;
   };
-  /// Precondition, here and below: covers(u).
+  /// Computes the distorted point and its derivative.
+  /// @pre covers(u), also for distorted() and weights()
   Value operator()(const Eigen::Vector2d& u) const;
   Eigen::Vector2d distorted(const Eigen::Vector2d& u) const { return (*this)(u).distorted; }
 
-  /// The control points that a place depends on, and how much: that in column `column + i` and row
-  /// `row + j` counts x[i] y[j], with i and j up to the order.
+  /// Weights of the control points at a point u: x[i] y[j] for the control point in column
+  /// `column + i` and row `row + j`, with i and j from 0 to the order.
   struct Weights {
     int column, row;
     std::array<double, 4> x, y;
   };
   Weights weights(const Eigen::Vector2d& u) const;
 
-  /// u, by Newton's method from a start out of a table of fixed size; nothing when no place up to
-  /// the reach is distorted so. The derivative is that up to 1e-6 before.
+  /// Computes the point u with this distorted position by Newton's method, from an initial point in
+  /// a table of fixed size. Returns std::nullopt if no such point within reach() is found. The
+  /// derivative is evaluated before the last step, at most 1e-6 from u.
   std::optional<Eigen::Vector2d> undistorted(const Eigen::Vector2d& distorted,
                                              Eigen::Matrix2d& d_distorted_d_u) const;
 
@@ -73,9 +79,10 @@ class SplineSurface {
   SplineGrid grid_;
   double pieces_per_u_;
   Eigen::Vector2d reach_;
-  /// Of each piece, row by row, the coefficients of x^i y^j: i in turn for each j.
+  /// Coefficients of x^i y^j of each piece, pieces row by row; for each j all i.
   std::vector<Eigen::Vector2d> pieces_;
-  /// Places that are distorted to the nodes of a lattice over all that is reached, or nearly so.
+  /// Initial points of undistorted(): points whose distorted positions are close to the nodes of a
+  /// kStarts x kStarts lattice over the range of the distorted positions.
   static constexpr int kStarts = 33;
   Eigen::Vector2d first_start_, starts_per_unit_;
   std::vector<Eigen::Vector2d> starts_;

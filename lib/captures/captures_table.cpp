@@ -9,7 +9,7 @@
 namespace vlp {
 namespace {
 
-/// Two fields of which there are both or neither.
+/// Reads two fields, both of which are given or empty.
 struct Pair {
   std::string_view first_name, second_name;
   std::optional<CsvTable::Column> first, second;

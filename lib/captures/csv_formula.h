@@ -6,11 +6,10 @@
 
 namespace vlp {
 
-/// Returns true for a field that a spreadsheet would calculate: it begins with =, +, -, @, a
-/// tabulator or a carriage return, and more follows. Apostrophes before these count as part of it,
-/// so that the one that CsvWriter puts before such a field can be taken away again by CsvTable.
-/// Numbers with a sign begin so, too, and are left to the caller.
-/// Source: OWASP, "CSV Injection".
+/// Returns true if a spreadsheet would evaluate the field: it begins with =, +, -, @, a tabulator
+/// or a carriage return, and has more characters. Leading apostrophes are skipped, so that CsvTable
+/// can remove the one that CsvWriter inserts. Returns true for signed numbers, too; the caller
+/// handles these. Source: OWASP, "CSV Injection".
 constexpr bool begins_like_formula(std::string_view field) {
   const auto first = field.find_first_not_of('\'');
   if (first == std::string_view::npos || first + 1 == field.size()) return false;

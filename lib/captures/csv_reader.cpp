@@ -33,7 +33,7 @@ struct CsvParsing {
   CsvTable& table;
   csv_parser parser{};
   std::size_t line = 0;
-  std::size_t row_line = 0;  // where the row's first field ends
+  std::size_t row_line = 0;  // line at which the row's first field ends
   std::size_t row_fields = 0;
   bool in_header = true;
   std::optional<InputError> error;
@@ -105,7 +105,7 @@ CsvTable::CsvTable(const std::filesystem::path& file) : file_(file) {
 
 CsvTable::Column CsvTable::required(std::string_view name) const {
   if (const auto column = optional(name)) return *column;
-  constexpr std::size_t enough = 500;  // of a table of ours all
+  constexpr std::size_t enough = 500;  // all columns of the program's tables
   std::string names;
   for (const std::string& have : header_) names += (names.empty() ? "" : ", ") + have;
   throw InputError(file_, 1, std::string(name),

@@ -13,9 +13,9 @@
 
 namespace vlp {
 
-/// A CSV file in the making: rows go in and, a few at a time, on to the disk; with save() the file
-/// is there, whole. Fields are quoted where they must be. Text that a spreadsheet would calculate
-/// gets an apostrophe first (csv_formula.h). Each throws InputError when the file cannot be
+/// Writer of a CSV file. Rows are buffered and written to a temporary file; save() puts it in place
+/// atomically. Fields are quoted if necessary. Text that a spreadsheet would evaluate gets a
+/// leading apostrophe (csv_formula.h). All functions throw InputError if the file cannot be
 /// written.
 class CsvWriter {
  public:
@@ -23,16 +23,16 @@ class CsvWriter {
       : file_(file) {
     row(header);
   }
-  /// With as many columns as the header has.
   CsvWriter(const std::filesystem::path& file, const std::vector<std::string>& header)
       : file_(file) {
     row(header);
   }
 
+  /// Writes a row with as many fields as the header has.
   void row(std::initializer_list<std::string_view> fields);
   void row(const std::vector<std::string>& fields);
   void save();
-  /// See WholeFile.
+  /// See WholeFile::save_unsynced().
   void save_unsynced();
 
  private:

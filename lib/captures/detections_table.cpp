@@ -42,7 +42,7 @@ std::vector<Frame> read_detections(const std::filesystem::path& file) {
 }
 
 void write_detections(const std::filesystem::path& file, const std::vector<Frame>& frames) {
-  constexpr int digits = 4;        // a ten-thousandth of a pixel
+  constexpr int digits = 4;        // 1e-4 px
   constexpr int sigma_digits = 4;  // significant
   CsvWriter csv(file, {"image", "lamp", "u_px", "v_px", "sigma_px"});
   for (const Frame& frame : frames) {

@@ -10,19 +10,19 @@
 
 namespace vlp {
 
-/// The lamps seen in one image.
+/// The lamps detected in one image.
 struct Frame {
   std::string image;
   std::vector<Detection> detections;
 };
 
-/// Reads `detections.csv`: columns image, lamp, u_px, v_px and, optionally, sigma_px, a field of
-/// which may be empty. Frames are in the order in which their images first appear. Throws
-/// InputError: see CsvTable; an empty image name; a sigma out of range; one lamp twice in
-/// an image; no rows.
+/// Reads `detections.csv`. Columns: image, lamp, u_px, v_px and, optionally, sigma_px, whose fields
+/// may be empty. Frames are in the order in which their images first appear.
+/// @throws InputError as CsvTable; if an image name is empty; if a sigma is out of range; if a lamp
+/// occurs twice in an image; if there are no rows
 std::vector<Frame> read_detections(const std::filesystem::path& file);
 
-/// Writes what read_detections() reads, whole or not at all. Throws InputError.
+/// Writes a file for read_detections(), atomically. Throws InputError if it cannot be written.
 void write_detections(const std::filesystem::path& file, const std::vector<Frame>& frames);
 
 }  // namespace vlp

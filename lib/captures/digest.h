@@ -8,10 +8,11 @@
 
 namespace vlp {
 
-/// SHA-256 of a text, in hexadecimal digits.
+/// Computes the SHA-256 of a text, in hexadecimal digits.
 std::string sha256_of_text(std::string_view text);
 
-/// SHA-256 of a file's content, in hexadecimal digits. Throws InputError.
+/// Computes the SHA-256 of a file's content, in hexadecimal digits. Throws InputError if it cannot
+/// be read.
 std::string sha256_of_file(const std::filesystem::path& file);
 
 }  // namespace vlp

@@ -79,7 +79,7 @@ FixRow::Fix fix_in(const CsvTable& csv, std::size_t row, const FixColumns& colum
   return fix;
 }
 
-/// Ids separated by blanks.
+/// Reads ids separated by blanks.
 std::vector<int> ids_in(const CsvTable& csv, std::size_t row, CsvTable::Column column) {
   std::vector<int> ids;
   std::string_view rest = csv.text(row, column);
@@ -96,10 +96,10 @@ std::vector<int> ids_in(const CsvTable& csv, std::size_t row, CsvTable::Column c
   return ids;
 }
 
-constexpr int kDigits = 9;    // nanometres
+constexpr int kDigits = 9;    // nanometers
 constexpr int kSdDigits = 6;  // significant
 
-/// A column that is there where a row has something in it.
+/// A column that is written if any row has a value in it.
 struct AddedColumn {
   std::string_view name;
   std::string (*text)(const FixRow&);

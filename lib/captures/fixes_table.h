@@ -16,45 +16,49 @@ namespace vlp {
 /// A row of `fixes.csv`.
 struct FixRow {
   std::string image;
-  /// "ok", or the reason why there is no fix.
+  /// "ok", or the reason of failure.
   std::string status;
   struct Fix {
     Pose pose;
-    /// Standard deviations of x, y, z in metres and of the yaw in radians; nothing when the noise
-    /// of the pixels is not known.
+    /// Standard deviations of x, y, z in meters and of yaw in radians; std::nullopt if the pixel
+    /// noise is unknown.
     std::optional<Eigen::Vector4d> sd;
     double residual_px;
-    /// The part of sd that is of this image alone; nothing when nothing else is known.
+    /// Part of sd due to this image alone; std::nullopt if the common errors are unknown.
     std::optional<Eigen::Vector4d> noise_sd = {};
-    /// In the world, where it moves, and the lean, where it was estimated.
+    /// Velocity in the world, and roll and pitch, if they were estimated.
     std::optional<Eigen::Vector2d> velocity_m_per_s = {};
     std::optional<Inclination> inclination = {};
   };
-  /// Nothing unless the status is "ok".
+  /// The fix; std::nullopt unless the status is "ok".
   std::optional<Fix> fix;
-  /// Lamps that the fix rests on.
+  /// Number of lamps used for the fix.
   int lamps;
-  /// Where the row stands in the file that it was read from.
+  /// Line of the row in the file from which it was read.
   std::size_t line = 0;
-  /// Ids of lamps that were left out because the others contradict them.
+  /// Ids of lamps rejected because the others contradict them.
   std::vector<int> rejected = {};
-  /// Ids of lamps that it rests on where the lens is not known, IntrinsicsReport::region_px.
+  /// Ids of used lamps that are outside the calibrated region, IntrinsicsReport::region_px.
   std::vector<int> outside_region = {};
-  /// When the capture was taken, where it is known.
+  /// Time of the capture, if known.
   std::optional<double> time_s = {};
 };
 
-/// Writes image, status, x_m, y_m, z_m, yaw_rad, sd_x_m, sd_y_m, sd_z_m, sd_yaw_rad, lamps,
-/// residual_px, and then, where a row has them, time_s, noise_sd_x_m, noise_sd_y_m, noise_sd_z_m,
-/// noise_sd_yaw_rad, vx_m_per_s, vy_m_per_s, roll_rad, pitch_rad, rejected and outside_region (ids,
-/// separated by blanks), whole or not at all; what there is not is left empty. Throws InputError.
+/// Writes `fixes.csv` atomically. Missing values are empty fields. Throws InputError if it cannot
+/// be written.
+///
+/// Columns: image, status, x_m, y_m, z_m, yaw_rad, sd_x_m, sd_y_m, sd_z_m, sd_yaw_rad, lamps,
+/// residual_px. Further columns, if any row has a value: time_s, noise_sd_x_m, noise_sd_y_m,
+/// noise_sd_z_m, noise_sd_yaw_rad, vx_m_per_s, vy_m_per_s, roll_rad, pitch_rad, rejected and
+/// outside_region (ids, separated by blanks).
 void write_fixes(const std::filesystem::path& file, const std::vector<FixRow>& rows);
 
-/// Reads what write_fixes() writes. Only image, status, x_m, y_m, z_m and yaw_rad are needed; an sd
-/// that is not there for all four is none; where the status is not "ok", the figures are not
-/// looked at. Throws InputError: see CsvTable; an image or a status that is empty; an image twice;
-/// a fix whose figures are not finite or further off than kFarthest_m, or an sd that is negative;
-/// lamps that are no ids; no rows.
+/// Reads the files of write_fixes(). Only image, status, x_m, y_m, z_m and yaw_rad are required.
+/// Standard deviations are ignored unless all four are given. Values of a fix are ignored unless
+/// the status is "ok".
+/// @throws InputError as CsvTable; if an image or a status is empty, or a status is not UTF-8; if
+/// an image occurs twice; if a value of a fix is not finite or exceeds kFarthest_m; if a standard
+/// deviation is negative; if lamps are not ids; if there are no rows
 std::vector<FixRow> read_fixes(const std::filesystem::path& file);
 
 }  // namespace vlp

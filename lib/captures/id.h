@@ -8,14 +8,14 @@
 
 namespace vlp {
 
-/// Name of a camera, run, session or step that is checked when it is made, from whatever source.
-/// It is one part of a path and reads the same in a table, a report and a terminal: 1 to 200 bytes
-/// of UTF-8, without '/', control characters, marks of direction, and '.' as its first character.
+/// Name of a camera, run, session or step, checked when it is constructed. It is one component of a
+/// path and reads the same in a table, a report and a terminal: 1 to 200 bytes of UTF-8, without
+/// '/', control characters, marks of direction, and '.' as its first character.
 class Id {
  public:
   /// @param source  file or database from which the text was read, for the message
   /// @param kind    "camera", "run", ...
-  /// @throws InputError if the text is no id
+  /// @throws InputError if the text is not an id
   Id(std::string text, const std::filesystem::path& source, std::string_view kind);
 
   /// Returns true if a text is an id.

@@ -7,8 +7,8 @@
 
 namespace vlp {
 
-/// Calls task(0) to task(count - 1), each once, on so many threads (one or more), the calling one
-/// among them. The first exception ends it and is thrown here.
+/// Calls task(0) to task(count - 1), each once, on `threads` threads (at least one), including the
+/// calling one. The first exception stops further calls and is thrown here.
 void in_parallel(std::size_t count, int threads, const std::function<void(std::size_t)>& task);
 
 }  // namespace vlp

@@ -10,7 +10,7 @@ namespace {
 
 std::uint64_t hash_of(std::string_view name) { return std::hash<std::string_view>()(name); }
 
-/// Of the hash's bits those that the choice of the slot leaves over.
+/// Returns the bits of the hash that do not select the slot.
 std::uint32_t upper(std::uint64_t hash) { return static_cast<std::uint32_t>(hash >> 32); }
 
 }  // namespace

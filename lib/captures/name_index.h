@@ -12,16 +12,16 @@
 
 namespace vlp {
 
-/// Where names stand: a hash table with open addressing, for tables of millions of rows. It holds
-/// views: the names outlive it.
+/// Index of each name: a hash table with open addressing, for tables of millions of rows. It holds
+/// views: the names must outlive it.
 class NameIndex {
  public:
-  /// For so many names, fewer than 2^32.
+  /// Reserves memory for `most` names, fewer than 2^32.
   explicit NameIndex(std::size_t most);
 
-  /// Puts a name at the next place, from 0; false, and nothing is done, when it is there.
+  /// Adds a name with the next index, from 0. Returns false, without a change, if the name exists.
   bool insert(std::string_view name);
-  /// The place of a name.
+  /// Returns the index of a name; std::nullopt if it does not exist.
   std::optional<std::size_t> find(std::string_view name) const;
 
  private:
@@ -29,15 +29,15 @@ class NameIndex {
     std::uint32_t hash = 0;
     std::uint32_t next_place = 0;  // 0: free
   };
-  /// The slot of the name, or the one that it would be in.
+  /// Returns the slot of the name, or the free slot for it.
   std::size_t slot_of(std::string_view name, std::uint64_t hash) const;
 
   std::vector<Slot> slots_;
   std::vector<std::string_view> names_;
 };
 
-/// The name in a cell, put into `names`. Throws InputError when it is empty or stands in a row
-/// before.
+/// Returns the name in a cell and adds it to `names`. Throws InputError if it is empty or occurs in
+/// an earlier row.
 std::string_view unique_name(const CsvTable& csv, std::size_t row, CsvTable::Column column,
                              NameIndex& names);
 

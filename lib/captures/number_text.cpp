@@ -9,7 +9,7 @@ namespace vlp {
 namespace {
 
 std::string formatted(double value, std::chars_format format, int digits) {
-  std::array<char, 400> text;  // the longest double with a few digits after the point
+  std::array<char, 400> text;  // fits the longest double with a few decimals
   const auto end = std::to_chars(text.begin(), text.end(), value, format, digits).ptr;
   return {text.begin(), end};
 }

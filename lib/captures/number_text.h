@@ -6,9 +6,9 @@
 
 namespace vlp {
 
-/// A number with so many digits after the point.
+/// Formats a number with `digits` digits after the point.
 std::string fixed(double value, int digits);
-/// A number with so many significant digits.
+/// Formats a number with `digits` significant digits.
 std::string significant(double value, int digits);
 
 }  // namespace vlp

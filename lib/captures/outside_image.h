@@ -10,8 +10,8 @@
 
 namespace vlp {
 
-/// How many detections are far outside an image of this width and height: by more than a tenth of
-/// it. A lamp that the image's edge cuts may have its centre a little outside.
+/// Counts the detections outside the image by more than 10 % of its width or height. The center of
+/// a lamp at the image's edge may be slightly outside.
 std::size_t count_far_outside(std::span<const Frame> frames, const std::array<int, 2>& imager_px);
 
 }  // namespace vlp

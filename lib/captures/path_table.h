@@ -9,24 +9,26 @@
 
 namespace vlp {
 
-/// A polyline in the world: two waypoints or more, from each straight on to the next.
+/// A polyline in the world with at least two waypoints.
 struct Path {
   std::vector<Eigen::Vector2d> waypoints_m;
-  /// Their heights: as many as waypoints, or none.
+  /// Heights of the waypoints; empty if unknown.
   std::vector<double> z_m;
 };
 
-/// The point of a path that is nearest to a place, seen from above.
+/// Point of a path closest to a position, horizontally.
 struct NearestOnPath {
   Eigen::Vector2d xy_m;
-  /// In between the waypoints', in proportion; nothing when the path has no heights.
+  /// Height interpolated between the waypoints; std::nullopt if the path has no heights.
   std::optional<double> z_m;
 };
 
+/// Returns the point of a path closest to a position.
 NearestOnPath nearest_on(const Path& path, const Eigen::Vector2d& place_m);
 
-/// Reads x_m, y_m and, optionally, z_m. Throws InputError: see CsvTable; a waypoint further off
-/// than kFarthest_m; fewer than two, or all at one place.
+/// Reads a path. Columns: x_m, y_m and, optionally, z_m.
+/// @throws InputError as CsvTable; if a coordinate exceeds kFarthest_m; if there are fewer than two
+/// waypoints, or all coincide
 Path read_path(const std::filesystem::path& file);
 
 }  // namespace vlp

@@ -42,7 +42,7 @@ std::size_t length_of_character(std::string_view text) {
   return length;
 }
 
-/// Returns true for separators of lines and marks that change the direction of the text around
+/// Returns true for line separators and marks that change the direction of the text around
 /// them (Unicode Standard Annex 9, section 2): U+061C, U+200E, U+200F, U+2028 to U+202E, U+2066 to
 /// U+2069.
 bool changes_order(std::string_view character) {
@@ -55,8 +55,8 @@ bool changes_order(std::string_view character) {
          is_within("\u2066", "\u2069");
 }
 
-/// Returns true for the code points that are no characters, such as U+FFFE (The Unicode Standard,
-/// section 23.7): readers of YAML replace or refuse them.
+/// Returns true for noncharacters, such as U+FFFE (The Unicode Standard, section 23.7): readers of
+/// YAML replace or reject them.
 bool is_noncharacter(std::string_view character) {
   if (character.size() == 3 && character >= "\ufdd0" && character <= "\ufdef") return true;
   if (!character.ends_with("\xbf\xbe") && !character.ends_with("\xbf\xbf")) return false;
@@ -70,7 +70,7 @@ bool is_control(std::string_view character) {
   return first < 0x20 || first == 0x7f || changes_order(character) || is_noncharacter(character);
 }
 
-/// Replaces what is not shown as it is, except characters in `kept`.
+/// Escapes control characters and invalid bytes, except characters in `kept`.
 std::string escape(std::string_view text, std::string_view kept) {
   constexpr std::string_view digits = "0123456789abcdef";
   std::string result;

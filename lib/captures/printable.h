@@ -7,16 +7,17 @@
 
 namespace vlp {
 
-/// Returns a text for a terminal or a log that holds names from others: control characters, those
-/// of ISO 6429 beyond ASCII too, marks of direction, separators of lines, code points that are no
-/// characters and bytes that are no UTF-8 become \xNN a byte. Line ends and tabulators stay.
+/// Escapes a text with untrusted names for a terminal or a log. Control characters, including those
+/// of ISO 6429 beyond ASCII, marks of direction, line separators, noncharacters and bytes that are
+/// not UTF-8 become \xNN per byte. Line ends and tabulators stay.
 std::string printable(std::string_view text);
 
-/// Returns printable() in one line: line ends and tabulators become \xNN, too, so that a name from
-/// others cannot add a line to a list.
+/// Escapes a text as printable(), and line ends and tabulators, too. An untrusted name therefore
+/// cannot add a line to a list.
 std::string printable_line(std::string_view text);
 
-/// The first characters of a text in UTF-8: so many bytes at most, no character cut.
+/// Returns the longest prefix of a UTF-8 text with at most `most_bytes` bytes and no truncated
+/// character.
 std::string first_characters(std::string text, std::size_t most_bytes);
 
 }  // namespace vlp

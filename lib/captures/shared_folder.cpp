@@ -47,7 +47,7 @@ class OpenFile {
   int descriptor_;
 };
 
-/// Returns the status of a file, not of what a link leads to; std::nullopt if it does not exist.
+/// Returns the status of a file, or of a link itself; std::nullopt if it does not exist.
 std::optional<struct stat> status_of(int folder, const std::string& name) {
   struct stat status {};
   if (::fstatat(folder, name.c_str(), &status, AT_SYMLINK_NOFOLLOW) != 0) return std::nullopt;
@@ -63,7 +63,7 @@ void write_all(int descriptor, std::string_view content, const fs::path& file) {
   }
 }
 
-/// Temporary file beside the one that is replaced; removed unless it was renamed.
+/// Temporary file in the folder of the replaced one; removed unless it was renamed.
 class TemporaryFile {
  public:
   TemporaryFile(int folder, const std::string& name) : folder_(folder) {
@@ -220,7 +220,7 @@ void SharedFolder::replace(const std::string& name, std::string_view content) co
   write_all(file.descriptor(), content, path);
   if (::fsync(file.descriptor()) != 0) fail(path, "cannot be written");
   if (!file.rename_to(name)) fail(path, "cannot be written");
-  ::fsync(descriptor_);  // not every file system can; the file is whole anyway
+  ::fsync(descriptor_);  // not every file system supports it; the file is complete in any case
 }
 
 bool SharedFolder::rename(const std::string& from, const std::string& to) const {
@@ -245,7 +245,7 @@ void SharedFolder::remove_folder(const Id& name) const {
 }
 
 void SharedFolder::remove_content() const {
-  // The open folder, though its name may lead elsewhere by now.
+  // Uses the open folder, whose name may refer to another one by now.
   const fs::path open = "/proc/self/fd/" + std::to_string(descriptor_);
   std::error_code error;
   std::vector<fs::path> entries;

@@ -12,12 +12,13 @@
 
 namespace vlp {
 
-/// Folder into which others can write, such as the captures, results and spool of a station. Its
-/// files are reached from the open folder by names of one part, and no symbolic link is followed:
-/// nothing outside the folder is read, written or removed. All functions throw InputError.
+/// Folder that others can write to, such as the captures, results and spool of a station. Its files
+/// are accessed from the open folder by names without a path, and symbolic links are not followed.
+/// Therefore no file outside the folder is read, written or removed. All functions throw
+/// InputError.
 class SharedFolder {
  public:
-  /// Opens an existing folder. Symbolic links in `path` are followed: the user named it.
+  /// Opens an existing folder. Symbolic links in `path` are followed: the user specified it.
   explicit SharedFolder(const std::filesystem::path& path);
   SharedFolder(SharedFolder&& other) noexcept;
   SharedFolder& operator=(SharedFolder&&) = delete;
@@ -30,16 +31,16 @@ class SharedFolder {
 
   /// Opens a folder in this one. Returns std::nullopt if it does not exist.
   std::optional<SharedFolder> find_folder(const Id& name) const;
-  /// Opens a folder in this one, and makes it first if it does not exist.
+  /// Opens a folder in this one, and creates it first if it does not exist.
   SharedFolder make_folder(const Id& name) const;
 
-  /// Returns true if there is anything of this name, including a symbolic link.
+  /// Returns true if an entry of this name exists, including a symbolic link.
   bool has(const std::string& name) const;
   /// Reads a regular file. Returns std::nullopt if it does not exist. Throws if it is a link, a
   /// pipe or a device, or longer than `max_bytes`.
   std::optional<std::string> read(const std::string& name, std::size_t max_bytes) const;
-  /// Replaces a file as a whole, or makes it: a temporary file, fsync, rename. Mode and owner of a
-  /// replaced regular file are kept; a link is replaced and not followed.
+  /// Replaces or creates a file atomically: a temporary file, fsync, rename. Mode and owner of a
+  /// replaced regular file are kept. A link is replaced and not followed.
   void replace(const std::string& name, std::string_view content) const;
   /// Opens a regular file with the flags of open(2). Returns -1 if it cannot be opened; throws if
   /// it is a link, a pipe or a device.
@@ -48,7 +49,7 @@ class SharedFolder {
   bool rename(const std::string& from, const std::string& to) const;
   /// Removes a file if it exists.
   void remove(const std::string& name) const;
-  /// Removes all that is in the folder, with its folders; of a link, the link.
+  /// Removes all entries of the folder, including its folders. Of a link, only the link is removed.
   void remove_content() const;
   /// Removes an empty folder in this one.
   void remove_folder(const Id& name) const;

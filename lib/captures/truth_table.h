@@ -11,18 +11,19 @@
 
 namespace vlp {
 
-/// A row of `truth.csv`: where the camera (or the robot's centre) was, in the world.
+/// A row of `truth.csv`: ground-truth position of the camera (or the robot's center) in the world.
 struct TruthRow {
   std::string image;
   Eigen::Vector2d xy_m;
   std::optional<double> z_m, yaw_rad;
-  /// Where the row stands in the file.
+  /// Line of the row in the file.
   std::size_t line = 0;
 };
 
-/// Reads image, x_m, y_m and, optionally, z_m and yaw_rad, fields of which may be empty. Throws
-/// InputError: see CsvTable; a place further off than kFarthest_m; an image name that is empty; an
-/// image twice; no rows.
+/// Reads `truth.csv`. Columns: image, x_m, y_m and, optionally, z_m and yaw_rad, whose fields may
+/// be empty.
+/// @throws InputError as CsvTable; if a coordinate exceeds kFarthest_m; if an image name is empty
+/// or occurs twice; if there are no rows
 std::vector<TruthRow> read_truth(const std::filesystem::path& file);
 
 }  // namespace vlp

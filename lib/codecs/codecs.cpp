@@ -18,7 +18,7 @@ const Codecs& load_codecs() {
     throw std::runtime_error(std::string("images cannot be read or written: ") + ::dlerror() +
                              ": install the programs again");
   }
-  // POSIX states that a symbol's address is a function's where it is one.
+  // POSIX allows the conversion of a symbol's address to a function pointer.
   const auto make = reinterpret_cast<Make>(::dlsym(library, "vlp_codecs"));  // NOLINT
   if (make == nullptr) {
     throw std::runtime_error(std::string("images cannot be read or written: ") +

@@ -7,13 +7,13 @@
 #include <string>
 #include <vector>
 
-/// Codecs of images and videos by OpenCV's imgcodecs and videoio. These load some 240 shared
-/// libraries, which takes longer than most programs. They are therefore linked to a library of
-/// their own, which is loaded at the first image, and used through these interfaces.
+/// Codecs of images and videos by OpenCV's imgcodecs and videoio, used through these interfaces.
+/// Both load about 240 shared libraries, which takes longer than most programs run. A separate
+/// library is therefore linked to them and loaded at the first image.
 namespace vlp {
 
-/// Reads the frames of a video: cv::VideoCapture behind an interface, with its members, backends
-/// (`api`, cv::CAP_FFMPEG) and properties (cv::CAP_PROP_FPS).
+/// Interface of cv::VideoCapture, which reads the frames of a video. Members, backends (`api`, for
+/// example cv::CAP_FFMPEG) and properties (cv::CAP_PROP_FPS) are those of OpenCV.
 class VideoReader {
  public:
   VideoReader() = default;
@@ -28,7 +28,8 @@ class VideoReader {
   virtual void set(int property, double value) = 0;
 };
 
-/// Decodes and encodes images, and opens videos. Its functions can be called from several threads.
+/// Decoder and encoder of images, and factory of video readers. Several threads can call its
+/// functions at the same time.
 class Codecs {
  public:
   Codecs() = default;
@@ -36,23 +37,27 @@ class Codecs {
   Codecs(const Codecs&) = delete;
   Codecs& operator=(const Codecs&) = delete;
 
-  /// Decodes the bytes of an image file, which stay as they are, with the flags of cv::imread.
-  /// Returns an empty matrix if it cannot be decoded. Throws cv::Exception as cv::imdecode does.
+  /// Decodes the bytes of an image file with the flags of cv::imread. The bytes are not changed.
+  /// Returns an empty matrix if they cannot be decoded.
+  /// @throws cv::Exception as cv::imdecode does
   virtual cv::Mat decode(std::string& bytes, int flags) const = 0;
 
-  /// Encodes an image as a file with this ending (".png"), with parameters of cv::imwrite. Throws
-  /// std::runtime_error if the image cannot be encoded.
+  /// Encodes an image as the bytes of a file.
+  ///
+  /// @param ending      file name extension, for example ".png"
+  /// @param parameters  as for cv::imwrite
+  /// @throws            std::runtime_error if the image cannot be encoded
   virtual std::string encode(const std::string& ending, const cv::Mat& image,
                              const std::vector<int>& parameters) const = 0;
 
-  /// Returns true if videos can be read by this backend of cv::VideoCapture, as cv::CAP_FFMPEG.
+  /// Returns true if this backend of cv::VideoCapture can read videos, for example cv::CAP_FFMPEG.
   virtual bool has_video_backend(int api) const = 0;
 
   virtual std::unique_ptr<VideoReader> make_video_reader() const = 0;
 };
 
-/// Returns the codecs, which are loaded at the first call. Throws std::runtime_error if the library
-/// cannot be loaded.
+/// Returns the codecs. Loads their library at the first call.
+/// @throws std::runtime_error if the library cannot be loaded
 const Codecs& codecs();
 
 }  // namespace vlp

@@ -19,17 +19,18 @@
 
 namespace vlp {
 
-/// What fixes are held against: one of a truth, a path and a commanded line.
+/// Fixes to evaluate and their reference: one of a ground truth, a path and a commanded line.
 struct EvaluationInput {
   FromFile<FixRow> fixes;
   std::optional<FromFile<TruthRow>> truth;
   std::optional<Path> path;
   std::optional<CommandedLine> line_m;
-  /// Captures whose true places are so near are of one station.
+  /// Captures whose true positions are within this distance belong to one reference point.
   double station_m = 1e-3;
-  /// To compare with.
+  /// Other fixes to compare with.
   std::optional<FromFile<FixRow>> others;
-  /// For the theoretical limit; with a truth that has z_m and yaw_rad.
+  /// Lamps, camera and pixel noise for the theoretical limit (CRLB). Needs a ground truth with z_m
+  /// and yaw_rad.
   struct Limit {
     LampMap lamps;
     Camera camera;
@@ -39,12 +40,12 @@ struct EvaluationInput {
   int threads = 1;
 };
 
-/// What the fixes are worth. With no fix nothing below `missing` holds.
+/// Accuracy of fixes. Without any fix, only the members up to `missing` are valid.
 struct Evaluation {
-  /// "truth", "path" or "line".
+  /// Reference: "truth", "path" or "line".
   std::string against;
   std::size_t captures = 0, fixes = 0;
-  /// Captures without a fix, by status.
+  /// Number of captures without a fix, by status.
   std::map<std::string, std::size_t> missing;
   double missing_share() const {
     return static_cast<double>(captures - fixes) / static_cast<double>(captures);
@@ -53,23 +54,25 @@ struct Evaluation {
   ErrorFigures horizontal_m{};
   std::vector<std::pair<double, double>> distribution_m;
   std::optional<ErrorIntervals> intervals_m;
-  /// What the intervals drew: "stations", "captures" or "runs of fixes".
+  /// Resampling unit of the intervals: "stations", "captures" or "runs of fixes".
   std::string drawn;
   std::optional<SignedFigures> height_m, yaw_rad;
-  /// With a truth: where stations have two fixes or more.
+  /// Only with a ground truth, if reference points have two fixes or more.
   std::optional<BiasAndScatter> stations;
-  /// With a commanded line: where the fixes have a direction.
+  /// Only with a commanded line, if the fixes determine a direction.
   std::optional<LineFit> fit;
-  /// With a truth.
+  /// Only with a ground truth.
   std::optional<StatedRatio> stated;
   std::optional<LimitRatio> limit;
   std::optional<Comparison> comparison;
 };
 
-/// What single fixes are off. Throws InputError when image names do not match.
+/// Computes the errors of single fixes against the reference of `input`.
+/// @throws InputError if image names do not match
 FixErrors errors_of(const EvaluationInput& input, const FromFile<FixRow>& fixes);
 
-/// Throws InputError when image names do not match.
+/// Evaluates the fixes of `input`.
+/// @throws InputError if image names do not match
 Evaluation evaluate(const EvaluationInput& input);
 
 }  // namespace vlp

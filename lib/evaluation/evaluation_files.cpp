@@ -14,7 +14,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Figures in the unit that their keys end in.
+/// Unit of keys and the factor that converts SI values to it.
 struct KeyUnit {
   const char* ending;
   double of_one;

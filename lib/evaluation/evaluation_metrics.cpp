@@ -7,8 +7,8 @@
 namespace vlp {
 namespace {
 
-/// The end of the difference's interval that is nearer to better; nothing is certain of too few,
-/// and what does not matter is nothing.
+/// Returns the lower end of the difference's interval, negative if the fixes may be better. Returns
+/// 0 for too few clusters, and for a positive difference too small to matter.
 double worse_m(const Comparison& comparison) {
   if (comparison.too_few()) return 0;
   const double low_m = comparison.interval_m->low;

@@ -9,7 +9,8 @@
 
 namespace vlp {
 
-/// Those of MetricSource::evaluation that there are, in their order.
+/// Returns the metrics of MetricSource::evaluation and ::reference that were measured, in their
+/// order.
 std::vector<Metric> metrics_of(const Evaluation& evaluation);
 
 }  // namespace vlp

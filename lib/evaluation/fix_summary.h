@@ -11,28 +11,29 @@
 
 namespace vlp {
 
-/// What a run of fixes amounts to.
+/// Summary of a run of fixes.
 struct FixSummary {
   std::size_t frames = 0;
   std::size_t fixes = 0;
-  /// Frames without a fix, by their status.
+  /// Number of frames without a fix, by status.
   std::map<std::string, std::size_t> refused;
-  /// Of the frames with a fix; nothing when there is none.
+  /// Statistics over the frames with a fix; std::nullopt if there are none.
   struct Typical {
     int fewest_lamps, most_lamps;
     double mean_lamps;
-    /// Of the fixes of three lamps or more; fewer leave no residual.
+    /// Median over the fixes from three lamps or more; fewer lamps yield no residual.
     std::optional<double> median_residual_px;
   };
   std::optional<Typical> typical;
   /// Medians of the reported standard deviations: horizontal (root of the sum of the squares of x
-  /// and y), height, yaw; nothing when there are none.
+  /// and y), height, yaw. std::nullopt if no fix reports them.
   struct Spread {
     double horizontal_m, height_m, yaw_rad;
   };
   std::optional<Spread> median_sd;
 };
 
+/// Summarizes fixes.
 FixSummary summarize(std::span<const FixRow> rows);
 
 }  // namespace vlp

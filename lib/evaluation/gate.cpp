@@ -27,7 +27,7 @@ std::string with_unit(double value, const std::string& unit) {
   return significant(value, kDigits) + (unit.empty() ? "" : " " + unit);
 }
 
-/// What is wrong with a limit; empty when nothing is.
+/// Returns an error message on an invalid limit; empty if it is valid.
 std::string problem_of(const MetricKind& kind, double limit) {
   constexpr int digits = 6;
   const std::string text = significant(limit, digits);

@@ -13,59 +13,64 @@ namespace vlp {
 
 class [[gnu::visibility("hidden")]] YamlValue;
 
-/// By how much more than its limit asks a metric has to be good, because it is measured with an
-/// uncertainty (guarded acceptance, JCGM 106:2012, section 8.3.2): it is accepted up to limit - k
-/// u, or from limit + k u on. Metrics that are at the limit in truth are accepted with the
-/// probability 1 - Phi(k): 0.05 with k = 1.645 (ISO 14253-1), 0.023 with 2.
+/// Guard band that allows for measurement uncertainty in an acceptance decision (guarded
+/// acceptance, JCGM 106:2012, section 8.3.2). A metric is accepted up to limit - k u, or from limit
+/// + k u on.
+///
+/// Metrics whose true value is at the limit are accepted with the probability 1 - Phi(k): 0.05 for
+/// k = 1.645 (ISO 14253-1), 0.023 for k = 2.
 struct GuardBand {
-  /// u, in the metric's unit.
+  /// Standard uncertainty u, in the metric's unit.
   double standard_uncertainty;
   double k;
 
   double width() const { return k * standard_uncertainty; }
 };
 
-/// What a metric has to be at most, or at least, whichever its kind says.
+/// Acceptance limit of a metric. Its direction, at most or at least, is that of the metric's kind.
 struct Gate {
   std::string metric;
   double limit;
   std::optional<GuardBand> guard = {};
 };
 
-/// A metric, as it was measured, and its gate.
+/// Measured metric and its gate, if any.
 struct CheckedMetric {
   std::string name;
   std::string unit;
-  /// Nothing where it could not be measured.
+  /// Measured value; std::nullopt if it could not be measured.
   std::optional<double> value;
-  /// Nothing when it is no gate.
+  /// Limit of the gate; std::nullopt if the metric has no gate.
   std::optional<double> limit;
   Direction asked;
   std::optional<GuardBand> guard = {};
 
-  /// The limit, its guard band taken off. Precondition: it is a gate.
+  /// Returns the limit tightened by its guard band.
+  /// @pre there is a gate
   double acceptance_limit() const;
-  /// A gate without a value is not met.
+  /// Returns true if the gate is passed, or if there is none. A gate without a value is not passed.
   bool met() const;
-  /// Of the metric being within its limit in truth, when nothing but its value is known of it:
-  /// Phi((limit - value) / u), or Phi((value - limit) / u) (JCGM 106:2012, section 7). Nothing
-  /// without a value, a limit or a guard band.
+  /// Returns the probability that the true value is within the limit, given only the measured
+  /// value: Phi((limit - value) / u), or Phi((value - limit) / u) (JCGM 106:2012, section 7).
+  /// Returns std::nullopt without a value, a limit or a guard band.
   std::optional<double> conformance_probability() const;
 };
 
-/// The metrics, with what each needs, a line for each, for people.
+/// Describes the metrics and what each requires, one line each, for humans.
 std::string gate_descriptions(const std::vector<MetricKind>& known);
 
-/// The gate that "NAME=VALUE" says. Throws std::invalid_argument when no kind has the name (and
-/// says which there are), or when the value is not a number from 0 to the kind's largest.
+/// Parses "NAME=VALUE".
+/// @throws std::invalid_argument with the valid names, if no kind has the name
+/// @throws std::invalid_argument if the value is not a number from 0 to the kind's largest
 Gate gate_of(const std::string& text, const std::vector<MetricKind>& known);
 
-/// Of several such texts. Throws std::invalid_argument, too, when one stands twice.
+/// Parses several "NAME=VALUE".
+/// @throws std::invalid_argument as gate_of(), and if a name is repeated
 std::vector<Gate> gates_of(const std::vector<std::string>& texts,
                            const std::vector<MetricKind>& known);
 
-/// Reads {NAME: LIMIT}, in the order of the kinds. Throws InputError: a name or a limit that
-/// gate_of() would refuse, no gate.
+/// Reads {NAME: LIMIT}, in the order of the kinds.
+/// @throws InputError if a name or limit is invalid as in gate_of(), or if there is no gate
 std::vector<Gate> read_gates(const YamlValue& value, const std::vector<MetricKind>& known);
 
 /// Reads `vlp-gates/1`:
@@ -74,31 +79,35 @@ std::vector<Gate> read_gates(const YamlValue& value, const std::vector<MetricKin
 std::vector<Gate> read_gates(const std::filesystem::path& file,
                              const std::vector<MetricKind>& known);
 
-/// The gates, those of `changes` in place of those of the same metric.
+/// Returns the gates with the limits of `changes`, and with the gates of `changes` on other metrics
+/// appended. Guard bands are kept.
 std::vector<Gate> with_changes(std::vector<Gate> gates, const std::vector<Gate>& changes);
 
-/// In the order of the gates. Precondition, here and below: gates are of kinds that there are.
+/// Returns the metrics with gates, in the order of the gates.
+/// @pre here and below: the metric of each gate exists (metric_kind())
 std::vector<CheckedMetric> check_gates(const std::vector<Gate>& gates,
                                        const std::vector<Metric>& metrics);
 
-/// All metrics, with gates and without, and gates whose metric was not measured; in the order of
-/// the kinds.
+/// Returns all metrics, with and without gates, and the gates whose metric was not measured. They
+/// are in the order of the kinds.
 std::vector<CheckedMetric> check_all(const std::vector<Gate>& gates,
                                      const std::vector<Metric>& metrics,
                                      const std::vector<MetricKind>& known);
 
-/// For example "mean_mm is 1.25 mm, at most 1 mm is asked for", or "at most 1 mm less a guard band
-/// of 0.04 mm". Precondition: it is a gate.
+/// Describes a gate, for example "mean_mm is 1.25 mm, at most 1 mm is asked for", or "at most 1 mm
+/// less a guard band of 0.04 mm".
+/// @pre there is a gate
 std::string words_of(const CheckedMetric& gate);
 
-/// " less a guard band of 0.04 mm", or " and ..."; empty without one.
+/// Returns " less a guard band of 0.04 mm", or " and ..." for lower limits; empty without a guard
+/// band.
 std::string words_of_guard(const CheckedMetric& gate);
 
-/// words_of() of those that are not met, with "; " between them.
+/// Returns words_of() for all gates that are not passed, separated by "; ".
 std::string words_of_missed(const std::vector<CheckedMetric>& gates);
 
-/// Returns what it means that a gate is not met, then words_of() it; of a metric that was not
-/// measured words_of() alone.
+/// Returns the probable cause of a failed gate, followed by words_of(); words_of() alone if the
+/// metric was not measured.
 std::string cause_of(const CheckedMetric& gate);
 
 }  // namespace vlp

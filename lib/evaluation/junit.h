@@ -14,7 +14,7 @@ namespace vlp {
 struct JUnitTest {
   enum class Result {
     passed,
-    failed,  // measured, and a gate is not met
+    failed,  // measured, and a gate is not passed
     error    // could not be measured
   };
 
@@ -24,12 +24,13 @@ struct JUnitTest {
   std::string message = {};
   /// Kind of an error, for example "wrong_map"; empty for the other results.
   std::string error_type = {};
-  /// Text that is printed with the test, also if it passed.
+  /// Text printed with the test, even if it passed.
   std::vector<std::string> warnings = {};
 };
 
-/// Returns a test for each gate, in their order; `failed` with cause_of() the gate if it is not
-/// met. Precondition: all have a limit.
+/// Returns a test for each gate, in their order; `failed` with cause_of() if the gate is not
+/// passed.
+/// @pre all have a limit
 std::vector<JUnitTest> make_junit_tests(std::span<const CheckedMetric> gates);
 
 /// Formats a report of one suite as JUnit XML, for CI systems. Errors become `error`, failures

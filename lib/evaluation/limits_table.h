@@ -8,9 +8,12 @@
 
 namespace vlp {
 
-/// Writes what each place of a floor allows as CSV: x_m, y_m, z_m, yaw_rad, lamps, sd_x_m, sd_y_m,
-/// sd_z_m, sd_yaw_rad; of each source its horizontal standard deviation, under its key and _m;
-/// horizontal_m of all together. What a place does not determine is empty. Throws InputError.
+/// Writes the achievable accuracy at each position of a floor as CSV. Columns:
+///   x_m, y_m, z_m, yaw_rad, lamps, sd_x_m, sd_y_m, sd_z_m, sd_yaw_rad
+///   for each source its horizontal standard deviation, named by its key and _m
+///   horizontal_m, the standard deviation of all sources together
+/// Cells of positions without a fix are empty.
+/// @throws InputError if the file cannot be written
 void write_limits(const std::filesystem::path& file, const FloorLimits& limits);
 
 }  // namespace vlp

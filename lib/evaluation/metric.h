@@ -9,56 +9,56 @@
 
 namespace vlp {
 
-/// Who measures a metric.
+/// Origin of a metric.
 enum class MetricSource {
-  /// Of a unit's images, against the camera's type and the known points.
+  /// Images of a unit at the station, against the camera's type and the known points.
   station,
-  /// The steps of the procedure.
+  /// Steps of the procedure.
   lens,
   rotation,
   dispersion,
   /// Errors of fixes.
   evaluation,
-  /// Errors of fixes, too, held against a line, the theoretical limit or other fixes.
+  /// Errors of fixes against a line, the theoretical limit or other fixes.
   reference
 };
 
-/// What a gate of a metric asks.
+/// Direction of a limit.
 enum class Direction { at_most, at_least };
 
-/// "at most" or "at least".
+/// Returns "at most" or "at least".
 std::string words_of(Direction asked);
 
-/// A figure that is measured, and that a gate can be of.
+/// Metric that can be measured and that a gate may limit.
 struct MetricKind {
   const char* name;
-  /// Of its values and limits: "mm", "px", "deg", "%"; empty of a share, from 0 to 1, or a ratio.
+  /// Unit of values and limits: "mm", "px", "deg", "%"; empty for a fraction (0 to 1) or a ratio.
   const char* unit;
   MetricSource source;
-  /// What it is, and what it needs.
+  /// Description, and what the metric requires.
   const char* meaning;
-  /// What it means when its gate is not met, for people: "the lens is decentred".
+  /// Probable cause of a failed gate, for humans: "the lens is decentred".
   const char* cause;
   Direction asked = Direction::at_most;
-  /// That a limit can be: 1 of a share.
+  /// Largest valid limit: 1 for a fraction.
   double largest = 1e6;
-  /// Whether it tells of the camera; otherwise of what it was measured with, or how.
+  /// True for a property of the camera; false for one of the equipment or the procedure.
   bool of_camera = true;
 };
 
-/// Those of some sources; what explains others comes before them.
+/// Returns the metrics of these sources, causes before effects.
 std::vector<MetricKind> metric_kinds(std::initializer_list<MetricSource> sources);
 
-/// The one of this name, which no two have; nothing when there is none.
+/// Returns the metric of this unique name; std::nullopt if there is none.
 std::optional<MetricKind> metric_kind(const std::string& name);
 
-/// A metric that was measured.
+/// Measured metric.
 struct Metric {
   std::string name;
   double value;
 };
 
-/// Nothing where it was not measured, or is not finite.
+/// Returns the value of a metric; std::nullopt if it was not measured or is not finite.
 std::optional<double> value_of(const std::vector<Metric>& metrics, const std::string& name);
 
 }  // namespace vlp

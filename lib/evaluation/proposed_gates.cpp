@@ -21,14 +21,15 @@ constexpr double kNormalQuantile999 = 3.0902, kNormalQuantile975 = 1.96;
 constexpr double kMinRelativeMargin = 0.01, kMinMargin = 0.001;
 
 double round_up(double value) {
-  constexpr double last_digit = 2;  // of three
+  constexpr double last_digit = 2;  // last of three significant digits
   constexpr double numeric_tolerance = 1e-9;
   const double step = std::pow(10, std::floor(std::log10(value)) - last_digit);
   return step * std::ceil(value / step - numeric_tolerance);
 }
 
 double compute_limit(double value, const Interval& interval) {
-  // The ends of the interval of a quantile are errors that occurred, so that one may be too near.
+  // The larger half: for quantiles, the interval ends at errors that occurred, so one end may be
+  // too near.
   const double half_width = std::max(interval.high - value, value - interval.low);
   const double standard_error = half_width / kNormalQuantile975;
   const double margin = std::max({kNormalQuantile999 * std::numbers::sqrt2 * standard_error,
@@ -36,8 +37,8 @@ double compute_limit(double value, const Interval& interval) {
   return round_up(value + margin);
 }
 
-/// Computes the intervals of the errors that `size_of` returns for each fix, std::nullopt for fixes
-/// without one.
+/// Computes the intervals of |size_of(error)|, without errors for which `size_of` returns
+/// std::nullopt.
 std::optional<ErrorIntervals> compute_intervals(
     const std::vector<FixError>& errors,
     const std::function<std::optional<double>(const FixError&)>& size_of, int threads) {
@@ -77,7 +78,7 @@ std::vector<Gate> propose_gates(const EvaluationInput& input, const Evaluation& 
   const auto yaw_rad = compute_intervals(
       errors, [](const FixError& error) { return error.yaw_rad; }, input.threads);
   if (yaw_rad) add("yaw_rms_deg", evaluation.yaw_rad->sizes.rms, yaw_rad->rms, degrees);
-  constexpr double millionth = 1e-6;  // as it is written
+  constexpr double millionth = 1e-6;  // resolution of the written limit
   gates.push_back({"missing", millionth * std::ceil(evaluation.missing_share() / millionth)});
   return gates;
 }

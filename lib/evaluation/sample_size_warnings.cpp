@@ -9,7 +9,8 @@
 namespace vlp {
 namespace {
 
-/// Of so many units percentile intervals are nearly as wide as they should be: error_intervals().
+/// Number of clusters from which percentile intervals are nearly as wide as they should be, see
+/// error_intervals().
 constexpr std::size_t kEnoughUnits = 50;
 
 std::string so_few(std::size_t units, const std::string& drawn) {

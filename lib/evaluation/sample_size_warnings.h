@@ -10,16 +10,19 @@
 
 namespace vlp {
 
-/// For example "393 of 432 captures have no fix, and no gate 'missing' asks"; empty when every
-/// capture has a fix, when such a gate asks, and without gates, as nothing passes then.
+/// Returns, for example, "393 of 432 captures have no fix, and no gate 'missing' asks". Returns an
+/// empty text if every capture has a fix or if a gate limits `missing`. Empty without gates, too,
+/// as no run passes then.
 std::string unasked_missing(const Evaluation& evaluation, const std::vector<CheckedMetric>& gates);
 
-/// That the theoretical limit is beaten: the noise it is of is stated too large, or the fixes use
-/// more than what it is of, one image of a level camera; empty when it is not. Without a full stop.
+/// Returns a warning if the errors are below the theoretical limit, without a full stop; empty
+/// otherwise. Either the assumed pixel noise is too large, or the fixes use more information than
+/// one image of a level camera.
 std::string warning_of_limit(const Evaluation& evaluation);
 
-/// What so few stations or captures (or, of a comparison, pairs' ones) mean for the intervals and
-/// the verdict, a line each without a full stop; none when there are 50 or more.
+/// Returns warnings about intervals and verdicts from few stations or captures, one line each
+/// without a full stop. For a comparison, clusters of the pairs count. Returns none for 50 clusters
+/// or more.
 std::vector<std::string> sample_size_warnings(const Evaluation& evaluation);
 
 }  // namespace vlp

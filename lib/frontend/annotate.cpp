@@ -16,7 +16,7 @@
 namespace vlp {
 namespace {
 
-/// Of places: eight bits of a fraction of a pixel.
+/// Number of fractional bits of OpenCV's drawing coordinates.
 constexpr int kShift = 8;
 
 cv::Scalar color_of(LightKind kind) {
@@ -55,7 +55,7 @@ cv::Point fine(const Eigen::Vector2d& pixel) {
           static_cast<int>(std::lround(pixel.y() * unit))};
 }
 
-/// In colour, and so that dark surroundings can be seen.
+/// Converts an image to color and brightens it, so that dark surroundings are visible.
 cv::Mat brightened(const cv::Mat& image) {
   constexpr double gamma = 0.5;
   const double white = image.depth() == CV_8U ? 255 : 65535;
@@ -67,7 +67,7 @@ cv::Mat brightened(const cv::Mat& image) {
   return result;
 }
 
-/// Beside the light, on the side where there is room.
+/// Draws a text next to a light, on the side with enough space.
 void write_label(cv::Mat& picture, const Light& light, double size) {
   const std::string label = label_of(light);
   const int thickness = static_cast<int>(std::lround(size));

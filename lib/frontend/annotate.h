@@ -11,14 +11,16 @@
 
 namespace vlp {
 
-/// A picture of what was found, to look at: the image, brightened, with the outline points of each
-/// light, its centre, what it is, and why it is no lamp. Lamps are green, cut ones yellow, unknown
-/// lights red, steady ones blue,
-/// formless ones grey. `image` has one channel of 8 or 16 bits.
+/// Renders the detected lights into a brightened color copy of an image, for visual inspection.
+/// Draws outline points, center, kind and reason of each light. Lamps are green, truncated lights
+/// yellow, unknown ones red, unmodulated ones blue, and lights without outline grey.
+///
+/// @param image  one channel of 8 or 16 bits
 cv::Mat annotated(const cv::Mat& image, const std::vector<Light>& lights, Readout readout);
 
-/// Writes it as PNG into `folder`, whole or not at all, named like the image with `.png` added.
-/// Throws InputError.
+/// Writes an annotated image atomically as PNG into `folder`, named like the image with `.png`
+/// appended.
+/// @throws InputError if the file cannot be written
 void write_annotated(const std::filesystem::path& folder, const std::filesystem::path& image_file,
                      const cv::Mat& picture);
 

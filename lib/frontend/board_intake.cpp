@@ -60,7 +60,8 @@ std::string describe_too_few_corners(const Board& board, const SeenBoard& seen) 
   return message;
 }
 
-/// Rejects images of another size than most; of sizes that are equally frequent the first counts.
+/// Rejects images that do not have the most frequent size. Among equally frequent sizes the first
+/// one counts.
 void reject_other_sizes(std::vector<Observation>& images) {
   std::map<std::array<int, 2>, std::size_t> counts;
   for (const Observation& image : images) {
@@ -109,7 +110,7 @@ std::vector<BoardView> collect_views(const std::vector<Observation>& images) {
   return views;
 }
 
-/// Options that take a few frames of videos, spread over their length.
+/// Returns options for a few frames of each video, spread over its length.
 FrontendOptions make_sparse_options(const std::vector<fs::path>& images, FrontendOptions options) {
   constexpr std::size_t num_samples = 12;
   const std::size_t step =
@@ -133,7 +134,7 @@ void inspect_samples(const std::vector<fs::path>& images, const FrontendOptions&
   }
 }
 
-/// Explains why no chessboard is seen, by the largest one in a few of the images.
+/// Explains why the chessboard is not detected, from the largest chessboard in a few of the images.
 IntakeFailure explain_no_chessboard(const std::vector<fs::path>& images, const Board& board,
                                     const fs::path& board_file, const FrontendOptions& options,
                                     std::size_t num_views) {
@@ -145,7 +146,7 @@ IntakeFailure explain_no_chessboard(const std::vector<fs::path>& images, const B
     if (shown[0] * shown[1] > largest[0] * largest[1]) largest = shown;
     return ++inspected < num_samples;
   });
-  // The board may be turned by 90 degrees.
+  // The board may be rotated by 90 degrees.
   if ((largest[0] < largest[1]) != (board.cols < board.rows)) std::swap(largest[0], largest[1]);
   const auto [cols, rows] = largest;
   if (cols > board.cols || rows > board.rows) {
@@ -222,7 +223,7 @@ IntakeFailure explain_no_board(const std::vector<fs::path>& images, const Board&
                              tag, board.family, views.size(), tag)};
 }
 
-/// Removes corners that contradict their neighbours; of tags the whole tag.
+/// Rejects corners that contradict their neighbors. A tag is rejected as a whole.
 void remove_blunders(const BoardLattice& lattice, BoardView& view,
                      std::vector<std::string>& warnings) {
   const auto blunders = corner_blunders(lattice.corners(view.seen));

@@ -15,12 +15,12 @@
 
 namespace vlp {
 
-/// Detects a board in images and rejects those that a calibration of the lens cannot use. Safe to
-/// share between threads.
+/// Detector of a board in images, which rejects images that a calibration of the lens cannot use.
+/// Safe to share between threads.
 class BoardIntake {
  public:
-  /// Throws std::invalid_argument for a board that BoardDetector or BoardLattice refuse.
-  /// `imager_px`: size of the camera's images, if it is known.
+  /// Creates the detector of a board. `imager_px` is the size of the camera's images, if known.
+  /// @throws std::invalid_argument if BoardDetector or BoardLattice reject the board
   BoardIntake(const Board& board, const FrontendOptions& options,
               const std::optional<std::array<int, 2>>& imager_px = std::nullopt);
 
@@ -40,23 +40,24 @@ class BoardIntake {
   const BoardCache cache_;
 };
 
-/// Detects a board in images and videos (BoardIntake) and rejects repeated views (Selection). All
-/// images have to be of one size: those of another size than most are rejected. Results do not
-/// depend on the number of threads. Observations::failure: no image shows the board; a wrong file
-/// if the images show another board than `board_file`.
+/// Detects a board in images and videos (BoardIntake) and rejects repeated views (Selection).
+/// Images whose size differs from that of most images are rejected. Results do not depend on the
+/// number of threads.
 ///
-/// Throws InputError if no image can be read.
+/// Sets Observations::failure if no image shows the board. Its file is `board_file` if the images
+/// show another board.
+/// @throws InputError if no image can be read
 Observations observe_boards(const std::vector<std::filesystem::path>& images, const Board& board,
                             const std::filesystem::path& board_file, const FrontendOptions& options,
                             const IntakeProgress& progress = {});
 
-/// Returns true for the name of a file of corners: .vnl of mrcal, or .csv.
+/// Returns true if the extension is that of a file of corners: .vnl of mrcal, or .csv.
 bool holds_corners(const std::filesystem::path& file);
 
-/// Reads the corners of a board from a file of mrcal (read_corners()) or a table
-/// (read_corner_table()) instead of images of size `imager_px`, and selects views as
-/// observe_boards() does. Removes corners that contradict their neighbours, with a warning. Throws
-/// InputError.
+/// Reads the corners of a board from a file of mrcal (read_corners()) or from a table
+/// (read_corner_table()), instead of images of size `imager_px`. Selects views as observe_boards()
+/// does. Rejects corners that contradict their neighbors, with a warning.
+/// @throws InputError if the file cannot be read
 Observations read_board_views(const std::filesystem::path& file, const Board& board,
                               const std::filesystem::path& board_file,
                               const std::array<int, 2>& imager_px, const FrontendOptions& options);

@@ -40,7 +40,7 @@ constexpr std::array kColumns{
     "sd3",   "blur0",   "dark0",   "bright0", "blur1",   "dark1", "bright1", "blur2",
     "dark2", "bright2", "blur3",   "dark3",   "bright3"};
 
-/// With zeros to its end.
+/// Returns a row that is padded with zeros.
 std::vector<std::string> row_of(std::vector<std::string> begin) {
   begin.resize(kColumns.size(), "0");
   return begin;
@@ -62,9 +62,13 @@ std::vector<std::string> row_of(int id, const SeenTag::Outline& outline) {
   return row;
 }
 
-/// The first row, with id -1, holds the image's size and the counts, by which a file that a power
-/// cut left in part is known. Then come a row per tag, one per foreign tag, one per point, with its
-/// place, one per curve with its cost, and of more than two each tag behind those beyond the first.
+/// Writes a detection. The first row, with id -1, contains the image size and the counts, by which
+/// a file truncated by a power failure is recognized. The other rows are, in this order:
+///   one per tag
+///   one per foreign tag
+///   one per point, with its pixel
+///   one per tone curve, with its cost
+///   with more than two tone curves, one per tag and curve after the first
 void write_view(const fs::path& file, const CachedView& cached) {
   const BoardView& view = cached.view;
   CsvWriter csv(file, {kColumns.begin(), kColumns.end()});

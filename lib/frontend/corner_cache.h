@@ -12,7 +12,7 @@
 
 namespace vlp {
 
-/// Detection of a board in an image with the figures that decide whether the image is used.
+/// Detection of a board in an image with the values by which the image is accepted or rejected.
 struct CachedView {
   BoardView view;
   /// Sigma of the blur; std::nullopt without contrast.
@@ -21,17 +21,19 @@ struct CachedView {
   double bright_fraction, white_fraction;
 };
 
-/// Results of earlier detections. Both functions are safe to call from several threads; both are
+/// Functions to find and store earlier detections, safe to call from several threads. Both are
 /// empty if there is no cache.
 struct BoardCache {
   std::function<std::optional<CachedView>(const SourceImage& image)> find;
   std::function<void(const SourceImage& image, const CachedView& view)> keep;
 };
 
-/// Creates a cache with a file per image in `folder`, which is created if missing and can be
-/// deleted at any time. Files are named by the SHA-256 of the image and of everything that the
-/// detection depends on: the board and the version of the program. Corners are restored as the same
-/// doubles. Files that cannot be read or written are ignored. An empty name means no cache.
+/// Creates a cache with one file per image in `folder`, which is created if missing and may be
+/// deleted at any time. Without a folder name there is no cache.
+///
+/// A file is named by the SHA-256 of the image and of all that the detection depends on: the board
+/// and the version of the program. Corners are restored as the same doubles. Files that cannot be
+/// read or written are ignored.
 BoardCache corner_cache(const std::filesystem::path& folder, const Board& board);
 
 }  // namespace vlp

@@ -17,8 +17,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A JPEG that is cut short is decoded all the same, grey from there on: its scan has to end with
-/// the marker of the end (FF D9).
+/// Returns true if a JPEG is truncated: no end marker (FF D9) follows its scan. A truncated JPEG is
+/// decoded without an error, with grey pixels after the end of the data.
 bool is_cut_jpeg(const std::string& bytes) {
   constexpr std::size_t marker = 2;
   if (!bytes.starts_with("\xff\xd8")) return false;
@@ -26,15 +26,16 @@ bool is_cut_jpeg(const std::string& bytes) {
   return scan == std::string::npos || end == std::string::npos || end < scan + marker;
 }
 
-/// A PNG ends with its IEND chunk: no data, and their check sum. Some programs add to it.
+/// Returns true if a PNG is truncated: it lacks the empty IEND chunk with its checksum. Some
+/// programs append data to this chunk.
 bool is_cut_png(const std::string& bytes) {
   using namespace std::string_view_literals;
   constexpr auto end = "\0\0\0\0IEND\xae\x42\x60\x82"sv;
   return bytes.starts_with("\x89PNG\r\n\x1a\n") && bytes.rfind(end) == std::string::npos;
 }
 
-/// Returns how long the file of an image of `max_mpx` megapixels can be: uncompressed with four
-/// channels of 16 bits, and as much again of previews and metadata as the largest profile needs.
+/// Returns the largest length in bytes of a file with `max_mpx` megapixels: four uncompressed
+/// channels of 16 bits, and 64 MB for previews, metadata and color profiles.
 std::size_t max_file_bytes(double max_mpx) {
   constexpr double bytes_per_mpx = 8e6, metadata_bytes = 64e6;
   constexpr double max_of_decoder = std::numeric_limits<int>::max();
@@ -59,7 +60,7 @@ cv::Mat read_image(const fs::path& file, double max_mpx) {
   if (bytes.empty()) throw InputError(file, "cannot be read as an image");
   const char* const cut = "cannot be read as an image: it is cut short";
   if (is_cut_jpeg(bytes)) throw InputError(file, cut);
-  // Other formats are not decoded: nothing states in advance how much memory they take.
+  // Other formats are rejected, because the memory that they need is unknown before decoding.
   const auto size = size_in_header(bytes);
   if (!size) {
     throw InputError(file, has_image_signature(bytes)

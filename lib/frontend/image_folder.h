@@ -11,11 +11,12 @@ namespace vlp {
 /// Returns true if the extension is that of an image: PNG, JPEG, BMP, TIFF or PGM.
 bool is_image_name(const std::filesystem::path& file);
 
-/// Lists the images in a folder, sorted by name. Throws InputError if it is no folder or holds
-/// none.
+/// Lists the images in a folder, sorted by name.
+/// @throws InputError if it is no folder or contains no image
 std::vector<std::filesystem::path> list_images(const std::filesystem::path& folder);
 
-/// Replaces each folder among the names by the images in it. Throws InputError as list_images().
+/// Replaces each folder among the names by the images in it.
+/// @throws InputError as list_images()
 std::vector<std::filesystem::path> expand_folders(const std::vector<std::string>& names);
 
 }  // namespace vlp

@@ -14,7 +14,7 @@ using Size = std::optional<std::array<std::int64_t, 2>>;
 
 enum class ByteOrder { big, little };
 
-/// An unsigned number of `count` bytes; nothing beyond the end.
+/// Reads an unsigned number of `count` bytes; std::nullopt beyond the end.
 std::optional<std::int64_t> number_at(std::string_view bytes, std::size_t at, std::size_t count,
                                       ByteOrder order) {
   if (at > bytes.size() || bytes.size() - at < count) return {};
@@ -31,12 +31,12 @@ Size pair_of(const std::optional<std::int64_t>& width, const std::optional<std::
   return std::array{*width, *height};
 }
 
-/// Length and type of the first chunk, IHDR, follow the signature of 8 bytes.
+/// Reads the size from the first chunk, IHDR. Its length and type follow the signature of 8 bytes.
 Size png_size(std::string_view bytes) {
   return pair_of(number_at(bytes, 16, 4, ByteOrder::big), number_at(bytes, 20, 4, ByteOrder::big));
 }
 
-/// A negative height means rows from the top.
+/// Reads the size of a BMP. A negative height means that rows are stored from the top.
 Size bmp_size(std::string_view bytes) {
   const auto header = number_at(bytes, 14, 4, ByteOrder::little);
   constexpr std::int64_t oldest = 12;  // of OS/2, with sizes of two bytes
@@ -85,9 +85,10 @@ Size jpeg_size(std::string_view bytes) {
   return {};
 }
 
-/// How TIFF, and BigTIFF with its numbers of 8 bytes, lay out what leads to the size.
+/// Layout of TIFF and of BigTIFF, whose numbers have 8 bytes, as far as the size requires it.
 struct TiffLayout {
-  /// Where the place of the first directory stands; bytes of a place, and of a count of entries.
+  /// Position of the offset of the first directory; number of bytes of an offset and of a count of
+  /// entries.
   std::size_t directory_at, place_bytes, count_bytes;
   /// Bytes of an entry, and where in it the value stands.
   std::size_t entry_bytes, value_at;
@@ -124,7 +125,8 @@ bool is_pnm(std::string_view bytes) {
   return bytes.size() > 2 && bytes[0] == 'P' && bytes[1] >= '1' && bytes[1] <= '6';
 }
 
-/// "P5", width and height with white space and comments between them.
+/// Reads the size of a PBM, PGM or PPM: "P5", width and height, separated by white space and
+/// comments.
 Size pnm_size(std::string_view bytes) {
   std::size_t at = 2;
   const auto is_space = [](char c) { return std::isspace(static_cast<unsigned char>(c)) != 0; };

@@ -9,12 +9,12 @@
 
 namespace vlp {
 
-/// Returns true if a file begins as a PNG, JPEG, BMP, TIFF, PBM, PGM or PPM does.
+/// Returns true if a file begins with the signature of PNG, JPEG, BMP, TIFF, PBM, PGM or PPM.
 bool has_image_signature(std::string_view bytes);
 
-/// Reads width and height in pixels from the header of a PNG, JPEG, BMP, TIFF, PBM, PGM or PPM file
-/// without decoding the image: a file of a megabyte can hold gigapixels. Returns std::nullopt for
-/// any other file, or if it is cut short before its size.
+/// Parses width and height in pixels from the header of a PNG, JPEG, BMP, TIFF, PBM, PGM or PPM
+/// file. The image is not decoded, because a file of a megabyte can contain gigapixels. Returns
+/// std::nullopt for other files, and for files truncated before the size.
 std::optional<std::array<std::int64_t, 2>> size_in_header(std::string_view bytes);
 
 }  // namespace vlp

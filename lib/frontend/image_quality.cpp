@@ -60,7 +60,7 @@ double estimate_noise(const cv::Mat& image) {
   return std::max(rounding_sd, std::sqrt(std::numbers::pi / 2) * mean / gain);
 }
 
-/// Returns the darkest and the brightest median of a pixel and its neighbours on both sides.
+/// Returns the darkest and the brightest median of a pixel and its neighbors on both sides.
 std::pair<double, double> find_extremes(const cv::Mat& image, const cv::Point& side) {
   if (image.cols < 3 || image.rows < 3) return {0, 0};
   const cv::Rect inner(side, cv::Size(image.cols - 2 * side.x, image.rows - 2 * side.y));

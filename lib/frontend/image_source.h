@@ -21,31 +21,33 @@ namespace vlp {
 
 class Video;
 
-/// An image that is still to be read from its file, or a frame of a video.
+/// Image file that is still to be read, or a frame of a video.
 struct SourceImage {
   explicit SourceImage(std::filesystem::path image_file) : file(std::move(image_file)) {}
 
-  /// VIDEO#000123 for a frame, frame_name().
+  /// Image file, or frame_name() (VIDEO#000123) for a frame.
   std::filesystem::path file;
   /// Pixels of a video's frame; empty for an image file.
   cv::Mat frame = {};
-  /// Time of a video's frame since the start of the video.
+  /// Time of a video's frame since the start of the video; std::nullopt for an image file.
   std::optional<double> time_s = {};
-  /// Number of the image in its source.
+  /// Index of the image in its source.
   std::size_t index = 0;
 
-  /// Returns the grey levels. Throws as read_image().
+  /// Returns the grey levels.
+  /// @throws InputError as read_image()
   cv::Mat read(const FrontendOptions& options) const {
     return frame.empty() ? read_image(file, options.max_mpx) : frame;
   }
 };
 
-/// Image files and the frames of video files, in their order, for any number of threads. Only the
-/// frames that are being processed are in memory.
+/// Sequence of image files and frames of video files, in their order, for any number of threads.
+/// Only the frames that are being processed are in memory.
 class ImageSource {
  public:
-  /// `options`: frame step and largest size. Throws InputError for a video that cannot be opened,
-  /// has no frame, is too large, or is not of `imager_px`.
+  /// Creates a source from files, with the frame step and the largest size of `options`.
+  /// @throws InputError for a video that cannot be opened, has no frame, is too large, or does not
+  ///         have the size `imager_px`
   explicit ImageSource(std::vector<std::filesystem::path> files,
                        const FrontendOptions& options = {},
                        const std::optional<std::array<int, 2>>& imager_px = std::nullopt);
@@ -53,9 +55,9 @@ class ImageSource {
 
   /// Returns the next image; std::nullopt at the end.
   std::optional<SourceImage> next();
-  /// Number of images, as far as the videos state it.
+  /// Number of images, with the frames that the headers of the videos report.
   std::size_t expected() const;
-  /// Videos that lack frames, so far, in one line each.
+  /// Warnings of videos with missing frames among those already read, one line each.
   const std::vector<std::string>& warnings() const { return warnings_; }
 
  private:
@@ -73,7 +75,7 @@ class ImageSource {
 void for_each_image(ImageSource& source, int threads,
                     const std::function<void(const SourceImage&)>& task);
 
-/// Returns that an image is not of the camera's size.
+/// Describes that the size of an image is not that of the camera.
 std::string describe_wrong_size(const std::array<int, 2>& size_px,
                                 const std::array<int, 2>& imager_px);
 

@@ -7,9 +7,11 @@
 
 namespace vlp {
 
-/// in_parallel() over images, which take one thread each: OpenCV's own threads are switched off,
-/// here and for the rest of the process, or there would be more than were asked for. `progress`,
-/// which may be empty, gets how many are done, one call at a time.
+/// Calls look_at(i) for each image i < `count` on `threads` threads, as in_parallel() does.
+/// Switches OpenCV's own threads off for the rest of the process, so that no more than `threads`
+/// run.
+///
+/// @param progress  called with the number of images done; calls do not overlap; may be empty
 void images_in_parallel(std::size_t count, int threads,
                         const std::function<void(std::size_t)>& look_at,
                         const std::function<void(std::size_t done)>& progress = {});

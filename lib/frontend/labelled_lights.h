@@ -13,14 +13,14 @@
 
 namespace vlp {
 
-/// Returns the light that a label means: the nearest one that flickers and is wholly in view, with
-/// the label within half its radius; nullptr if there is none.
+/// Finds the light of a label: the nearest modulated light that is completely in view and whose
+/// center is within half its radius of `pixel`. Returns nullptr if there is none.
 const Light* light_at(const Observation& image, const Eigen::Vector2d& pixel);
 
-/// Lights whose lamps a table states.
+/// Lights whose lamps are given by a table.
 struct Labelled {
   std::vector<LabelledLight> lights;
-  /// Number of labels in images that were used, and of those without a light.
+  /// Number of labels in images that are used, and number of these labels without a light.
   int labels = 0, without_light = 0;
 };
 
@@ -28,7 +28,7 @@ struct Labelled {
 void add_labelled(const std::vector<Observation>& images, const std::vector<Frame>& labels,
                   Labelled& labelled);
 
-/// Measured period of a light, and the light's place.
+/// Measured period of a light, with its position.
 struct LightPeriod : MeasuredPeriod {
   /// Index of the image.
   std::size_t image;
@@ -36,8 +36,8 @@ struct LightPeriod : MeasuredPeriod {
   double sigma_px;
 };
 
-/// Returns the periods of the lights that are wholly in view and whose stripes are trustworthy().
-/// With `labels`, only labelled lights count.
+/// Returns the periods of the lights that are completely in view and whose stripes are
+/// trustworthy(). If `labels` is not empty, only of labelled lights.
 std::vector<LightPeriod> measured_periods(const std::vector<Observation>& images,
                                           const std::vector<Frame>& labels);
 

@@ -43,8 +43,8 @@ bool is_overexposed(const Light& light, const cv::Mat& image) {
   return light.kind == LightKind::unknown && white_fraction(image, {low, high}) > kMaxWhiteFraction;
 }
 
-/// Returns true if the grey levels of an image span so little that its signal may be noise, because
-/// it is dark or white all over. Takes a small part of the time of measure_signal().
+/// Returns true if the range of the grey levels is small (image uniformly dark or white), so that
+/// the signal may be noise. Takes a small part of the time of measure_signal().
 bool is_flat(const cv::Mat& image) {
   constexpr double max_range = 0.25;  // of the full scale
   double min = 0, max = 0;
@@ -210,7 +210,7 @@ std::string explain_no_lamp(const std::vector<Observation>& images, const LampMa
   return message;
 }
 
-/// Creates the folder for pictures of the lights.
+/// Creates the folder for annotated images.
 void create_annotate_folder(const fs::path& folder, const fs::path& images) {
   std::error_code error;
   fs::create_directories(folder, error);
@@ -248,7 +248,7 @@ LightDetector make_detector(const LampImages& images, const FrontendOptions& opt
   camera.readout =
       find_readout(list_lamp_images(images.images), known_readout, options, imager_px, remarks);
   result.notes.insert(result.notes.end(), remarks.notes.begin(), remarks.notes.end());
-  // Each image of an unknown camera decides for itself.
+  // Without a calibration the readout direction is chosen per image.
   if (known_readout || images.calibration) {
     result.warnings.insert(result.warnings.end(), remarks.warnings.begin(), remarks.warnings.end());
   }

@@ -22,11 +22,12 @@
 
 namespace vlp {
 
-/// level_from_camera of images, by name; std::nullopt if unknown (LightDetector::leaning).
+/// Rotations level_from_camera of images, by name; std::nullopt if unknown
+/// (LightDetector::leaning).
 using LevelRotations = std::map<std::string, std::optional<Eigen::Matrix3d>>;
 
-/// Returns level_from_camera of a robot's inclination. Only the direction of the zenith is defined,
-/// which is all that a detector uses.
+/// Computes level_from_camera from the inclination of a robot. Its yaw is arbitrary; a detector
+/// uses only the direction of the zenith.
 Eigen::Matrix3d level_rotation(const Inclination& inclination, double yaw_in_robot_rad,
                                const Eigen::Matrix3d& base_from_camera);
 
@@ -40,41 +41,45 @@ struct LampImages {
   std::filesystem::path images;
   LampMap lamps;
   std::filesystem::path lamps_file;
-  /// Without a calibration, centres are those of ellipses in the image.
+  /// Calibration of the camera. Without it, centers are those of ellipses in the image.
   std::optional<Calibration> calibration = {};
   std::filesystem::path calibration_file = {};
   /// Inclinations of the images; used if there is a calibration. std::nullopt: captures.csv in the
   /// folder.
   std::optional<CapturesTable> captures = {};
-  /// Yaw of the camera on the robot whose inclinations are given.
+  /// Yaw of the camera in the frame of the robot's inclinations.
   double yaw_in_robot_rad = 0;
 };
 
-/// Detects lamps in images and rejects those that their use does not permit. Safe to share between
-/// threads.
+/// Detector of lamps in images, which rejects images that their use does not permit. Safe to share
+/// between threads.
 class LampIntake {
  public:
-  /// `imager_px`: size of the camera's images, if it is known. `levels`: of images whose camera is
-  /// tilted differently from the detector's.
+  /// Creates an intake from a detector.
+  ///
+  /// @param imager_px  size of the camera's images, if known
+  /// @param levels     rotations of images whose camera is tilted differently from the detector's
   LampIntake(LightDetector detector, ImageUse use, const FrontendOptions& options,
              const std::optional<std::array<int, 2>>& imager_px, LevelRotations levels = {});
 
-  /// Prepares the intake of a set of images: reads the classifier and estimates the readout
-  /// direction if it is not known. Remarks are added to `result`. Throws InputError: no row time,
-  /// no frequency, no image, a classifier of other lamps or of another row time, a captures.csv
-  /// that cannot be read.
+  /// Creates the intake of a set of images: reads the classifier and estimates the readout
+  /// direction if it is not known. Adds notes and warnings to `result`.
+  /// @throws InputError if the row time, the frequencies or images are missing, if the classifier
+  /// is
+  ///         for other lamps or another row time, or if captures.csv cannot be read
   LampIntake(const LampImages& images, ImageUse use, const FrontendOptions& options,
              Observations& result);
 
   /// Detects the lamps of an image. Rejects the image if it is unreadable, of another size, too
   /// dark, overexposed, or shows fewer lamps than its use needs. Repeated images are not rejected
-  /// here, see Selection. Throws InputError if a picture of the lights cannot be written.
+  /// here, see Selection.
+  /// @throws InputError if an annotated image cannot be written
   Observation observe(const SourceImage& source) const;
 
-  /// Returns an intake for the repetition of a detection: with other level rotations for some
-  /// images, of which none is rejected for what it shows.
+  /// Returns an intake that repeats a detection with other level rotations for some images. It
+  /// rejects no image for its content.
   LampIntake with_levels(const LevelRotations& levels) const;
-  /// Returns the same intake with, or without (empty), pictures of the detected lights.
+  /// Returns the same intake with annotated images in `folder`; without them if it is empty.
   LampIntake with_annotate(const std::filesystem::path& folder) const;
 
   /// Applies observe() to images and videos.
@@ -98,27 +103,29 @@ class LampIntake {
 /// Returns the image files of a folder, or the video.
 std::vector<std::filesystem::path> list_lamp_images(const std::filesystem::path& images);
 
-/// Detects the lamps in a set of images (LampIntake) and rejects repeated images (Selection).
-/// Warns of lamps in the map that are hard to distinguish. Observations::failure: no lamp is
-/// identified, or no image can be used. Throws InputError as LampIntake does, and if no image can
-/// be read.
+/// Detects the lamps in a set of images (LampIntake) and rejects repeated images (Selection). Warns
+/// of lamps in the map that are hard to distinguish. Sets Observations::failure if no lamp is
+/// identified or no image can be used.
+/// @throws InputError as LampIntake, and if no image can be read
 Observations observe_lamps(const LampImages& images, ImageUse use, const FrontendOptions& options,
                            const IntakeProgress& progress = {});
 
-/// Sets Observations::failure if no lamp is identified in any image, or no image is kept. Throws
-/// InputError if no image can be read.
+/// Sets Observations::failure if no lamp is identified in any image, or no image is kept.
+/// @throws InputError if no image can be read
 void check_lamps_seen(const LampImages& images, Observations& result);
 
-/// Estimates the readout direction from images unless it is known. A note, or a warning if rows are
-/// assumed because the images do not show it, is added to `result`.
+/// Estimates the readout direction from images unless it is known. Adds a note to `result`, or a
+/// warning if the images do not determine it and rows are assumed.
 Readout find_readout(const std::vector<std::filesystem::path>& images,
                      const std::optional<Readout>& known, const FrontendOptions& options,
                      const std::optional<std::array<int, 2>>& imager_px, Observations& result);
 
-/// Throws InputError if no lamp has a frequency.
+/// Checks the frequencies of a lamp map.
+/// @throws InputError if no lamp has a frequency
 void check_frequencies(const LampMap& lamps, const std::filesystem::path& lamps_file);
 
-/// Throws InputError if the map has none of the lamps in the captures.
+/// Checks that a lamp map belongs to captures.
+/// @throws InputError if the map has none of the lamps in the captures
 void check_lamps(std::span<const Frame> frames, const LampMap& lamps,
                  const std::filesystem::path& lamps_file);
 

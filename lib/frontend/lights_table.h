@@ -16,31 +16,32 @@ namespace vlp {
 /// Returns the number of lights of a kind.
 int count_of(std::span<const Observation> images, LightKind kind);
 
-/// Number of lights that are no lamps, per reason.
+/// Number of lights with the same kind and reason.
 struct CountedReason {
   LightKind kind;
   LightReason reason;
   int lights;
 };
 
-/// Counts why lights are no lamps: the most frequent reason first, but lights without form, which
-/// are seldom lamps, last. explanation_of() explains a reason.
+/// Counts the lights that are no lamps, per kind and reason. The most frequent reason comes first.
+/// Lights without outline come last, because they are rarely lamps.
 std::vector<CountedReason> reasons_of(std::span<const Observation> images);
 
 /// Returns the enumerator as a word, for example "steady" and "too_few_periods".
 std::string_view name_of(LightKind kind);
 std::string_view name_of(LightReason reason);
 
-/// Returns what a reason means and what would help, in a clause: "it shows no clear period: ...".
+/// Describes a reason and its remedy in a clause, for example "it shows no clear period: ...".
 std::string explanation_of(LightReason reason);
 
-/// Describes a light in one line: its place, its kind with the reason, and its measurements.
+/// Describes a light in one line: its position, its kind with the reason, and its measurements.
 std::string line_of(const Light& light);
 
-/// Writes `lights.csv`, whole or not at all, a row a light: image, kind, reason (name_of() both),
-/// lamp, u_px, v_px, sigma_px, radius_px, outline (edge, rim, glow or shape), rise_px,
+/// Writes `lights.csv` atomically, one row per light. Columns: image, kind, reason (name_of()
+/// both), lamp, u_px, v_px, sigma_px, radius_px, outline (edge, rim, glow or shape), rise_px,
 /// roundness, contrast, period_lines, periods, clarity, coherence, duty; see Light and Stripes.
-/// What a light does not have is empty: a lamp, stripes, an outline. Throws InputError.
+/// Cells are empty for a light without lamp, stripes or outline.
+/// @throws InputError if the file cannot be written
 void write_lights(const std::filesystem::path& file, std::span<const Observation> images);
 
 }  // namespace vlp

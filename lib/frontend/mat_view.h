@@ -8,8 +8,9 @@
 
 namespace vlp {
 
-/// Returns a view of an image's pixels, which the image keeps alive.
-/// @pre The image has one channel of 8 or 16 bits, or is empty, as the view then is.
+/// Returns a view of an image's pixels, which is valid as long as the image. Empty for an empty
+/// image.
+/// @pre The image has one channel of 8 or 16 bits, or is empty.
 inline ImageView image_view(const cv::Mat& image) {
   if (image.empty()) return {};
   CV_Assert(image.type() == CV_8UC1 || image.type() == CV_16UC1);

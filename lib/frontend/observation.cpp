@@ -108,7 +108,7 @@ std::string summarize_rejections(std::span<const Observation> images) {
   for (const Observation& image : images) {
     if (image.is_kept()) continue;
     const auto& [reason, message] = *image.rejection;
-    // Names the run that an image belongs to; after the colon stands how it gets free.
+    // The message names the run of the image; the text after the colon is the remedy.
     const bool has_owner = reason == RejectionReason::used_elsewhere;
     const auto colon = std::min(message.find(':'), message.size());
     const std::pair key(reason, has_owner ? message.substr(0, colon) : name_of(reason).data());

@@ -43,32 +43,33 @@ enum class RejectionReason {
 /// Returns a phrase that follows a number of images, for example "blurred" or "cannot be read".
 std::string_view name_of(RejectionReason reason);
 
-/// Returns true for images without a fault that others make unnecessary.
+/// Returns true if the image has no fault, but other images make it unnecessary.
 bool is_redundant(RejectionReason reason);
 
+/// Rejection of an image.
 struct Rejection {
   RejectionReason reason;
-  /// The reason with its figures, in one line for people.
+  /// Reason with its measured values, in one human-readable line.
   std::string message;
 };
 
-/// The result of the intake of one image: what was detected in it, and whether it is used.
+/// Result of the intake of one image: its detections, and the rejection if it is not used.
 struct Observation {
-  /// VIDEO#000123 for a frame of a video.
+  /// Image file, or frame_name() (VIDEO#000123) for a frame of a video.
   std::filesystem::path file;
   /// Time of a video's frame since the start of the video.
   std::optional<double> time_s = {};
   /// Width and height; 0 for an image that cannot be read.
   std::array<int, 2> size_px = {0, 0};
-  /// std::nullopt: the image is used.
+  /// Rejection; std::nullopt if the image is used.
   std::optional<Rejection> rejection = {};
 
-  /// Board images only: the detection, unless the image is unreadable or of another size, and the
-  /// blur, unless there is no contrast.
+  /// Board images only: the detection, std::nullopt for images that are unreadable or of another
+  /// size; sigma of the blur, std::nullopt for images without contrast.
   std::optional<BoardView> board = {};
   std::optional<double> blur_px = {};
 
-  /// Lamp images only: all lights, without outlines, and the readout direction used.
+  /// Lamp images only: all lights, without outline points, and the readout direction used.
   std::vector<Light> lights = {};
   Readout readout = Readout::rows;
 
@@ -81,22 +82,22 @@ struct Observation {
 
 /// Reason why no image of a set can be used.
 struct IntakeFailure {
-  /// True if the images contradict `file`; false if they are of no use.
+  /// True if the images contradict `file`; false if the images themselves are unusable.
   bool is_wrong_file;
   std::string message;
   /// File to correct; empty if it is the images.
   std::filesystem::path file = {};
 };
 
-/// The observations of a set of images, in the order of the images.
+/// Observations of a set of images, in the order of the images.
 struct Observations {
   std::vector<Observation> images;
-  /// Doubts, decisions, and details for --verbose.
+  /// Messages: warnings, decisions of the program (notes), and details for --verbose.
   std::vector<std::string> warnings = {}, notes = {}, details = {};
   std::optional<IntakeFailure> failure = {};
 };
 
-/// Returns the lamps among the lights, with their centres.
+/// Returns the lamps among the lights, with their centers.
 std::vector<Detection> lamps_in(const Observation& image);
 
 /// Returns the views of the boards in the images that are used.
@@ -105,14 +106,15 @@ std::vector<BoardView> kept_views(std::span<const Observation> images);
 /// Returns the lamps in the images that are used, one frame per image.
 std::vector<Frame> kept_frames(std::span<const Observation> images);
 
-/// Returns the number of rejected images per reason, for example "10 blurred, 2 too dark", followed
-/// by the remedy if one reason applies to more than half of them; empty if no image is rejected.
+/// Returns the number of rejected images per reason, for example "10 blurred, 2 too dark". Appends
+/// the remedy if one reason applies to more than half of them. Empty if no image is rejected.
 std::string summarize_rejections(std::span<const Observation> images);
 
-/// Returns that none of the images can be used, with their number per reason.
+/// Describes that none of the images can be used, with their number per reason.
 std::string describe_none_kept(std::span<const Observation> images);
 
-/// Throws InputError if no image can be read, with the reason of the first one.
+/// Checks that at least one image can be read.
+/// @throws InputError with the reason of the first image if none can be read
 void check_any_readable(const std::filesystem::path& where, std::span<const Observation> images);
 
 /// Reads an image and passes its pixels to `detect`. Rejects the image, with the reason, if it
@@ -121,8 +123,8 @@ void observe_pixels(const SourceImage& source, const FrontendOptions& options,
                     const std::optional<std::array<int, 2>>& imager_px, Observation& result,
                     const std::function<void(const cv::Mat&)>& detect);
 
-/// Reports the number of images done and their total, as far as videos state it. Calls do not
-/// overlap.
+/// Callback with the number of images done and their total, as far as the headers of videos report
+/// it. Calls do not overlap.
 using IntakeProgress = std::function<void(std::size_t done, std::size_t total)>;
 
 /// Calls `observe` for each image of the source on several threads and returns the results in the

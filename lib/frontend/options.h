@@ -10,8 +10,8 @@
 
 namespace vlp {
 
-/// Options of the intake of images: reading, detection, rejection. Programs, sessions and the
-/// station share them.
+/// Options for reading images, for detection and for rejection, shared by programs, sessions and
+/// the station.
 struct FrontendOptions {
   /// Number of images processed at the same time.
   int threads = 1;
@@ -27,13 +27,13 @@ struct FrontendOptions {
   /// Board images: level that 1 % of the pixels exceed, as a fraction of the full scale. An image
   /// below it with too few corners is too dark.
   double min_bright_fraction = 0.1;
-  /// Two images show the same view if what both show lies this close together, as a fraction of the
-  /// image's width.
+  /// Largest RMS distance of the corners or lamps of two images that show the same view, as a
+  /// fraction of the image width.
   double same_view_fraction = 0.01;
 
   /// Folder of corners that were detected before (corner_cache()); empty: none.
   std::filesystem::path corner_cache = {};
-  /// Folder for pictures of the detected lights; created if missing. Empty: none.
+  /// Folder for annotated images of the detected lights; created if missing. Empty: none.
   std::filesystem::path annotate = {};
   /// Lamp classifier by vlp-train; empty: lamps are identified by the map's frequencies.
   std::filesystem::path classifier = {};

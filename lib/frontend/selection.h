@@ -11,22 +11,22 @@ namespace vlp {
 
 /// Use of a set of images, which determines the reasons for a rejection.
 enum class ImageUse {
-  boards,  // calibration of the lens: repeated images and views are rejected
-  turn,    // captures of a turn on the spot: the same, and fewer than two lamps
-  places,  // captures at known places: repeated images, and fewer than two lamps
-  fixes    // captures to locate: none is rejected for what it shows
+  boards,  // calibration of the lens: rejects repeated images and views
+  turn,    // rotation in place: rejects repeated images and views, and fewer than two lamps
+  places,  // captures at known positions: rejects repeated images, and fewer than two lamps
+  fixes    // captures to locate: rejects no image for its content
 };
 
-/// Rejects images that repeat one that is used. Two images show the same view if they share 70 % of
-/// their corners (or lamps) and these are `same_view_fraction` of the image's width apart or less,
-/// rms. They are copies if corners (or lamps) agree to the last digit.
+/// Filter for images that repeat an image in use. Two images show the same view if they share at
+/// least 70 % of their corners (or lamps). In addition, their RMS distance is at most
+/// `same_view_fraction` of the image width. They are copies if corners (or lamps) are identical.
 class Selection {
  public:
   Selection(ImageUse use, const FrontendOptions& options)
       : use_(use), same_view_fraction_(options.same_view_fraction) {}
 
-  /// Rejects the image if it repeats one that was added or kept before. Images that are rejected
-  /// already, or that show nothing, are left as they are.
+  /// Rejects the image if it repeats one that was added or kept before. Does not change images that
+  /// are already rejected or have no corners or lamps.
   void add(Observation& image);
 
   /// Adds an image that is used, without a check.
@@ -46,7 +46,7 @@ class Selection {
 void reject_repeated(std::vector<Observation>& images, ImageUse use,
                      const FrontendOptions& options);
 
-/// Number of lamps below which an image is of no use.
+/// Returns the minimum number of lamps that an image needs.
 int min_lamps(ImageUse use);
 
 }  // namespace vlp

@@ -49,7 +49,7 @@ struct Video::Capture {
 
 Video::Video(const std::string& source, const std::optional<std::array<int, 2>>& camera_px)
     : source_(source), capture_(std::make_unique<Capture>()) {
-  // What OpenCV and FFmpeg say of each of their ways to open a video helps nobody.
+  // Messages of OpenCV and FFmpeg about each backend that fails to open a video are suppressed.
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
   ::setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
   const bool is_url = source.find("://") != std::string::npos;
@@ -59,7 +59,7 @@ Video::Video(const std::string& source, const std::optional<std::array<int, 2>>&
   }
   // FFmpeg would wait for the writer of a pipe.
   if (!is_url && !is_camera()) InputFile(source, std::numeric_limits<std::size_t>::max());
-  // For a file OpenCV would try sequences of images, too.
+  // OpenCV would also try to read a file as a sequence of images.
   const bool has_ffmpeg = codecs().has_video_backend(cv::CAP_FFMPEG);
   const int file_api = !is_url && has_ffmpeg ? cv::CAP_FFMPEG : cv::CAP_ANY;
   VideoReader& video = *capture_->reader;
@@ -72,7 +72,7 @@ Video::Video(const std::string& source, const std::optional<std::array<int, 2>>&
   if (!is_camera() || !camera_px) return;
   video.set(cv::CAP_PROP_FRAME_WIDTH, (*camera_px)[0]);
   video.set(cv::CAP_PROP_FRAME_HEIGHT, (*camera_px)[1]);
-  video.set(cv::CAP_PROP_BUFFERSIZE, 1);  // what it sees now, not some frames ago
+  video.set(cv::CAP_PROP_BUFFERSIZE, 1);  // returns the current frame, not a buffered one
 }
 
 Video::~Video() = default;
@@ -90,7 +90,8 @@ std::size_t Video::frames_stated() const {
   return stated > 0 && stated < most ? static_cast<std::size_t>(stated) : 0;
 }
 
-/// After a frame that cannot be decoded OpenCV fails some times, and then goes on.
+/// Grabs the next frame. OpenCV fails several times after a frame that cannot be decoded and then
+/// continues.
 bool Video::grab() {
   constexpr int most_tries = 100;
   if (ended_) return false;
@@ -113,11 +114,11 @@ std::optional<VideoFrame> Video::next() {
   } while (!capture_->reader->retrieve(frame) || frame.empty());
   VideoFrame next{{}, grabbed_ - 1, capture_->reader->get(cv::CAP_PROP_POS_MSEC) / 1000};
   if (frame.channels() == 1) {
-    next.image = frame.clone();  // OpenCV writes the next one over it
+    next.image = frame.clone();  // OpenCV overwrites the buffer with the next frame
   } else {
     cv::cvtColor(frame, next.image, cv::COLOR_BGR2GRAY);
   }
-  // Some decoders lose the stamps of the last frames.
+  // Some decoders lose the time stamps of the last frames.
   const double rate = capture_->reader->get(cv::CAP_PROP_FPS);
   if (!(next.time_s > last_s_) && last_ && rate > 0) {
     next.time_s = last_s_ + static_cast<double>(next.number - *last_) / rate;
@@ -131,7 +132,7 @@ void Video::skip() { grab(); }
 
 std::string Video::missing() const {
   const std::size_t stated = frames_stated();
-  // Files of the other kinds state it by their length.
+  // Other formats only estimate the number of frames from their duration.
   const std::string kind = std::filesystem::path(source_).extension().string();
   const bool exact = kind == ".avi" || kind == ".mp4" || kind == ".mov" || kind == ".m4v";
   const std::size_t tolerated = exact || gap_ ? 0 : 1 + stated / 50;

@@ -11,46 +11,48 @@
 
 namespace vlp {
 
-/// Whether the name is that of a video, by its ending: AVI, MP4, M4V, MOV, MKV, WebM, MPG, MPEG.
+/// Returns true if the extension is that of a video: AVI, MP4, M4V, MOV, MKV, WebM, MPG, MPEG.
 bool is_video_name(const std::filesystem::path& file);
 
-/// VIDEO#000123: what stands for the name of an image where the image is a frame. From 0, of the
-/// frames that can be decoded.
+/// Returns the name of a frame, VIDEO#000123, which replaces the name of an image file. Frames are
+/// numbered from 0; only those that can be decoded count.
 std::string frame_name(const std::string& video, std::size_t number);
 
-/// VIDEO of VIDEO#000123; nothing when it is no such name.
+/// Parses the name of a frame, VIDEO#000123, and returns VIDEO; std::nullopt for other names.
 std::optional<std::string> video_of_frame(const std::string& name);
 
+/// Decoded frame of a video.
 struct VideoFrame {
-  /// Grey, of 8 bits.
+  /// Grey levels of 8 bits.
   cv::Mat1b image;
   std::size_t number;
-  /// Since the video's start, by the frame's time stamp.
+  /// Time since the start of the video, from the time stamp of the frame.
   double time_s;
 };
 
-/// The frames of a video file, of a URL or of a camera (/dev/video0, by V4L2), through OpenCV, one
-/// at a time. Turns that the file asks for are not made, because the shutter does not turn.
+/// Reader of the frames of a video file, a URL or a camera (/dev/video0, by V4L2), through OpenCV.
+/// A rotation tag in the file is ignored, because the readout direction does not rotate with it.
 class Video {
  public:
-  /// A camera is asked for frames of `camera_px`. Throws InputError when it cannot be opened.
+  /// Opens a video. A camera is configured for frames of size `camera_px`.
+  /// @throws InputError if the video cannot be opened
   explicit Video(const std::string& source,
                  const std::optional<std::array<int, 2>>& camera_px = std::nullopt);
   ~Video();
   Video(const Video&) = delete;
   Video& operator=(const Video&) = delete;
 
-  /// The next frame that can be decoded; nothing at the end.
+  /// Returns the next frame that can be decoded; std::nullopt at the end.
   std::optional<VideoFrame> next();
-  /// Goes past the next frame.
+  /// Skips the next frame.
   void skip();
 
   bool is_camera() const;
   std::array<int, 2> size_px() const;
-  /// How many frames the file says that it has; 0 when it does not.
+  /// Number of frames according to the header of the file; 0 if unknown.
   std::size_t frames_stated() const;
-  /// That frames are missing, in one line without the file's name; empty when all are there. After
-  /// the end only.
+  /// Describes missing frames in one line without the file name; empty if there are none.
+  /// @pre The end of the video has been reached.
   std::string missing() const;
 
  private:
@@ -60,7 +62,7 @@ class Video {
   std::string source_;
   std::unique_ptr<Capture> capture_;
   std::size_t grabbed_ = 0;
-  /// The last frame that was given, and its time.
+  /// Number and time of the last frame that next() returned.
   std::optional<std::size_t> last_;
   double last_s_ = -1;
   bool gap_ = false, ended_ = false;

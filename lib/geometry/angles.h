@@ -10,7 +10,7 @@ namespace vlp {
 constexpr double rad_from_deg(double angle_deg) { return angle_deg * (std::numbers::pi / 180.0); }
 constexpr double deg_from_rad(double angle_rad) { return angle_rad * (180.0 / std::numbers::pi); }
 
-/// The same direction in [-pi, pi]; exact for angles already there.
+/// Returns the same direction in [-pi, pi], in rad; unchanged if the angle lies there already.
 inline double wrapped_rad(double angle_rad) {
   return std::abs(angle_rad) <= std::numbers::pi ? angle_rad
                                                  : std::remainder(angle_rad, 2 * std::numbers::pi);

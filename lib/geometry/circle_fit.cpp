@@ -15,7 +15,8 @@ Eigen::Vector2d mean_of(std::span<const Eigen::Vector2d> points) {
   return mean;
 }
 
-/// Taubin's fit, about the points' mean; Chernov's characteristic polynomial, smallest root.
+/// Fits a circle by Taubin's method, relative to the mean of the points: the smallest root of
+/// Chernov's characteristic polynomial.
 std::optional<Circle> fit_taubin(std::span<const Eigen::Vector2d> points,
                                  const Eigen::Vector2d& mean) {
   const double n = static_cast<double>(points.size());
@@ -27,7 +28,7 @@ std::optional<Circle> fit_taubin(std::span<const Eigen::Vector2d> points,
     xz += p.x() * z / n, yz += p.y() * z / n, zz += z * z / n;
   }
   const double z = xx + yy, cov = xx * yy - xy * xy, var = zz - z * z;
-  // On one line the covariance is singular, to rounding: of the sums, and of the coordinates.
+  // The covariance of points on one line is singular, within the rounding of sums and coordinates.
   constexpr double rounding = 8 * std::numeric_limits<double>::epsilon();
   const double coordinate_variance = rounding * rounding * (mean.squaredNorm() + z);
   if (!(cov > z * (1e-14 * z + coordinate_variance))) return std::nullopt;
@@ -69,7 +70,7 @@ std::optional<CircleFit> fit_circle(std::span<const Eigen::Vector2d> points) {
     for (const auto& point : points) {
       const Eigen::Vector2d radial = point - mean - fit.circle.center;
       const double distance = radial.norm();
-      if (!(distance > 0)) continue;  // a point on the centre pulls nowhere
+      if (!(distance > 0)) continue;  // a point at the center has no radial direction
       const double residual = distance - fit.circle.radius;
       const Eigen::Vector3d row(-radial.x() / distance, -radial.y() / distance, -1);
       normal += row * row.transpose();

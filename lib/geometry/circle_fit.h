@@ -10,25 +10,33 @@
 
 namespace vlp {
 
+/// Circle in the plane, in any unit.
 struct Circle {
   Eigen::Vector2d center;
   double radius;
 };
 
+/// Result of fit_circle().
 struct CircleFit {
   Circle circle;
-  /// Root of the mean squared distance of the points from the circle.
+  /// RMS distance of the points from the circle.
   double rms;
-  /// Of the centre, for the scatter found: s^2 (J^T J)^-1 with s^2 = sum of squares / (n - 3).
-  /// Infinite for three points, which leave no scatter to measure. Symmetric 2x2.
+  /// Covariance of the center, estimated from the residuals: s^2 (J^T J)^-1 with
+  /// s^2 = sum of squares / (n - 3). Symmetric 2x2. Infinite for three points, which have no
+  /// residuals.
   Matrix2 center_covariance;
   bool converged;
 };
 
-/// The circle with the least sum of squared distances of the points from it (the geometric
-/// fit): Taubin's algebraic fit (Taubin 1991; Newton form of Chernov, "Circular and Linear
-/// Regression", 2010), then Gauss-Newton. Algebraic fits alone shrink short noisy arcs. Any
-/// units. Needs three points or more; nothing for fewer and for points on one line or spot.
+/// Fits a circle to points by minimizing the sum of the squared distances of the points from the
+/// circle (geometric fit). The initial circle is Taubin's algebraic fit; Gauss-Newton refines it.
+/// Algebraic fits alone are biased to small radii for short noisy arcs.
+///
+/// @param points  at least three, in any unit
+/// @return        std::nullopt for fewer than three points, and for points on one line, at one
+///                position or not finite
+///
+/// Source: Taubin 1991; Newton form of Chernov, "Circular and Linear Regression", 2010.
 std::optional<CircleFit> fit_circle(std::span<const Eigen::Vector2d> points);
 
 }  // namespace vlp

@@ -19,7 +19,8 @@ Circle across(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   return {(a + b) / 2, (a - b).norm() / 2};
 }
 
-/// Through three points; of points on one line, across the two that are farthest apart.
+/// Returns the circle through three points. For points on one line it is the circle whose diameter
+/// connects the two points that are farthest apart.
 Circle through(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c) {
   const Eigen::Vector2d p = b - a, q = c - a;
   const double twice_area = 2 * (p.x() * q.y() - p.y() * q.x());
@@ -34,7 +35,7 @@ Circle through(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::
   return widest;
 }
 
-/// The smallest that holds `points` and has both `a` and `b` on its rim.
+/// Returns the smallest circle that contains `points` and has both `a` and `b` on its rim.
 Circle with_two_on_rim(Points points, const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   Circle circle = across(a, b);
   for (const auto& point : points) {

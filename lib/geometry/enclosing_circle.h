@@ -9,9 +9,12 @@
 
 namespace vlp {
 
-/// The smallest circle that holds all points, by taking them in one by one (Welzl 1991): the circle
-/// of those so far holds the next, or has it on its rim. Radius zero for a single point. Any units.
-/// Precondition: one point or more.
+/// Computes the smallest circle that contains all points, in their unit. Its radius is 0 for a
+/// single point.
+///
+/// Adds the points one by one (Welzl 1991): the next point lies in the circle of the previous
+/// points, or on the rim of the new circle.
+/// @pre There is at least one point.
 Circle enclosing_circle(std::span<const Eigen::Vector2d> points);
 
 }  // namespace vlp

@@ -11,7 +11,7 @@
 namespace vlp {
 namespace {
 
-/// Takes one side of the pairs to points with mean 0 and spread 1.
+/// Returns the transform of one side of the pairs to points with mean 0 and RMS radius 1.
 Eigen::Matrix3d normalization(std::span<const PlanePair> pairs, Eigen::Vector2d PlanePair::*side) {
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
   for (const PlanePair& pair : pairs) mean += pair.*side / double(pairs.size());

@@ -7,15 +7,17 @@
 
 namespace vlp {
 
-/// Two views of a point of a plane.
+/// Corresponding points of two views of a plane.
 struct PlanePair {
   Eigen::Vector2d from, to;
 };
 
-/// The homography that takes `from` to `to` with the least algebraic error: of all H of unit norm
-/// the one that makes the sum of |(to, 1) x H (from, 1)|^2 smallest (direct linear transform, in
-/// coordinates with mean 0 and spread 1). Four points or more, no three of four on a line;
-/// otherwise it is not determined.
+/// Estimates the homography H that maps `from` to `to`, by the direct linear transform. H is
+/// defined up to scale.
+///
+/// Minimizes the algebraic error, the sum of |(to, 1) x H (from, 1)|^2 over all H of unit norm. The
+/// coordinates are normalized to mean 0 and RMS radius 1 first.
+/// @pre There are at least four pairs, no three of four on a line; otherwise H is undetermined.
 Eigen::Matrix3d homography(std::span<const PlanePair> pairs);
 
 }  // namespace vlp

@@ -9,8 +9,9 @@
 
 namespace vlp {
 
-/// The value in the middle; of an even number, where the two in the middle make a choice, always
-/// one that is there. Precondition: not empty.
+/// Returns the median of `values`; for an even number of values the upper one of the two middle
+/// values, so that the result is always one of them.
+/// @pre `values` is not empty.
 inline double upper_median(std::vector<double> values) {
   assert(!values.empty());
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -18,7 +19,8 @@ inline double upper_median(std::vector<double> values) {
   return *middle;
 }
 
-/// The same with the lower one of the two.
+/// Returns the median of `values`; for an even number the lower one of the two middle values.
+/// @pre `values` is not empty.
 inline double lower_median(std::vector<double> values) {
   assert(!values.empty());
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);

@@ -7,17 +7,18 @@
 #include <cmath>
 #include <cstddef>
 
-/// Normal equations of least squares, of a size that the compiler knows, in plain loops: Eigen's
-/// own products and decompositions of matrices of 9 x 9 are no faster and take it minutes to
-/// compile.
+/// Normal equations of least squares with a size fixed at compile time, in plain loops. Eigen's
+/// products and decompositions of 9 x 9 matrices are no faster and take minutes to compile.
 namespace vlp {
 
+/// Normal equations of n unknowns: information matrix J^T W J and gradient J^T W r.
 template <std::size_t n>
 struct Normal {
-  std::array<std::array<double, n>, n> information{};  // the lower half
+  std::array<std::array<double, n>, n> information{};  // lower triangle only
   std::array<double, n> gradient{};
 
-  /// `row`: the derivative of the residual, an array or a vector of Eigen's.
+  /// Adds a weighted residual. `row` holds its derivatives with respect to the unknowns, as a
+  /// std::array or an Eigen vector.
   template <typename Row>
   void add_row(const Row& row, double residual, double weight = 1) {
     const double* const slope = row.data();
@@ -29,7 +30,7 @@ struct Normal {
   }
 };
 
-/// L of A = L L^T, with the inverses of its diagonal.
+/// Cholesky factor L of the information matrix A = L L^T, with the inverses of its diagonal.
 template <std::size_t n>
 struct Cholesky {
   std::array<std::array<double, n>, n> lower;
@@ -51,14 +52,17 @@ struct Cholesky {
     }
   }
 
-  /// Whether every unknown is told by more than `share` of what the best told one is, by the
-  /// information that each adds to those before it.
+  /// Returns true if the equations determine all unknowns: A is positive definite, and the smallest
+  /// squared diagonal element of L exceeds the largest one times the given ratio. The squared
+  /// element of an unknown is its information, given all following unknowns and with the preceding
+  /// ones free.
   bool determines(double share) const {
     const auto [least, most] =
         std::minmax_element(inverse_diagonal.begin(), inverse_diagonal.end());
     return is_positive && *least * *least > share * *most * *most;
   }
 
+  /// Solves A y = x and returns y.
   std::array<double, n> solve(std::array<double, n> x) const {
     for (std::size_t i = 0; i < n; ++i) {
       for (std::size_t k = 0; k < i; ++k) x[i] -= lower[i][k] * x[k];
@@ -71,6 +75,7 @@ struct Cholesky {
     return x;
   }
 
+  /// Returns column i of the inverse of A.
   std::array<double, n> inverse_column(std::size_t i) const {
     std::array<double, n> unit{};
     unit[i] = 1;

@@ -5,20 +5,20 @@
 #include <Eigen/Core>
 
 /// Points of the plane as complex numbers x + j y, the notation of the positioning equations.
-/// (std::complex would check every product for infinities.)
+/// std::complex is not used because it checks every product for infinities.
 namespace vlp {
 
-/// a b: `b` turned by the angle of `a` and stretched by its length.
+/// Returns the complex product a b: `b` rotated by the angle of `a` and scaled by its length.
 inline Eigen::Vector2d complex_product(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   return {a.x() * b.x() - a.y() * b.y(), a.x() * b.y() + a.y() * b.x()};
 }
 
-/// conj(a) b: the real part is the dot product, the imaginary part the cross product.
+/// Returns conj(a) b. The real part is the dot product, the imaginary part the cross product.
 inline Eigen::Vector2d conj_product(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   return {a.x() * b.x() + a.y() * b.y(), a.x() * b.y() - a.y() * b.x()};
 }
 
-/// The matrix of multiplication by `a`.
+/// Returns the matrix M for which M b is complex_product(a, b).
 inline Eigen::Matrix2d product_matrix(const Eigen::Vector2d& a) {
   return (Eigen::Matrix2d() << a.x(), -a.y(), a.y(), a.x()).finished();
 }

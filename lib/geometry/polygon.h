@@ -7,7 +7,7 @@
 
 namespace vlp {
 
-/// Computes the area of a polygon from its corners in turn, in either direction.
+/// Computes the area of a polygon from its corners, listed in either direction.
 double compute_polygon_area(const std::vector<Eigen::Vector2d>& polygon);
 
 /// Returns true if a point lies in a polygon or on its edge, to 1e-8 of the unit of its corners.

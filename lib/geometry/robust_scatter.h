@@ -12,15 +12,15 @@
 #include "geometry/median.h"
 #include "geometry/statistical_bounds.h"
 
-/// Scatter of residuals of which some are outliers, from their median, and the bound beyond which a
-/// residual is an outlier, for samples of any size. "Linear" residuals have one coordinate,
-/// "planar" ones two.
+/// Robust variance of residuals with outliers, from the median, and the bound above which a
+/// residual is an outlier. Valid for samples of any size. "Linear" residuals have one coordinate,
+/// "planar" residuals two.
 ///
-/// The median of the squares of n normal residuals with the variance sigma^2 per coordinate is
-/// q^2 sigma^2 with q = 0.6745 (linear), and 2 ln 2 sigma^2 (planar). Least squares leave the
-/// fraction nu / (rows) of the variance, with nu degrees of freedom. The median scatters as a
-/// variance of m degrees of freedom does: m = 2 n (2 q phi(q))^2 (linear), 2 n ln^2 2 (planar),
-/// where n is nu or nu / 2.
+/// For normal residuals with variance sigma^2 per coordinate the median of the squares is q^2
+/// sigma^2 with q = 0.6745 (linear), 2 ln 2 sigma^2 (planar). Least squares with nu degrees of
+/// freedom reduce the variance of the residuals by the factor nu / (number of coordinates). The
+/// variance estimated from the median is as uncertain as a variance of m degrees of freedom:
+/// m = 2 n (2 q phi(q))^2 (linear), 2 n ln^2 2 (planar), where n is nu or nu / 2.
 namespace vlp {
 
 /// Estimates the variance of the errors from the median of the squares of linear residuals.
@@ -48,8 +48,8 @@ inline double robust_planar_variance(std::vector<double> squares, double degrees
          std::max(degrees_of_freedom, 1.0);
 }
 
-/// Computes the bound of the squared residuals in units of robust_linear_variance() that normal
-/// residuals exceed as rarely as they exceed sigmas^2 where the variance is known.
+/// Computes the outlier bound of squared linear residuals, in units of robust_linear_variance().
+/// Normal residuals exceed it as rarely as they exceed sigmas^2 if the variance is known.
 inline double linear_outlier_bound(double sigmas, double degrees_of_freedom) {
   constexpr double m_per_residual = 0.367540;  // 2 (2 q phi(q))^2
   return student_bound(sigmas, m_per_residual * std::max(degrees_of_freedom, 1.0));

@@ -11,20 +11,24 @@
 
 namespace vlp {
 
-/// A planar similarity in complex notation: p = offset + factor * z. Its scale is |factor|, its
-/// angle arg factor; it never mirrors.
+/// Planar similarity transform in complex notation: p = offset + factor * z. The scale is |factor|,
+/// the rotation angle arg factor. Reflections are excluded.
 struct Similarity {
   Eigen::Vector2d offset;
   Eigen::Vector2d factor;
 };
 
-/// The similarity that takes from(i) to to(i), i < count, with the least sum of squared
-/// distances in the `to` plane; with two points it is exact. Closed form: with primes for means,
+/// Fits the similarity that maps from(i) to to(i), by minimizing the sum of the squared distances
+/// in the `to` plane. Two pairs are fitted exactly.
+///
+/// @param count     number of pairs; i < count
+/// @param from, to  callables that return an Eigen::Vector2d, in any units
+/// @return          std::nullopt for fewer than two pairs, or if within rounding all `from` or all
+///                  `to` coincide or the best factor is 0 (regular polygon and its mirror image)
+///
+/// Closed form, with primes for means:
 ///   factor = sum conj(from_i - from')(to_i - to') / sum |from_i - from'|^2,
 ///   offset = to' - factor * from'.
-/// `from` and `to` are callables that return an Eigen::Vector2d, in any units. Nothing for fewer
-/// than two pairs, or when, to rounding, all `from` or all `to` are one point or the best factor
-/// is zero, as it is for a regular polygon's mirror image.
 template <typename From, typename To>
 std::optional<Similarity> fit_similarity(std::size_t count, const From& from, const To& to) {
   if (count < 2) return std::nullopt;
@@ -44,7 +48,7 @@ std::optional<Similarity> fit_similarity(std::size_t count, const From& from, co
     from_magnitude += from(i).squaredNorm();
     to_magnitude += to(i).squaredNorm();
   }
-  // Below this the differences are the rounding of the coordinates.
+  // Smaller differences are rounding errors of the coordinates.
   constexpr double rounding = 4 * std::numeric_limits<double>::epsilon();
   if (!(spread > rounding * rounding * from_magnitude) ||
       !(product.squaredNorm() > rounding * rounding * spread * to_magnitude)) {

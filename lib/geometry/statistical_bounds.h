@@ -4,32 +4,32 @@
 
 #include <cmath>
 
-/// Bounds of chi-squared and Student's t in closed form, for libraries that do without Boost. A
-/// bound is stated by `sigmas`: chi-squared exceeds its bound, and t the root of its bound, as
-/// rarely as a normal variable of unit variance exceeds `sigmas` on one side. Tested for sigmas
-/// of 1.96 to 4.5 and two degrees of freedom or more: the bounds are exceeded as rarely as sigmas -
-/// 0.01 to sigmas + 0.3, so that few degrees of freedom make a test less sensitive and no false
-/// alarms.
+/// Bounds of chi-squared and Student's t in closed form, for libraries without Boost.
+///
+/// A bound is given by `sigmas`. Chi-squared exceeds its bound, and t the root of its bound, as
+/// rarely as a normal variable of unit variance exceeds `sigmas` on one side. Tested for sigmas of
+/// 1.96 to 4.5 and at least two degrees of freedom: the bounds are exceeded as rarely as sigmas -
+/// 0.01 to sigmas + 0.3. Few degrees of freedom therefore reduce the power of a test but cause no
+/// false alarms.
 namespace vlp {
 
-/// Number of standard deviations that a normal variable exceeds in one of ten thousand cases.
+/// Number of standard deviations that a normal variable exceeds with probability 1e-4 (one side).
 inline constexpr double kSigmasOfOneInTenThousand = 3.719;
 
-/// Computes the bound of t^2, Student's with m degrees of freedom, that is exceeded as rarely as
-/// sigmas^2 by the square of a normal variable of unit variance.
+/// Computes the bound of t^2 (Student's t with m degrees of freedom) for `sigmas`, see above.
 ///
-/// m (exp((sigmas (8 m + 3) / (8 m + 1))^2 / m) - 1). Source: Wallace, Bounds on normal
-/// approximations to Student's and the chi-square distributions (1959).
+///   m (exp((sigmas (8 m + 3) / (8 m + 1))^2 / m) - 1)
+/// Source: Wallace, Bounds on normal approximations to Student's and the chi-square distributions
+/// (1959).
 inline double student_bound(double sigmas, double m) {
   const double z = sigmas * (8 * m + 3) / (8 * m + 1);
   return m * std::expm1(z * z / m);
 }
 
-/// Computes the bound of chi-squared with m degrees of freedom that is exceeded as rarely as
-/// `sigmas` by a normal variable of unit variance.
+/// Computes the bound of chi-squared with m degrees of freedom for `sigmas`, see above.
 ///
-/// m (1 - 2 / (9 m) + sigmas sqrt(2 / (9 m)))^3. Source: Wilson and Hilferty, The distribution of
-/// chi-square (1931).
+///   m (1 - 2 / (9 m) + sigmas sqrt(2 / (9 m)))^3
+/// Source: Wilson and Hilferty, The distribution of chi-square (1931).
 inline double chi_squared_bound(double sigmas, double m) {
   const double part = 2 / (9 * m);
   const double root = 1 - part + sigmas * std::sqrt(part);

@@ -5,27 +5,27 @@
 #include <Eigen/Core>
 #include <optional>
 
-/// Decompositions of symmetric matrices that are needed in several places, compiled once: each of
-/// Eigen's costs the compiler several seconds wherever it stands.
+/// Decompositions of symmetric matrices for several callers, compiled once: each use of Eigen's
+/// decompositions takes several seconds of compile time.
 namespace vlp {
 
-/// A = V diag(values) V^T: the values ascend, the columns of V have unit length. All are NaN where
-/// the iteration does not converge.
+/// Eigendecomposition A = V diag(values) V^T with ascending values and columns of V of unit length.
+/// All are NaN if the iteration does not converge.
 template <int N>
 struct SymmetricEigen {
   Eigen::Matrix<double, N, 1> values;
   Eigen::Matrix<double, N, N> vectors;
 };
 
-/// Of the lower half of a matrix.
+/// Computes the eigendecomposition of a symmetric matrix. Reads its lower triangle only.
 SymmetricEigen<2> symmetric_eigen(const Eigen::Matrix2d& matrix);
 SymmetricEigen<Eigen::Dynamic> symmetric_eigen(const Eigen::MatrixXd& matrix);
 
-/// The inverse of a positive definite matrix, as of normal equations; nothing where it is not
-/// positive, or has no finite inverse.
+/// Computes the inverse of a positive definite matrix, such as one of normal equations. Returns
+/// std::nullopt if the matrix is not positive definite or its inverse is not finite.
 std::optional<Eigen::Matrix4d> inverse_of_positive(const Eigen::Matrix4d& matrix);
 
-/// A^-1 B by LDL^T.
+/// Solves A X = B for a symmetric matrix A, by LDL^T. Returns X.
 Eigen::MatrixXd solve_symmetric(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);
 
 }  // namespace vlp

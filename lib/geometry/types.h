@@ -6,12 +6,12 @@
 
 namespace vlp {
 
-/// Matrices of public structs. Eigen aligns its own 2x2 and 4x4 matrices by the widest
-/// vector unit the compiler may use, so a program built with -march=native would lay them out
-/// differently from the installed library. These are laid out alike everywhere.
+/// Matrices of public structs, with the same memory layout for all compiler options. Eigen aligns
+/// 2x2 and 4x4 matrices to the widest vector unit that the compiler may use. A program built with
+/// -march=native would lay them out differently from the installed library.
 using Matrix2 = Eigen::Matrix<double, 2, 2, Eigen::DontAlign>;
 using Matrix4 = Eigen::Matrix<double, 4, 4, Eigen::DontAlign>;
-/// Of any size: its memory, too, is got and given back alike everywhere.
+/// Matrix of any size. Its memory is allocated and freed in the same way for all compiler options.
 using MatrixX = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::DontAlign>;
 
 }  // namespace vlp

@@ -15,8 +15,8 @@ std::string describe(const ImageSize& size) {
   return std::to_string(size.width) + " x " + std::to_string(size.height);
 }
 
-/// @throws std::invalid_argument if pixels cannot be read as the view has it, or it has another
-/// size
+/// Checks the layout of a view. @throws std::invalid_argument if the pixels are not readable with
+/// this layout or the size differs
 void check(const ImageView& image, const ImageSize& size) {
   if (image.data == nullptr) throw std::invalid_argument("the image has no pixels");
   if (image.size() != size) {

@@ -12,27 +12,27 @@
 
 namespace vlp {
 
-class LightDetector;  // light_detector.h: all lights with what was measured of them
+class LightDetector;  // light_detector.h: reports all lights with their measurements
 
 /// Detects and identifies the lamps of a map in images of a rolling-shutter camera, for
-/// Positioner::locate(). Immutable: any number of threads may share it, and its copies.
+/// Positioner::locate(). Immutable: any number of threads may share the detector and its copies.
 ///
-/// The centre is that of the disc or rectangle whose outline is seen, projected through the lens;
-/// the identity is the lamp whose frequency f makes stripes of 1 / (f row_time) lines. Equations
-/// and sources: lib/THEORY.md, "Lamp centroid".
+/// The center of a lamp is estimated from its outline, a disc or a rectangle, and projected through
+/// the lens. A lamp is identified by its frequency f, which makes stripes with a period of 1 / (f
+/// row_time) scanlines. Equations and sources: lib/THEORY.md, "Lamp centroid".
 class LampDetector {
  public:
-  /// @throws std::invalid_argument if the calibration has no row time, by which lamps are told
-  ///         apart, or a lens that is not one
+  /// @throws std::invalid_argument if the calibration has no row time, which identification needs,
+  ///        or has an invalid lens
   LampDetector(const LampMap& lamps, const Calibration& calibration);
 
-  /// Detects the lamps that are wholly in an image, from the top. Those of which the image's edge
-  /// cuts a part, and lights that are no lamp of the map, are left out. Takes memory from the heap.
+  /// Detects the lamps that are fully inside the image, ordered from the top. Lamps that the image
+  /// border cuts and lights that are not identified are excluded. Allocates memory on the heap.
   ///
-  /// @param image  as the camera took it, of 8 or 16 bits, of the size of the calibration's images
-  /// @return       pixel (u, v) of the centres and their standard deviation per axis in pixels
-  /// @throws std::invalid_argument if `image` has no pixels, another size, other bits, rows that
-  ///         overlap, or pixels of 16 bits at odd addresses
+  /// @param image  unmodified camera image of 8 or 16 bits, of the size of the calibration's images
+  /// @return       pixel (u, v) of the centers and their standard deviation per axis, in pixels
+  /// @throws std::invalid_argument if `image` has no pixels, another size, another bit depth, rows
+  ///        that overlap, or 16-bit pixels at odd addresses
   std::vector<Detection> detect(const ImageView& image) const;
 
  private:

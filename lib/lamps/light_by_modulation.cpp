@@ -14,8 +14,8 @@
 namespace vlp {
 namespace {
 
-/// Distance of the bright part's centre from that of the whole area, over the area's radius, up to
-/// which a light without a clear rim is as round as its glow.
+/// Maximum distance of the bright part's center from that of the whole area, as a fraction of the
+/// area's radius, for a round glow. Applies to lights without a clear rim.
 constexpr double kMaxEccentricity = 0.1;
 
 /// Returns the runs within a box, as one blob.
@@ -35,7 +35,8 @@ Blob clip(std::span<const Blob> blobs, const PixelBox& box) {
   return result;
 }
 
-/// Returns the lit pixels of a light: the blob that it is most of, or those near its box.
+/// Returns the lit pixels of a light: the blob of which the light is the largest part, or the runs
+/// near its box.
 Blob lit_pixels(const PixelBox& box, std::span<const Blob> blobs, const ImageSize& size) {
   constexpr int max_area_ratio = 4;
   for (const Blob& blob : blobs) {
@@ -78,7 +79,7 @@ Light light_by_modulation(const ImageView& lines, const ModulatedLight& found,
   if (!blob.runs.empty()) rim = rim_of(lines, blob, background, shape);
   Light light = without_outline(lines, found, shape);
   if (rim && rim->light.roundness >= kMinRoundness) {
-    // Without a clear rim either may be what it is.
+    // Without a clear rim either center may be correct.
     const double apart_px =
         rim->clear ? 0 : (rim->light.pixel - light.pixel).norm() / std::numbers::sqrt2;
     const bool is_round = found.asymmetry_px < kMaxEccentricity * found.radius_px;

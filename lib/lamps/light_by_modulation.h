@@ -13,13 +13,14 @@
 
 namespace vlp {
 
-/// Returns a box that is larger by a margin on each side, within an image of that size, in pixels.
+/// Returns the box extended by `margin_px` on each side and clipped to an image of `size`.
 PixelBox grow(const PixelBox& box, int margin_px, const ImageSize& size);
 
-/// Makes a light of one that was found by its modulation. Its outline is its rim, see rim_of(),
-/// where it shows one clearly; else it has none, and its centre is that of the area that it lights.
-/// Kind, reason and lamp are not set.
+/// Converts a light that was found by its modulation to a Light. The outline is the rim, see
+/// rim_of(), if the rim is clear. Otherwise the light has no outline, and its center is the
+/// centroid of the lit area. Kind, reason and lamp are not set.
 ///
+/// @param lines  image whose rows are the scanlines
 /// @param blobs  lit pixels of the image, in which the rim is searched
 Light light_by_modulation(const ImageView& lines, const ModulatedLight& found,
                           std::span<const Blob> blobs, const Background& background,

@@ -31,7 +31,8 @@ namespace vlp {
 namespace {
 
 /// Function that fits a light to a blob with the outline of outline_of(), for lamps of one shape
-/// with the sizes `sizes_m`; std::nullopt if it has another shape. See rectangle_of().
+/// with the sizes `sizes_m`. Returns std::nullopt if the blob has another shape. See
+/// rectangle_of().
 using ShapeDetector = decltype(&rectangle_of);
 
 /// Detectors of all shapes but discs, see LightShape, in the order in which they are tried.
@@ -51,7 +52,8 @@ int max_dark_rows_of(const LampMap& lamps, const std::optional<double>& row_time
   return static_cast<int>(std::ceil(max_rows)) + spare;
 }
 
-/// Returns whether no pixel can be brighter: full scale of 8 bits, or of a converter of 10 to 16.
+/// Returns true if no pixel can be brighter: full scale of 8 bits, or of a converter of 10 to 16
+/// bits.
 bool is_full_scale(double level, int bits_per_pixel) {
   constexpr double nearly = 0.98;
   const int min_bits = bits_per_pixel == 16 ? 10 : 8;
@@ -76,8 +78,8 @@ double clipped_fraction(const ImageView& lines, const Eigen::Vector2d& low,
   return double(count_pixels_at(pixels, brightest)) / (double(pixels.width) * pixels.height);
 }
 
-/// Adds the error of an unknown lens to the sigma of the lights. Called last: keep_best_claim()
-/// compares sigmas without this error.
+/// Adds the error of an unknown lens to the sigma of the lights. Must be called last, because
+/// keep_best_claim() compares sigmas without this error.
 void add_unknown_lens(const ImageSize& size, std::vector<Light>& lights) {
   for (Light& light : lights) {
     if (light.kind == LightKind::formless) continue;
@@ -86,7 +88,7 @@ void add_unknown_lens(const ImageSize& size, std::vector<Light>& lights) {
   }
 }
 
-/// Width of a sharp edge over the radius.
+/// Maximum width of a sharp edge, as a fraction of the radius.
 constexpr double kMaxRise = 0.3;
 
 bool is_sharp(const Light& light) { return light.rise_px <= kMaxRise * light.radius_px; }
@@ -95,7 +97,7 @@ bool has_clear_outline(const Light& light) {
   return !light.glows && !light.is_doubtful && is_sharp(light) && light.roundness >= kMinRoundness;
 }
 
-/// Returns whether the centre of one light is within the other one's radius.
+/// Returns true if the center of one light is within the radius of the larger light.
 bool are_at_one_place(const Light& a, const Light& b) {
   return (a.pixel - b.pixel).norm() < std::max(a.radius_px, b.radius_px);
 }
@@ -121,7 +123,7 @@ std::vector<PixelBox> merge_overlapping(std::vector<PixelBox> boxes) {
       boxes[i] = around(boxes[i], boxes[j]);
       boxes.erase(boxes.begin() + std::ptrdiff_t(j));
       if (j < i) --i;
-      j = std::size_t(-1);  // the larger box may overlap those before, too
+      j = std::size_t(-1);  // the larger box may also overlap earlier boxes
     }
   }
   return boxes;
@@ -210,7 +212,7 @@ std::vector<LightPart> LightDetector::parts_of(const ImageView& lines, const Blo
     if (part.light) part.light->outside = double(rest.size()) / double(part.light->outline.size());
   }
   constexpr double min_edge_roundness = 0.5;
-  // Lights that touch have an edge each, and may be of different brightness.
+  // Each of several touching lights has an edge; their brightness may differ.
   const auto sharp_parts = std::count_if(parts.begin(), parts.end(), [](const LightPart& part) {
     return part.light && is_sharp(*part.light);
   });
@@ -248,7 +250,7 @@ void LightDetector::add_by_modulation(const ImageView& lines, const std::vector<
            lines, merge_overlapping(std::move(boxes)), background, lamp_periods_)) {
     Light light = light_by_modulation(lines, found, blobs, background, shape_);
     if (found.lamp) light.lamp = lamps_by_period_[*found.lamp];
-    // Lamps that share a period differ in duty; without known periods a classifier decides.
+    // Lamps with the same period differ in duty; without known periods a classifier decides.
     const bool has_choice = found.lamp ? !light.lamp : lamp_periods_.empty();
     if (has_choice) light.lamp = lamp_of(light.stripes);
     const auto is_at_it = [&](const Light& other) { return are_at_one_place(other, light); };
@@ -334,8 +336,9 @@ std::vector<Light> LightDetector::detect(const ImageView& image) const {
 
 namespace {
 
-/// Adds the error of a partly hidden light to its sigma. If its ratio of axes is not that of the
-/// lamp, something may hide one end: the centre of the visible part has half of that offset.
+/// Adds the error of a partly hidden light to its sigma. If the aspect ratio differs from that of
+/// the lamp, an object may hide one end: the center of the visible part is offset by half of the
+/// hidden length.
 void add_hidden_end(double off, double leaned_off, Light& light) {
   constexpr double clear = 3;
   if (!(off > leaned_off + clear * light.aspect_sd)) return;
@@ -349,10 +352,11 @@ void refuse(Light& light, LightReason reason) {
   light.reason = reason;
 }
 
-/// Refuses lights whose period is not that of their lamp by the row time that the lights of the
-/// image share. A wrong row time changes the ratio of measured and expected period of all lights
-/// alike: the median of those with clear stripes, of which it needs three. Other periods may differ
-/// by kMaxUnclearDrift from those of their lamps.
+/// Rejects lights whose period contradicts that of their lamp under the row time of the other
+/// lights of the image. A wrong row time changes the ratio of measured and expected period of all
+/// lights by the same factor, which is the median over the lights with clear stripes. At least
+/// three such lights are required. Other periods may differ by kMaxUnclearDrift from those of their
+/// lamps.
 void refuse_other_row_times(const LampMap& lamps, double row_time_s, std::vector<Light>& lights) {
   constexpr std::size_t min_lights = 3;
   const auto has_clear_period = [](const Light& light) {
@@ -376,11 +380,11 @@ void refuse_other_row_times(const LampMap& lamps, double row_time_s, std::vector
   }
 }
 
-/// Keeps one of the lights that are identified as one lamp, because the others are mirror images:
-/// one with an outline rather than one without; of several with an outline the one with the
-/// smallest sigma, of several without the largest. Refuses all if two of them are about as large
-/// and as bright. A mirror reflects less than all light, and a camera shows the corners of an image
-/// darker.
+/// Keeps one of the lights that are identified as the same lamp; the others are mirror images. A
+/// light with an outline takes precedence over one without. Among lights with an outline the one
+/// with the smallest sigma is kept, among lights without the largest one. Rejects all if two of
+/// them have similar size and brightness. A mirror reflects less than all light, and lenses darken
+/// the corners of an image.
 void keep_best_claim(int lamp, std::vector<Light>& lights) {
   constexpr double min_area_ratio = 2, min_peak_ratio = 2;
   std::vector<Light*> claims;
@@ -404,7 +408,7 @@ void keep_best_claim(int lamp, std::vector<Light>& lights) {
     });
     std::sort(claims.begin(), alike_end,
               [](const Light* a, const Light* b) { return a->peak > b->peak; });
-    // The level of lines and the amplitude of cells are no measures of one kind.
+    // The level of scanlines and the amplitude of cells are not comparable.
     is_clear = claims[0]->by_modulation == claims[1]->by_modulation &&
                claims[0]->peak > min_peak_ratio * claims[1]->peak;
   }
@@ -427,9 +431,9 @@ std::optional<int> LightDetector::lamp_of(const Stripes& stripes) const {
 }
 
 std::optional<double> LightDetector::shape_off(const Light& light, int lamp) const {
-  // An unknown lens changes the ratio of the sides by more than a lean.
+  // An unknown lens changes the aspect ratio by more than an unknown tilt.
   const double max_off = shape_.has_lens() ? 2 * kLeanedOff : 0.3;
-  const Lamp* mapped = find_lamp(lamps_.lamps, lamp);  // a classifier may know others
+  const Lamp* mapped = find_lamp(lamps_.lamps, lamp);  // a classifier may have other lamps
   const LampShape shape = mapped != nullptr ? mapped->shape : LampShape();
   if (shape.kind != light.shape) return std::nullopt;
   const double aspect = shape.size_m ? shape.size_m->maxCoeff() / shape.size_m->minCoeff() : 1;
@@ -438,8 +442,8 @@ std::optional<double> LightDetector::shape_off(const Light& light, int lamp) con
 }
 
 void LightDetector::identify(std::vector<Light>& lights, const ImageSize& size) const {
-  // A surface that blurs the image of a lamp reflects less than 5 % of its light to one side, which
-  // a tone curve of gamma 2.2 shows as a quarter of its level.
+  // A surface that blurs the image of a lamp reflects less than 5 % of its light in one direction.
+  // A tone curve of gamma 2.2 displays this as a quarter of the level.
   constexpr double min_peak_ratio = 0.25;
   constexpr double max_rise_ratio = 5, max_outside = 0.25;
   double sharpest_px = std::numeric_limits<double>::infinity(), brightest = 0;
@@ -466,8 +470,8 @@ void LightDetector::identify(std::vector<Light>& lights, const ImageSize& size) 
   }
   for (Light& light : lights) {
     if (!light.lamp) continue;
-    // A lamp's reflection flickers like the lamp. Where most of the edge is not the lamp's, a
-    // circle through the rest is not to be trusted.
+    // The reflection of a lamp is modulated like the lamp. If too many edge points are not on the
+    // lamp's outline, a circle through the others is not reliable.
     const bool strays = light.outside > max_outside;
     const bool is_soft = light.glows
                              ? light.peak < min_peak_ratio * brightest

@@ -14,38 +14,42 @@
 
 namespace vlp {
 
-/// Evidence of images for one read-out and for the other.
+/// Evidence of images for each readout direction.
 struct ReadoutEvidence {
-  /// Sum over the modulated lights with a read-out along rows, and along columns, of clarity times
-  /// contrast times roundness, each from 0 to 1.
+  /// Sum over the modulated lights detected with readout along rows, and along columns, of clarity
+  /// times contrast times roundness, each from 0 to 1.
   double rows = 0, columns = 0;
 
-  /// Returns the read-out with the larger evidence, if it is that of one light or more and three
-  /// times the other.
+  /// Returns the readout direction with the larger evidence. Returns std::nullopt if this evidence
+  /// is below 1, that of one perfect light, or below three times the other.
   std::optional<Readout> readout() const;
 };
 
-/// Returns the sum of ReadoutEvidence over the lights that were detected with one read-out.
+/// Returns the sum of ReadoutEvidence over `lights`, which were detected with one readout
+/// direction.
 double readout_evidence(std::span<const Light> lights);
 
-/// Adds the evidence of an image: with the right read-out a lamp has stripes, with the other one it
-/// falls to pieces or has none.
+/// Adds the evidence of an image. With the correct readout direction a lamp has stripes; with the
+/// other one it breaks into pieces or has no stripes.
 void add_evidence(const ImageView& image, ReadoutEvidence& evidence);
 
-/// Finds the read-out from the first images that show it, at most eight with lights. `image` gives
-/// an image by number, which is used until the next call of it, or an empty one if it cannot be
-/// used.
+/// Estimates the readout direction from images in their order, from at most eight images with
+/// modulated lights. Stops when the evidence is clear. Returns std::nullopt if it is not.
+///
+/// @param images  number of images
+/// @param image   returns an image by index, valid until the next call; empty if the image is
+///        unusable
 std::optional<Readout> find_readout(std::size_t images,
                                     const std::function<ImageView(std::size_t)>& image);
 
-/// Lights of an image and the read-out with which they were detected.
+/// Lights of an image and the readout direction with which they were detected.
 struct LightsByReadout {
   Readout readout;
   std::vector<Light> lights;
 };
 
-/// Detects the lights of an image whose read-out is not known: with the detector's read-out, or
-/// with the other one if the image has clear evidence for that, as when a phone turned it.
+/// Detects the lights of an image with unknown readout direction. Uses the detector's direction, or
+/// the other one if the image has clear evidence for it, for example if a phone rotated the image.
 LightsByReadout detect_either_way(const LightDetector& detector, const ImageView& image);
 
 }  // namespace vlp

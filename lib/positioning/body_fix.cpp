@@ -18,18 +18,18 @@ namespace {
 using Matrix23 = Eigen::Matrix<double, 2, 3>;
 using BodyVector = Eigen::Matrix<double, kBodyStates, 1>;
 
-/// `v` turned about z, back by the angle of that unit number.
+/// Returns `v` rotated about z by minus the angle of the unit complex number.
 Eigen::Vector3d turned_back(const Eigen::Vector2d& heading, const Eigen::Vector3d& v) {
   return {heading.x() * v.x() + heading.y() * v.y(), heading.x() * v.y() - heading.y() * v.x(),
           v.z()};
 }
 Eigen::Vector2d unit(double angle_rad) { return {std::cos(angle_rad), std::sin(angle_rad)}; }
 
-/// z x v.
+/// Returns z x v.
 Eigen::Vector3d about_z(const Eigen::Vector3d& v) { return {-v.y(), v.x(), 0}; }
 
-/// q of a lamp on the way: seen from R along the level axes of time 0, without u t; along those of
-/// the time t; and q + arm.
+/// Intermediate results of q: relative to R along the level axes of time 0, without u t; along the
+/// level axes of time t; and q + arm.
 struct Way {
   Eigen::Vector3d still, turned_level, in_body;
   Eigen::Vector2d turn;
@@ -48,11 +48,11 @@ Way way_of(const PosedBody& at, const Eigen::Vector3d& lamp_m, double time_s) {
   return way;
 }
 
-/// A derivative of q, a column per state.
+/// Derivative of q, a column for each state.
 template <std::size_t count>
 using Columns = std::array<Eigen::Vector3d, count>;
 
-/// Which states are estimated, and so how many, known to the compiler.
+/// The estimated states; their number is a compile-time constant.
 template <bool velocity, bool yaw_rate, bool lean>
 struct States {
   static constexpr std::size_t kYawRate = velocity ? 6 : 4, kLean = kYawRate + (yaw_rate ? 1 : 0);
@@ -81,7 +81,7 @@ struct States {
     return d;
   }
 
-  /// The index of each among all states.
+  /// Index of each estimated state among all states.
   static constexpr std::array<int, kCount> indices() {
     std::array<int, kCount> all{0, 1, 2, 3};
     std::size_t next = 4;
@@ -104,7 +104,7 @@ BodyState moved(const BodyState& from, const BodyVector& step) {
   return next;
 }
 
-/// How heavy the priors weigh: 1 / sd of each state, zero for those that are as given.
+/// Returns the weights of the priors: 1 / sd of each state, zero for fixed states.
 BodyVector weights_of(const BodyPrior& prior) {
   const auto inverse = [](double sd) { return sd > 0 ? 1 / sd : 0; };
   BodyVector weights = BodyVector::Zero();
@@ -115,7 +115,7 @@ BodyVector weights_of(const BodyPrior& prior) {
   return weights;
 }
 
-/// The states less what is expected of them, in standard deviations.
+/// Returns the prior residuals, (state - prior mean) / sd.
 BodyVector deviations_of(const BodyState& state, const BodyPrior& prior,
                          const BodyVector& weights) {
   const BodyMotion &motion = state.motion, &mean = prior.mean;
@@ -128,7 +128,9 @@ BodyVector deviations_of(const BodyState& state, const BodyPrior& prior,
   return deviations.cwiseProduct(weights);
 }
 
-/// The residual of a lamp in standard deviations, 1 / depth along its ray; depth <= 0: behind it.
+/// Residual of a lamp in standard deviations, and 1 / depth along its ray; not positive if the
+/// lamp
+/// is behind the ray.
 struct LampResidual {
   Eigen::Vector2d value;
   double inverse_depth;
@@ -139,7 +141,7 @@ LampResidual residual_of(const BodySighting& sighting, const Eigen::Vector3d& q)
   return {-inverse_depth * (sighting.whitened_pixel_from_ray * q), inverse_depth};
 }
 
-/// Of the lamp's pixel, by q.
+/// Returns the derivative of the lamp's pixel by q.
 Matrix23 d_pixel(const BodySighting& sighting, const LampResidual& residual) {
   return residual.inverse_depth *
          (sighting.whitened_pixel_from_ray + residual.value * sighting.ray.transpose());
@@ -148,7 +150,7 @@ Matrix23 d_pixel(const BodySighting& sighting, const LampResidual& residual) {
 template <typename S>
 struct Linearized : Normal<S::kCount> {
   double chi_squared = 0;
-  /// Parts of the pixels' residuals.
+  /// Contributions of the pixels.
   double pixels_chi_squared = 0, sum_px2 = 0;
   bool lamps_ahead = true;
 
@@ -185,9 +187,9 @@ struct Linearized : Normal<S::kCount> {
   }
 };
 
-/// What is left after such a whole step is its square, or a thousandth where pixels err: below any
-/// noise. A halved one is to be so small itself. Of the distance, of a radian, of a metre or a
-/// radian per second.
+/// Convergence tolerances of a step, relative to the distance, 1 rad, 1 m/s and 1 rad/s. After a
+/// full step of this size the error is its square, or a thousandth of it with noise in the pixels:
+/// below any noise. A halved step must meet the smaller tolerance.
 bool negligible(const BodyVector& step, double scale_m, bool whole) {
   const double small_step = whole ? 1e-7 : 1e-10, small_rate = whole ? 1e-6 : 1e-8;
   return step.head<3>().norm() <= small_step * scale_m && std::abs(step[kBodyYaw]) <= small_step &&
@@ -263,7 +265,7 @@ std::optional<Eigen::Matrix<double, 2, 3>> whitened_pixel_from_ray(
     const Eigen::Vector3d& ray, const Eigen::Matrix<double, 3, 2>& d_ray_d_pixel, double sigma_px) {
   const double inverse_length = 1 / ray.norm();
   const Eigen::Vector3d unit_ray = inverse_length * ray;
-  // How the unit ray moves, across itself.
+  // Derivative of the unit ray, perpendicular to it.
   const Eigen::Matrix<double, 3, 2> across =
       inverse_length * (d_ray_d_pixel - unit_ray * (unit_ray.transpose() * d_ray_d_pixel));
   const Eigen::Matrix2d square = across.transpose() * across;

@@ -10,20 +10,27 @@
 #include "fix.h"
 #include "robot.h"
 
-/// The fix of a body that drives, turns and leans while the shutter reads. The body is the robot,
-/// with the camera at `arm_in_body_m`, or the camera itself, with no arm. At the time 0, the middle
-/// of the exposure of the image's middle row, it stands at R with yaw g; u is its velocity in its
-/// level frame, w its yaw rate, L = Ry(pitch) Rx(roll) its lean. A lamp P that is read at the time
-/// t stands, seen from the camera and along the axes of the body, at
-///   q = L^T Rz(-w t) (Rz(-g) (P - R) - u t) - arm,
-/// which for a camera that stands level is the positioning equation (sighting.h). The velocity is
-/// one in the plane: bodies do not climb. One image shows it: motion along the read-out stretches
-/// the lamps' picture one way, motion across it shears it, and a camera that stands level can do
-/// neither. Three lamps that are not in one line tell two of velocity, turn and lean, with more
-/// lamps all.
+/// Least-squares position fix of a body that moves and is tilted while a rolling shutter reads the
+/// image. The body is the robot with the camera at `arm_in_body_m`, or the camera itself with no
+/// arm.
+///
+/// Time 0 is the middle of the exposure of the image's middle row. At time 0 the body is at R with
+/// yaw g. A lamp P read at time t has, relative to the camera and along the axes of the body, the
+/// position
+///   q = L^T Rz(-w t) (Rz(-g) (P - R) - u t) - arm
+/// with
+///   u    velocity in the body's level frame, horizontal: a body does not climb
+///   w    yaw rate
+///   L    Ry(pitch) Rx(roll), the roll and pitch of the body
+/// For a level camera at rest this is the positioning equation (sighting.h).
+///
+/// One image determines the motion: velocity along the readout direction stretches the pattern of
+/// lamps, velocity across it shears the pattern. A level camera at rest produces neither effect.
+/// Three lamps that are not collinear determine two of velocity, yaw rate and roll and pitch. More
+/// lamps determine all three.
 namespace vlp {
 
-/// What is unknown of a body besides R and g, which always are.
+/// Unknowns of a body besides R and g, which are always estimated.
 struct BodyMotion {
   /// u, in the body's level frame.
   Eigen::Vector2d velocity_m_per_s{0, 0};
@@ -31,64 +38,67 @@ struct BodyMotion {
   Inclination inclination{0, 0};
 };
 
+/// Pose and motion of a body at time 0.
 struct BodyState {
   Pose pose{{0, 0, 0}, 0};
   BodyMotion motion = {};
 };
 
-/// What is known before the lamps are seen: each state is normal about `mean`, with its standard
-/// deviation per component. 0: it is as given, and not estimated.
+/// Prior knowledge of the motion: each state is normally distributed about `mean`, with its
+/// standard deviation per component. A state with standard deviation 0 is fixed at its mean.
 struct BodyPrior {
   BodyMotion mean;
   double velocity_sd_m_per_s = 0;
   double yaw_rate_sd_rad_per_s = 0;
   double inclination_sd_rad = 0;
-  /// Of R.
+  /// Prior of the height of R.
   std::optional<KnownHeight> height = {};
 };
 
-/// A lamp of the map as the camera saw it.
+/// Observation of a lamp of the map.
 struct BodySighting {
   /// P, in the world.
   Eigen::Vector3d lamp_m;
-  /// Towards it, along the axes of the body; unit length.
+  /// Direction to the lamp along the axes of the body, unit length.
   Eigen::Vector3d ray;
-  /// M: the pixel is off by M q / (ray . q), in standard deviations. M ray = 0.
+  /// M: the pixel residual is M q / (ray . q), in standard deviations. M ray = 0.
   Eigen::Matrix<double, 2, 3, Eigen::DontAlign> whitened_pixel_from_ray;
   double sigma_px;
-  /// When its centre is read.
+  /// Readout time of the lamp's center.
   double time_s;
 };
 
-/// M of a pixel with that standard deviation and that derivative of its ray (any length). Nothing
-/// where the lens has no inverse.
+/// Computes M of a pixel from its standard deviation and the derivative of its ray, which may have
+/// any length. Returns std::nullopt if the lens is not invertible there.
 std::optional<Eigen::Matrix<double, 2, 3>> whitened_pixel_from_ray(
     const Eigen::Vector3d& ray, const Eigen::Matrix<double, 3, 2>& d_ray_d_pixel, double sigma_px);
 
+/// Estimated state of a body with covariance and statistics of the residuals.
 struct BodyFix {
   BodyState state;
-  /// In metres, radians and seconds; zero for states that are as given.
+  /// Covariance in meters, radians and seconds; zero for fixed states.
   BodyCovariance covariance = BodyCovariance::Zero();
-  /// Of pixels and priors, over their variances: its mean is 2n - 4, with a known height 2n - 3.
+  /// Sum of the squared residuals of pixels and priors over their variances. Its expectation is 2n
+  /// - 4, or 2n - 3 with a known height.
   double chi_squared = 0;
-  /// Part of chi_squared from the pixels.
+  /// Contribution of the pixels to chi_squared.
   double pixels_chi_squared = 0;
-  /// Expectation of pixels_chi_squared, which follows from the covariance.
+  /// Expectation of pixels_chi_squared, computed from the covariance.
   double redundancy = 0;
-  /// Root of the mean squared distance, in the image, of the lamps from where the fix sees them.
+  /// RMS distance in the image between the observed and the predicted lamps.
   double residual_px = 0;
 };
 
-/// A state with its angles as the numbers that predictions need.
+/// A state with the trigonometric terms that predictions use.
 class PosedBody {
  public:
   explicit PosedBody(const BodyState& state);
-  /// As `other`, whose lean it shares.
+  /// Copies the terms of roll and pitch from `other`, which has the same roll and pitch.
   PosedBody(const BodyState& state, const PosedBody& other);
 
-  /// q + arm of a lamp.
+  /// Returns q + arm of a lamp.
   Eigen::Vector3d lamp_in_body(const Eigen::Vector3d& lamp_m, double time_s) const;
-  /// The derivative of q by the states: X, Y, Z, yaw, u, w, roll, pitch.
+  /// Returns the derivative of q by the states X, Y, Z, yaw, u, w, roll, pitch.
   Eigen::Matrix<double, 3, kBodyStates> d_lamp_in_body(const Eigen::Vector3d& lamp_m,
                                                        double time_s) const;
 
@@ -96,23 +106,25 @@ class PosedBody {
   Eigen::Vector2d heading;
   /// L^T.
   Eigen::Matrix<double, 3, 3, Eigen::DontAlign> body_from_level;
-  /// The axis about which it is pitched, along its own axes.
+  /// Axis of the pitch rotation, along the axes of the body.
   Eigen::Vector3d pitch_axis;
 };
 
-/// The derivative of a lamp's pixel, in standard deviations, by q.
+/// Returns the derivative of a lamp's pixel, in standard deviations, by q.
 Eigen::Matrix<double, 2, 3> d_whitened_pixel_d_lamp(const BodySighting& sighting,
                                                     const Eigen::Vector3d& lamp_from_camera_m);
 
-/// Squared residuals over their variances, of the pixels and of the priors, at `state`. Nothing
-/// when a lamp is there behind its ray.
+/// Computes the sum of the squared residuals of pixels and priors over their variances at `state`.
+/// Returns std::nullopt if a lamp is behind its ray.
 std::optional<double> chi_squared_of(std::span<const BodySighting> sightings,
                                      const Eigen::Vector3d& arm_in_body_m, const BodyPrior& prior,
                                      const BodyState& state);
 
-/// The state of least squares, of pixels and priors, by Gauss-Newton steps, halved where they do
-/// not help, from `start`; what the prior gives has to be in it. Nothing when a lamp is behind its
-/// ray there, when neither lamps nor priors determine the state, or when 50 steps do not converge.
+/// Estimates the state by least squares over pixels and priors. Gauss-Newton from `start`; a step
+/// that does not reduce the sum of squares is halved. Returns std::nullopt if a lamp is behind its
+/// ray at `start`, if lamps and priors do not determine the state, or without convergence in 50
+/// steps.
+/// @pre `start` has the values of the states that the prior fixes
 std::optional<BodyFix> fix_body(std::span<const BodySighting> sightings,
                                 const Eigen::Vector3d& arm_in_body_m, const BodyPrior& prior,
                                 const BodyState& start);

@@ -22,7 +22,7 @@ using Agreeing = std::bitset<kMaxSightings>;
 constexpr double kUnexplained = 25;
 constexpr double kMuchBetter = 100;
 
-/// What a frame is solved with.
+/// Arm of the camera and prior of the motion.
 struct Problem {
   const Eigen::Vector3d& arm_m;
   const BodyPrior& prior;
@@ -34,14 +34,14 @@ struct Problem {
 };
 
 struct Starts {
-  /// `ok`, or why there is none.
+  /// `ok`, or the reason of failure.
   FixStatus status = FixStatus::degenerate;
   int count = 0;
   std::array<BodyState, 4> states;
 };
 
-/// The lamps of now as a level camera would see them that leans as the prior says. Nothing when one
-/// is not above its horizon.
+/// Observations of the current frame by a camera with the inclination of the prior, rotated to the
+/// level frame. fill() returns false if a lamp is not above the horizon.
 struct LevelSightings {
   std::array<Sighting, kMaxSightings> sightings;
   std::size_t size = 0;
@@ -92,7 +92,7 @@ bool below_lamps(const FreePose& camera, const std::array<Eigen::Vector3d, 3>& l
   });
 }
 
-/// The poses below the lamps that see three of them.
+/// Computes the states below the lamps from three of them.
 Starts starts_of(const BodyFrame& frame, const std::array<std::size_t, 3>& lamps,
                  const Problem& problem) {
   std::array<Eigen::Vector3d, 3> points_m, rays;
@@ -113,7 +113,7 @@ Starts starts_of(const BodyFrame& frame, const std::array<std::size_t, 3>& lamps
   return starts;
 }
 
-/// Three lamps of now that are far apart, and far from one line.
+/// Returns three lamps of the current frame that are far apart and far from collinear.
 std::array<std::size_t, 3> widest_lamps(const BodyFrame& frame) {
   const auto best = [&](const auto& value) {
     std::size_t found = 0;
@@ -134,7 +134,7 @@ std::array<std::size_t, 3> widest_lamps(const BodyFrame& frame) {
   return {first, second, third};
 }
 
-/// Across its ray, from where the body sees it to where it is.
+/// Returns the distance of a lamp from its observed ray; infinity if the lamp is behind it.
 double distance_from_ray(const BodySighting& seen, const Problem& problem, const PosedBody& body) {
   const Eigen::Vector3d q = body.lamp_in_body(seen.lamp_m, seen.time_s) - problem.arm_m;
   const double depth_m = seen.ray.dot(q);
@@ -165,7 +165,8 @@ bool are_below_lamps(const BodyFrame& frame, const Problem& problem, const BodyS
                      [&](const BodySighting& seen) { return seen.lamp_m.z() > z_m; });
 }
 
-/// The best of the fixes from several starts, and whether another explains the frame as well.
+/// Returns the fix with the smallest chi-squared from several initial states; `ambiguous` if
+/// another fix explains the frame nearly as well.
 BodySolution best_from(const Starts& starts, const BodyFrame& frame, const Problem& problem) {
   constexpr double hopeless = 100, small = 100, unlikely = 12, same_m = 1e-4;
   std::array<double, 4> at_start;
@@ -209,8 +210,9 @@ bool has_fix(const BodySolution& solution) {
          solution.status == FixStatus::undetermined;
 }
 
-/// From the three lamps that are widest apart, and, where motion or noise hides their pose, from
-/// others in place of the third. Nothing when all lamps are on one line.
+/// Computes the fix with free roll and pitch from the three lamps that are farthest apart. If
+/// motion or noise hides their pose, tries other lamps in place of the third. Returns std::nullopt
+/// if all lamps are collinear.
 std::optional<BodySolution> fix_free(const BodyFrame& frame, const Problem& problem) {
   constexpr std::size_t most_tries = 8;
   if (frame.now < 3) return std::nullopt;
@@ -233,7 +235,7 @@ std::optional<BodySolution> fix_free(const BodyFrame& frame, const Problem& prob
   return best;
 }
 
-/// The fix of all lamps, as if they were what they are said to be.
+/// Computes the fix of all lamps, assuming that the identities are correct.
 BodySolution fix_all(const BodyFrame& frame, const Problem& problem) {
   if (problem.lean_is_free()) {
     if (const auto solution = fix_free(frame, problem); solution && has_fix(*solution)) {
@@ -245,7 +247,7 @@ BodySolution fix_all(const BodyFrame& frame, const Problem& problem) {
   return best_from(start, frame, problem);
 }
 
-/// How far across its ray a lamp may be from where the fix sees it.
+/// Returns the largest accepted distance of a lamp from its ray, in m.
 double limit_of(const BodyFrame& frame, double max_residual_share) {
   constexpr double share_of_the_way = 0.15;
   Eigen::Vector3d mean_m = Eigen::Vector3d::Zero();
@@ -259,7 +261,7 @@ double limit_of(const BodyFrame& frame, double max_residual_share) {
   return std::min(max_residual_share * std::sqrt(sum / n), share_of_the_way * nearest_m);
 }
 
-/// Whether the motion is one that is known to be possible.
+/// Returns true if the motion is within five standard deviations of the prior.
 bool prior_holds(const BodyPrior& prior, const BodyMotion& motion) {
   constexpr double sigmas = 5;
   const Inclination &lean = motion.inclination, &mean = prior.mean.inclination;
@@ -304,13 +306,14 @@ BodyFrame kept(const BodyFrame& frame, const Agreeing& agreeing) {
   return rest;
 }
 
-/// Under the mirror image of the map.
+/// Returns the frame with the mirror image of the map.
 BodyFrame mirrored(BodyFrame frame) {
   for (std::size_t i = 0; i < frame.size; ++i) frame.sightings[i].lamp_m.y() *= -1;
   return frame;
 }
 
-/// The body as it stands and leans by any angle, by votes for what each three lamps say.
+/// Finds the largest set of lamps that agree with a state of free roll and pitch, at rest. Every
+/// triple of lamps proposes its states.
 std::optional<Agreeing> free_majority(const BodyFrame& frame, const Problem& problem,
                                       double limit_m) {
   constexpr std::size_t few = 12, at_least = 4;
@@ -333,13 +336,13 @@ std::optional<Agreeing> free_majority(const BodyFrame& frame, const Problem& pro
   return best;
 }
 
-/// The same for one that stands as level as the prior says.
+/// Finds the largest set of lamps that agree with a state with the inclination of the prior.
 std::optional<Agreeing> level_majority(const BodyFrame& frame, const Problem& problem,
                                        double limit_m) {
   const Eigen::Matrix3d lean = level_from_inclination(problem.prior.mean.inclination);
   LevelSightings level;
   if (!level.fill(frame, lean)) return std::nullopt;
-  // The limit in z, by the scale of the lamps' spreads.
+  // The limit is converted to z by the ratio of the distances between lamps.
   double sum_z = 0, sum_m = 0;
   const Sighting& first = level.sightings[0];
   for (const Sighting& seen : level.span()) {
@@ -351,7 +354,7 @@ std::optional<Agreeing> level_majority(const BodyFrame& frame, const Problem& pr
   return agreeing_with(body_of(majority->pose, problem, lean), frame, problem, limit_m);
 }
 
-/// The fix of a majority of the lamps, which are all that the frame then has.
+/// Computes the fix of a majority of the lamps, and removes the others from the frame.
 BodySolution fix_majority(BodyFrame& frame, const Problem& problem, double max_residual_share) {
   const BodySolution none{FixStatus::inconsistent, {}};
   const double limit_m = limit_of(frame, max_residual_share);
@@ -362,7 +365,7 @@ BodySolution fix_majority(BodyFrame& frame, const Problem& problem, double max_r
   const double driven_m = 2 * problem.prior.velocity_sd_m_per_s * latest_s;
   auto agreeing = problem.lean_is_free() ? free_majority(frame, problem, limit_m + driven_m)
                                          : level_majority(frame, problem, limit_m + driven_m);
-  // Motion was left out: once it is known, some that seemed wrong may turn out right.
+  // The majority ignored motion: with estimated motion, rejected lamps may agree.
   constexpr int rounds = 3;
   for (int round = 0; agreeing && round < rounds; ++round) {
     if (2 * agreeing->count() <= frame.size) return none;
@@ -381,8 +384,8 @@ BodySolution fix_majority(BodyFrame& frame, const Problem& problem, double max_r
   return none;
 }
 
-/// Where the stated noise does not explain the residuals, one lamp after the other is left out that
-/// alone does explain them; nothing when that is none, or several might be it.
+/// Rejects lamps one after another until the reported noise explains the residuals. Returns
+/// std::nullopt if no lamp, or more than one, qualifies.
 std::optional<BodySolution> fix_without_moved(BodyFrame& frame, const Problem& problem,
                                               const BodySolution& all) {
   BodyFrame rest = frame;
@@ -439,7 +442,7 @@ BodySolution fix_body_frame(BodyFrame& frame, const Eigen::Vector3d& arm_in_body
         kMuchBetter * excess_of(mirror_image.fix, frame) < excess_of(all.fix, frame)) {
       return {FixStatus::mirrored_map, {}};
     }
-    // Frames that one straight way does not explain are not of one.
+    // Constant velocity and yaw rate do not explain the frames.
     if (frame.now < frame.size) return {FixStatus::inconsistent, {}};
     if (!frame.noise_is_stated) return all;
     return fix_without_moved(frame, problem, all).value_or(all);

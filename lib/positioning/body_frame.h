@@ -12,17 +12,18 @@
 
 namespace vlp {
 
-/// The lamps of one frame, or of some that follow one another, in room of a fixed size so that
-/// nothing is allocated.
+/// Lamps observed in one frame, or in several consecutive frames. The arrays have a fixed size, so
+/// that no memory is allocated.
 struct BodyFrame {
   std::array<BodySighting, kMaxSightings> sightings;
   std::array<int, kMaxSightings> ids;
-  /// Distance on the floor plan from each lamp to the nearest other lamp of the map.
+  /// Horizontal distance from each lamp to the nearest other lamp of the map.
   std::array<double, kMaxSightings> nearest_m;
   std::size_t size = 0;
-  /// The first so many are of the frame whose fix it is; others were seen earlier.
+  /// Number of observations, at the start of the arrays, from the frame of the fix. The others are
+  /// from earlier frames.
   std::size_t now = 0;
-  /// Whether every sigma_px is one that a detector stated.
+  /// True if a detector reported every sigma_px.
   bool noise_is_stated = true;
   int rejected_lamps = 0;
   std::array<int, kMaxSightings> rejected_ids = {};
@@ -30,23 +31,30 @@ struct BodyFrame {
   std::span<const BodySighting> span() const { return {sightings.data(), size}; }
 };
 
+/// Status of a fix and the fix.
 struct BodySolution {
   FixStatus status;
   BodyFix fix;
 };
 
-/// The fix of a body that drives, turns or leans, from a frame of two lamps or more whose
-/// identities may be wrong. Where the lean is known to 0.15 rad it starts from the fix of a level
-/// camera (initial_pose), and otherwise from the poses of the three lamps that are widest apart
-/// (three_lamp_poses). Bodies are below their lamps. What fix_robustly() does for cameras that
-/// stand level it does here: lamps that are as far from where the fix sees them as fix_robustly()
-/// says, there in z, here in metres across their rays; a map that is mirrored; a majority that
-/// agrees; noise that does not explain the residuals, though a single lamp less does, and no other.
-/// And:
+/// Estimates the state of a body that moves or is tilted, from a frame with at least two lamps. The
+/// identities of lamps may be wrong.
+///
+/// Initial state: if the standard deviation of roll and pitch is at most 0.15 rad, the fix of a
+/// level camera (initial_pose). Otherwise the poses from the three lamps that are farthest apart
+/// (three_lamp_poses). Only poses below the lamps are accepted.
+///
+/// Checks residuals, mirrored maps and majorities as fix_robustly() does for level cameras. The
+/// residual limits apply to distances in meters across the rays; fix_robustly() applies them to z.
+/// If the noise does not explain the residuals, a lamp is rejected if only its removal does.
+///
+/// Additional statuses:
 ///   undetermined  lamps and priors leave the position uncertain by more than a quarter of the
-///                 distance to the lamps: two lamps, or three on one line, and a lean that is free;
-///   ambiguous     another solution explains the frame nearly as well (exp(-6) as likely or more);
-///   inconsistent  velocity, yaw rate or lean are five standard deviations from what is known.
+///                 distance to the lamps: two lamps, or three collinear ones, with free roll and
+///                 pitch
+///   ambiguous     another solution is nearly as likely: by a factor of exp(-6) or more
+///   inconsistent  velocity, yaw rate or roll and pitch differ from the prior by more than five
+///                 standard deviations
 BodySolution fix_body_frame(BodyFrame& frame, const Eigen::Vector3d& arm_in_body_m,
                             const BodyPrior& prior, double max_residual_share);
 

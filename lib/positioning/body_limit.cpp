@@ -45,7 +45,7 @@ std::optional<BodyLimit> body_limit(std::span<const Eigen::Vector3d> lamps_m, co
                                     double noise_px, const BodyPrior& prior,
                                     const std::optional<RowClock>& row_clock) {
   if (lamps_m.size() < 2 || lamps_m.size() > kMaxSightings) return std::nullopt;
-  // What contradicts a fix, and how a map is mirrored, is no question of exact sightings.
+  // Exact observations neither contradict the fix nor fit a mirrored map: the limit has no effect.
   constexpr double share = 0.1;
   BodyLimit limit;
   BodyFrame& frame = limit.frame;
@@ -60,7 +60,7 @@ std::optional<BodyLimit> body_limit(std::span<const Eigen::Vector3d> lamps_m, co
   const auto [status, fix] = fix_body_frame(frame, kNoArm, prior, share);
   if (status != FixStatus::ok) return std::nullopt;
   limit.fix = fix;
-  // Where the fix stopped it is at rest and level to rounding.
+  // The fix is at rest and level to rounding.
   limit.fix.state.motion = prior.mean;
   BodyPrior level_prior = prior;
   level_prior.inclination_sd_rad = 0;

@@ -14,23 +14,27 @@
 
 namespace vlp {
 
-/// Whether more than a pose is to be estimated.
+/// Returns true if velocity, yaw rate or roll and pitch are estimated together with the pose.
 bool is_free(const BodyPrior& prior);
+/// Returns true if velocity or yaw rate are estimated.
 bool may_move(const BodyPrior& prior);
 
-/// What pixels allow a camera that may move and lean, before it takes a fix.
+/// Cramer-Rao lower bound of a camera that may move and be tilted, predicted from the pixel noise.
 struct BodyLimit {
-  /// Of (X, Y, Z, yaw): of one that is known to stand and how it leans; what comes on top because
-  /// it may move; and because it may lean.
+  /// Covariances of (X, Y, Z, yaw): `noise` for known motion, roll and pitch; `motion` is the
+  /// increase due to unknown motion; `lean` the increase due to unknown roll and pitch.
   Matrix4 noise, motion, lean;
-  /// The lamps as it sees them, and the fix that they and the prior make.
+  /// Exact observations of the lamps, and the fix from these and the prior.
   BodyFrame frame;
   BodyFix fix;
 };
 
-/// For a camera that stands at `level` with these lamps in view, each pixel known to `noise_px` per
-/// axis. The prior's mean is at rest and level. Nothing where there is no fix (fix_body_frame), or
-/// the lens does not see a lamp. Precondition: a row clock where the prior lets it move.
+/// Computes the bound for a camera at `level` that observes `lamps_m`. The mean of the prior is at
+/// rest and level.
+///
+/// @param noise_px   standard deviation of each pixel per axis
+/// @return std::nullopt if fix_body_frame() finds no fix, or if the lens does not image a lamp
+/// @pre `row_clock` has a value if the prior leaves the motion free
 std::optional<BodyLimit> body_limit(std::span<const Eigen::Vector3d> lamps_m, const Lens& lens,
                                     const Eigen::Matrix3d& camera_from_level, const Pose& level,
                                     double noise_px, const BodyPrior& prior,

@@ -10,14 +10,16 @@
 
 namespace vlp {
 
-/// What an error of the inclination's roll, and one of its pitch, does to (X, Y, Z, yaw).
+/// Derivatives of (X, Y, Z, yaw) by the errors of roll and pitch of the inclination, a column each.
 using InclinationJacobian = Eigen::Matrix<double, 4, 2>;
 
-/// The robot's centre and yaw from the camera's: with m the mount's position turned into the
-/// camera's level frame, leaning as the robot does,
-///   robot = S - Rz(g) m,   yaw = g - yaw_in_robot.
-/// `camera` has the covariance of the pixel noise; `by_lean` is how it errs with the inclination,
-/// and m errs with it, too.
+/// Computes center and yaw of the robot from the camera pose. With m the position of the mount
+/// rotated into the camera's level frame, and inclined as the robot is:
+///   robot = S - Rz(g) m,   yaw = g - yaw_in_robot
+///
+/// @param camera   pose of the camera with the covariance from pixel noise
+/// @param by_lean  derivative of the camera pose by the inclination; m depends on the inclination,
+/// too
 PoseEstimate robot_from_camera(const PoseEstimate& camera, const InclinationJacobian& by_lean,
                                double inclination_sigma_rad, const CameraMount& mount,
                                const InclinationRotation& lean);

@@ -18,11 +18,11 @@
 namespace vlp {
 namespace {
 
-/// By the two coordinates of an error.
+/// Returns the derivatives of the rotation by the two coordinates of an error.
 template <typename With>
 void add_turns(std::vector<Eigen::Matrix3d>& turns, const Calibration& calibration,
                Correction correction, With with_error) {
-  constexpr double step = 1e-5;  // of second order in it: 1e-10 is left
+  constexpr double step = 1e-5;  // central differences have errors of second order: 1e-10
   for (int axis = 0; axis < 2; ++axis) {
     const Eigen::Vector2d error = step * Eigen::Vector2d::Unit(axis);
     const Calibration less = with_error(calibration, -error), more = with_error(calibration, error);
@@ -31,11 +31,12 @@ void add_turns(std::vector<Eigen::Matrix3d>& turns, const Calibration& calibrati
   }
 }
 
-/// Of a covariance, what goes away when the errors of these rows get known: S_:P S_PP^-1 S_P:. In
-/// directions of which they know nothing but rounding, nothing.
+/// Returns the reduction of a covariance if the errors of these rows become known:
+///   S_:P S_PP^-1 S_P:
+/// Directions in which S_PP has only rounding errors contribute zero.
 Eigen::MatrixXd known_by(const Eigen::MatrixXd& covariance, Eigen::Index first, Eigen::Index size) {
   if (size == 0) return Eigen::MatrixXd::Zero(covariance.rows(), covariance.cols());
-  if (first + size == covariance.rows()) return covariance;  // what is left is theirs alone
+  if (first + size == covariance.rows()) return covariance;  // the last rows own the remainder
   const Eigen::MatrixXd columns = covariance.middleCols(first, size);
   const Eigen::VectorXd sd = columns.middleRows(first, size).diagonal().cwiseMax(0).cwiseSqrt();
   const Eigen::VectorXd inverse_sd =
@@ -56,7 +57,7 @@ Eigen::MatrixXd known_by(const Eigen::MatrixXd& covariance, Eigen::Index first, 
   return known;
 }
 
-/// In units of the normalized plane.
+/// Converts a covariance in px^2 to units of the normalized plane.
 Eigen::Matrix2d normalized(const std::optional<Matrix2>& covariance_px,
                            const Eigen::Vector2d& focal_px) {
   if (!covariance_px) return Eigen::Matrix2d::Zero();
@@ -194,8 +195,8 @@ void CommonErrors::state_lamps(std::span<const Lamp> lamps,
 void CommonErrors::propagate_to_zenith_and_offset(std::span<const Lamp> lamps,
                                                   const Calibration& calibration) {
   const Eigen::Index rows = shared() - intrinsics_;
-  // Derivatives of zenith and offset by independent errors: lens, own of the zenith, own of the
-  // offset, lamps.
+  // Derivatives of zenith and offset by independent errors: lens, the zenith's step, the offset's
+  // step, lamps.
   Eigen::MatrixXd derivatives = Eigen::MatrixXd::Zero(rows, covariance_.cols());
   derivatives.middleCols(intrinsics_, rows).setIdentity();
   if (has_zenith() && !calibration.adjustment && calibration.rotation_center->by_intrinsics) {
@@ -261,7 +262,7 @@ CommonErrors::ByRay CommonErrors::effect_on_ray(const Eigen::Vector3d& ray_in_ba
   ByRay effect = ByRay::Zero(3, shared());
   const Eigen::Vector3d ray = camera_from_base_ * ray_in_base;
   if (const auto seen = lens.project_with_jacobians(ray)) {
-    // At a pixel that stays, the ray moves within its plane of z.
+    // For a fixed pixel the ray moves within its plane of z.
     const Eigen::Matrix2d d_ray = -seen->d_pixel_d_point.leftCols<2>().inverse();
     const Eigen::Matrix<double, 3, 2> d_ray_in_base = base_from_camera_.leftCols<2>() * d_ray;
     effect.leftCols(intrinsics_).noalias() = d_ray_in_base * seen->d_pixel_d_parameters;
@@ -275,7 +276,7 @@ CommonErrors::ByRay CommonErrors::effect_on_ray(const Eigen::Vector3d& ray_in_ba
 CommonErrors::Effect CommonErrors::effect_on(const Sighting& sighting, const LevelPose& pose,
                                              const Lens& lens,
                                              const Eigen::Matrix3d& level_from_base) const {
-  // How z moves with the direction, which has z = 1.
+  // Derivative of z by the direction, which has z = 1.
   Eigen::Matrix<double, 2, 3> d_z;
   d_z << 1, 0, -sighting.z.x(), 0, 1, -sighting.z.y();
   const Eigen::Matrix<double, 2, 3> d_z_d_base = d_z * level_from_base;
@@ -361,7 +362,7 @@ Eigen::Matrix<double, States, States, Eigen::DontAlign> CommonErrors::covariance
   const ByShared with_shared = by_shared.lazyProduct(covariance_.topLeftCorner(n, n));
   Covariance sum = with_shared.lazyProduct(by_shared.transpose());
   for (std::size_t i = 0; i < gain.size; ++i) {
-    // Half of the lamp's own, the shared ones, and the lamps before it.
+    // Half of the lamp's own errors, the shared errors, and those of the lamps before it.
     ByLamp other = 0.5 * by_lamp[i] * covariance_of_lamp(gain.lamps[i]);
     if (const auto& row = lamps_[gain.lamps[i]].row) {
       other += by_shared.lazyProduct(covariance_.block(0, *row, n, 3));
@@ -484,7 +485,7 @@ Unexplained find_unexplained(std::span<const Sighting> sightings, std::span<cons
     });
     const double freedom = 2 * static_cast<double>(left) - 4;
     if (chi_squared <= chi_squared_bound(kSigmasOfOneInTenThousand, freedom)) return found;
-    // Of three that contradict each other nobody knows which is wrong; nor when most are.
+    // Three contradicting lamps do not determine which is wrong; nor does a minority.
     if (!(worst > 0) || left == 3 || 2 * (left - 1) <= sightings.size()) return {};
     left_out.set(worst_lamp);
     found.lamps[found.count++] = worst_lamp;
@@ -494,7 +495,7 @@ Unexplained find_unexplained(std::span<const Sighting> sightings, std::span<cons
 
 namespace {
 
-/// Whether they lack what a calibration states of its lens.
+/// Returns true if the calibration reports errors of its lens that `errors` lacks.
 bool lack_lens(const CommonErrors& errors, const Calibration& calibration) {
   const auto& report = calibration.intrinsics_report;
   return report && report->covariance && !errors.stated(CommonPart::lens);

@@ -9,7 +9,7 @@
 namespace vlp {
 namespace {
 
-/// Takes z to z - offset.
+/// Returns the shear that takes z to z - offset.
 Eigen::Matrix3d shear(const Eigen::Vector2d& offset) {
   Eigen::Matrix3d matrix = Eigen::Matrix3d::Identity();
   matrix.topRightCorner<2, 1>() = -offset;

@@ -8,18 +8,18 @@
 
 namespace vlp {
 
-/// Which parts of a calibration a fix applies. `all` is every part that is there.
+/// Parts of a calibration that a fix applies. `all`: every part that exists.
 enum class Correction { none, rotation, dispersion, all };
 
-/// The correction as one matrix M: a ray v of the camera is seen along M v in the level frame,
-/// at the normalized point z = (M v)_xy / (M v)_z. M is the product of
-///   rotation centre, `tilt`:  the rotation that takes the zenith to +Z;
-///   rotation centre, `shift`: the shear that takes z to z - (center_px - c) / f  (eq. 9);
+/// Returns the correction as one matrix M. A ray v of the camera has the direction M v in the level
+/// frame, and the normalized point z = (M v)_xy / (M v)_z. M is the product of
+///   rotation center, `tilt`:  the rotation that takes the zenith to +Z;
+///   rotation center, `shift`: the shear that takes z to z - (center_px - c) / f  (eq. 9);
 ///   dispersion after `tilt`:  the rotation that takes (offset_px / f, 1) to +Z;
 ///   dispersion otherwise:     the shear that takes z to z - offset_px / f  (eq. 12, 13, with the
 ///                             factor f / H that they lack).
-/// Throws std::invalid_argument when `correction` asks for a part that is not there, or a part
-/// holds what is not finite or a zenith that is not in front of the camera.
+/// @throws std::invalid_argument if `correction` requires a part that is missing, if a part has
+/// values that are not finite, or if the zenith is not in front of the camera
 Eigen::Matrix3d level_from_camera(const Calibration& calibration, Correction correction);
 
 }  // namespace vlp

@@ -13,7 +13,7 @@ using Matrix24 = Eigen::Matrix<double, 2, 4>;
 using Matrix42 = Eigen::Matrix<double, 4, 2>;
 using Matrix43 = Eigen::Matrix<double, 4, 3>;
 
-/// A lamp's part in the least-squares fix, in pixels.
+/// Derivatives of a lamp's pixel in the least-squares fix.
 struct Row {
   Eigen::Matrix2d d_pixel_d_z;
   Matrix24 d_pixel_d_state;
@@ -31,7 +31,7 @@ std::optional<Row> row_of(const Eigen::Vector3d& lamp_m, const Lens& lens,
   return Row{d_pixel_d_z, d_pixel_d_z * prediction.d_z_d_state, prediction.z};
 }
 
-/// A lamp's prediction moves with the lamp as it moves against the camera.
+/// Returns the derivative by the lamp's position: minus the derivative by the camera's position.
 Eigen::Matrix<double, 2, 3> d_pixel_d_lamp(const Row& row) {
   return -row.d_pixel_d_state.leftCols<3>();
 }

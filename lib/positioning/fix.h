@@ -12,90 +12,91 @@
 
 namespace vlp {
 
-/// How a fix went. name_of() is what stands in fixes.csv.
+/// Status of a fix. name_of() returns the word in fixes.csv.
 enum class FixStatus {
   ok,
   too_few_lamps,      // fewer than two lamps of the map
   too_many_lamps,     // more than Positioner::max_lamps
   duplicate_lamp,     // one id twice in a frame
-  not_finite,         // a pixel or a sensor reading is not, or a sigma or sd is out of range
+  not_finite,         // a pixel or sensor reading is not finite, or a sigma or sd is out of range
   outside_lens,       // a pixel that no ray through the lens reaches
-  lamp_below_camera,  // a lamp would have to hang at or below the camera's height
-  degenerate,         // the lamps are seen too close together, or do not fit any pose
-  ambiguous,          // two poses would explain the lamps
-  inconsistent,       // three lamps or more that contradict each other
-  mirrored_map,       // they fit a mirror image of the map
-  undetermined,       // lamps and what is known do not tell lean or motion, and so not the place
-  row_time_unknown    // motion wants to know when each row was read
+  lamp_below_camera,  // a lamp would have to be at or below the camera's height
+  degenerate,         // the lamps are too close together in the image, or fit no pose
+  ambiguous,          // two poses explain the lamps
+  inconsistent,       // three lamps or more contradict each other
+  mirrored_map,       // the lamps fit a mirror image of the map
+  undetermined,       // lamps and priors do not determine motion or tilt, and so the position
+  row_time_unknown    // motion compensation requires the row time
 };
 
-/// The enumerator as a word, for example "too_few_lamps".
+/// Returns the enumerator as a word, for example "too_few_lamps".
 std::string_view name_of(FixStatus status);
 
-/// What it means and what to do, for people.
+/// Returns a human-readable explanation with the remedy.
 std::string_view explanation_of(FixStatus status);
 
-/// A pose and the covariance of its (X, Y, Z, yaw) in metres and radians.
+/// A pose and the covariance of its (X, Y, Z, yaw) in meters and radians.
 struct PoseEstimate {
   Pose pose;
   Matrix4 covariance;
 };
 
-/// Where the states of a body stand in covariances: X, Y, Z, yaw, then velocity, yaw rate and lean.
+/// Indices of the states of a body in covariances: X, Y, Z, yaw, velocity, yaw rate, roll, pitch.
 enum BodyIndex { kBodyYaw = 3, kBodyVelocity = 4, kBodyYawRate = 6, kBodyRoll = 7, kBodyPitch = 8 };
 inline constexpr int kBodyStates = 9;
 using BodyCovariance = Eigen::Matrix<double, kBodyStates, kBodyStates, Eigen::DontAlign>;
 
-/// How the body of a fix moved and leaned: the robot, or, without a mount, the camera.
+/// Estimated motion, roll and pitch of the robot, or, without a mount, of the camera.
 struct BodyEstimate {
-  /// In the world.
+  /// Velocity in the world.
   Eigen::Vector2d velocity_m_per_s{0, 0};
   double yaw_rate_rad_per_s = 0;
   Inclination inclination{0, 0};
-  /// Of (X, Y, Z, yaw, vx, vy, yaw rate, roll, pitch) in metres, radians and seconds: all that is
-  /// known of their errors, as in Fix::estimate. Zero for what was given as exact.
+  /// Covariance of (X, Y, Z, yaw, vx, vy, yaw rate, roll, pitch) in meters, radians and seconds.
+  /// Includes all known errors, as in Fix::estimate. Zero for quantities given as exact.
   BodyCovariance covariance = BodyCovariance::Zero();
-  /// The part that is of this frame alone: of pixels and of what was known before, weighed
-  /// together.
+  /// Part of the covariance due to this frame: pixels and priors combined.
   BodyCovariance noise_covariance = BodyCovariance::Zero();
 };
 
-/// The answer to one frame. Everything below `status` holds only when that is `ok`.
+/// Result for one frame. The members below `status` are valid only if it is `ok`.
 struct Fix {
   FixStatus status = FixStatus::too_few_lamps;
-  /// Of the camera, or of the robot's centre when a CameraMount is given; the covariance of
-  /// (X, Y, Z, yaw) is all that is known of its error: noise_covariance, and what calibration and
-  /// lamp map got wrong, as far as they state it (common_errors.h).
+  /// Pose of the camera, or of the robot's center if there is a CameraMount. The covariance of (X,
+  /// Y, Z, yaw) includes all known errors: noise_covariance, and the errors of calibration and lamp
+  /// map as far as they are reported (common_errors.h).
   PoseEstimate estimate;
-  /// The part of the pixel noise, of the inclination, and, for one lamp, of height, yaw and motion.
-  /// It averages out over frames as far as these errors are independent between them.
+  /// Part of the covariance due to pixel noise and inclination, and, for one lamp, height, yaw and
+  /// motion. It averages out over frames as far as these errors are independent between frames.
   Matrix4 noise_covariance = Matrix4::Zero();
-  /// Root of the mean squared distance between the lamps' pixels and where the fix sees them. Zero,
-  /// to rounding, with one or two lamps.
+  /// RMS distance in the image between the observed and the predicted lamps. Zero, to rounding,
+  /// with one or two lamps.
   double residual_px = 0;
-  /// Lamps that the fix rests on.
+  /// Number of lamps used for the fix.
   int lamps = 0;
-  /// Those that residual_px is of: the same, and those of earlier frames.
+  /// Number of observations in residual_px: those of `lamps` and those of earlier frames.
   int sightings = 0;
-  /// Lamps that were left out because the others contradict them, and the ids of the first of them.
+  /// Number of lamps rejected because the others contradict them, and the ids of the first 32 of
+  /// them.
   int rejected_lamps = 0;
   std::array<int, 32> rejected_ids = {};
-  /// Detections whose id is not in the lamp map; they are left out. Holds whatever the status.
+  /// Number of detections whose id is not in the lamp map; these are ignored. Valid for every
+  /// status.
   int unknown_lamps = 0;
-  /// Degrees of freedom that the pixels' residuals have: 2n - 4 for three lamps and more that are
-  /// seen from a body that stands and whose lean is known, less by what else they determine. If
-  /// sigma_px is not stated, the expectation of chi_squared for unit noise in the image.
+  /// Degrees of freedom of the pixel residuals. A body at rest with known roll and pitch has 2n - 4
+  /// for three lamps or more; each other estimated quantity reduces them. If sigma_px is not
+  /// reported, the expectation of chi_squared for unit noise in the image.
   double redundancy = 0;
   /// Sum of the squared residuals of the pixels over their variances. Its expectation is
   /// `redundancy` plus common_chi_squared.
   double chi_squared = 0;
   /// Expected contribution of the errors of calibration and lamp map to chi_squared, as far as they
-  /// are stated. 0 without PositionerOptions::computes_common_chi_squared.
+  /// are reported. 0 without PositionerOptions::computes_common_chi_squared.
   double common_chi_squared = 0;
-  /// Where Sensors let it move or lean.
+  /// Motion, roll and pitch if Sensors leave them free.
   std::optional<BodyEstimate> body;
-  /// That of the Sensors: the middle of the exposure of the image's middle row, of which the fix
-  /// is.
+  /// Sensors::time_s: the middle of the exposure of the image's middle row, to which the fix
+  /// refers.
   std::optional<double> time_s;
 
   bool ok() const { return status == FixStatus::ok; }

@@ -52,7 +52,7 @@ std::vector<Eigen::Vector3d> places_of(const LampMap& map, const std::vector<std
 using Source = FloorLimits::Source;
 constexpr Source kLampMap{"lamp map", "lamp_map"};
 
-/// What is of each image alone.
+/// Returns the sources that are independent between images.
 std::vector<Source> sources_of(const BodyPrior& prior) {
   std::vector<Source> sources{{"noise", "noise"}};
   if (may_move(prior)) sources.push_back({"motion", "motion"});

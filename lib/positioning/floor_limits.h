@@ -13,7 +13,7 @@
 
 namespace vlp {
 
-/// Places on the floor, row by row from (x_min, y_min), in metres of the world.
+/// Grid of positions on the floor, row by row from (x_min, y_min), in meters of the world.
 struct FloorGrid {
   double x_min_m;
   double x_max_m;
@@ -22,24 +22,25 @@ struct FloorGrid {
   double step_m;
 };
 
-/// The smallest grid around the lamps. Precondition: the map has lamps.
+/// Returns the smallest grid around the lamps.
+/// @pre the map has lamps
 FloorGrid floor_under(const LampMap& map, double step_m);
 
-/// The error budget over a floor.
+/// Error budget of each position on a floor.
 struct FloorLimits {
-  /// "lamp map", "lamp_map": for people, and for programs.
+  /// Name of an error source, such as "lamp map", and its machine-readable key, such as "lamp_map".
   struct Source {
     std::string_view name, key;
   };
   std::vector<Source> sources;
 
-  /// What a camera at one place could reach.
+  /// Predicted covariance at one position.
   struct Place {
     Pose camera;
-    /// Lamps that are seen whole.
+    /// Number of lamps that are fully visible.
     int lamps;
-    /// Covariances of (X, Y, Z, yaw), one a source; empty where fewer than two lamps are seen, or
-    /// they do not tell what else is to be estimated.
+    /// Covariances of (X, Y, Z, yaw), one for each source. Empty if fewer than two lamps are
+    /// visible, or if these do not determine all estimated quantities.
     std::vector<Matrix4> parts;
 
     Matrix4 total() const;
@@ -47,22 +48,25 @@ struct FloorLimits {
   std::vector<Place> places;
 };
 
-/// The lamps of the map that a level camera at `pose` sees whole: the centre, and the rim when the
-/// diameter is known, are in front of it and within the image.
+/// Returns the positions of the lamps that are fully visible to a level camera at `pose`. Such a
+/// lamp has its center, and its rim if the diameter is known, in front of the camera and within the
+/// image.
 std::vector<Eigen::Vector3d> visible_lamps(const LampMap& map, const Camera& camera,
                                            const Pose& pose);
 
-/// The error budget at every place of the grid, for a level camera at height `z_m` and one yaw:
-/// noise, centre, tilt, lamp map; after the noise motion and lean, where the prior, whose mean is
-/// at rest and level, lets the camera move or lean. Throws std::invalid_argument when the grid has
-/// a step that is not positive, no extent or more than ten million places, or the intrinsics are
-/// not the lens model's. Precondition: the camera has row time and read-out where it may move.
+/// Computes the error budget at every position of the grid, for a level camera at height `z_m` and
+/// yaw `yaw_rad`. Sources: noise, center, tilt, lamp map. Motion and lean follow the noise if the
+/// prior leaves them free; its mean is at rest and level.
+/// @throws std::invalid_argument if the step is not positive, if the grid has no extent or more
+/// than ten million positions, or if the intrinsics do not match the lens model
+/// @pre the camera has row time and readout direction if it may move
 FloorLimits floor_limits(const LampMap& map, const Camera& camera, const FloorGrid& grid,
                          double z_m, double yaw_rad, const ErrorSources& sources,
                          const BodyPrior& prior = {});
 
-/// The same from what calibration and lamp map state of themselves, for this camera, which leans as
-/// it does: noise, motion, lean, lens, zenith, offset where there is one, lamp map.
+/// Computes the same for a calibrated camera with its tilt, from the reported uncertainties of
+/// calibration and lamp map. Sources: noise, motion, lean, lens, zenith, offset if there is one,
+/// lamp map.
 FloorLimits floor_limits(const UnitErrors& unit, const FloorGrid& grid, double z_m, double yaw_rad,
                          double noise_px, const BodyPrior& prior = {});
 

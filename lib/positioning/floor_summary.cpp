@@ -15,12 +15,12 @@ struct MedianAndWorst {
   double median, worst;
 };
 
-/// Precondition: not empty.
+/// @pre `values` is not empty
 MedianAndWorst summary_of(const std::vector<double>& values) {
   return {lower_median(values), *std::max_element(values.begin(), values.end())};
 }
 
-/// `covariance` of a place that has a fix.
+/// Summarizes `covariance(place)` over the places that have a fix.
 template <typename Covariance>
 FloorSummary::Row row_of(const FloorLimits::Source& source, const FloorLimits& limits,
                          const Covariance& covariance) {
@@ -42,7 +42,7 @@ FloorSummary::Row row_of(const FloorLimits::Source& source, const FloorLimits& l
 }  // namespace
 
 FixSpread spread_of(const Matrix4& covariance) {
-  // Of a part that is nothing rounding may leave less than that.
+  // The rounding errors of a zero part may be negative.
   const auto root = [](double variance) { return variance < 0 ? 0 : std::sqrt(variance); };
   return {root(covariance(0, 0) + covariance(1, 1)), root(covariance(2, 2)),
           root(covariance(3, 3))};

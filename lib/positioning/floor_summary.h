@@ -10,25 +10,27 @@
 
 namespace vlp {
 
-/// Standard deviations of a fix: horizontal is the root of the sum of the variances of x and y.
-/// Variances below zero, which rounding makes of none, are none.
+/// Standard deviations of a fix. `horizontal_m` is the root of the sum of the variances of x and y.
+/// Negative variances, which result from rounding, count as zero.
 struct FixSpread {
   double horizontal_m;
   double height_m;
   double yaw_rad;
 };
 
+/// Returns the standard deviations of a covariance of (X, Y, Z, yaw).
 FixSpread spread_of(const Matrix4& covariance);
 
-/// The error budget of a floor: for each source alone, and for all together, the median and the
-/// worst over the places that see two lamps or more, each figure on its own.
+/// Summary of the error budget of a floor: median and maximum for each source alone and for all
+/// sources together. Taken over the positions where at least two lamps are visible, for each
+/// statistic separately.
 struct FloorSummary {
   struct Row {
     /// As in FloorLimits.
     FloorLimits::Source source;
     FixSpread median;
     FixSpread worst;
-    /// Of the horizontal variances, summed over these places, what is this source's.
+    /// Fraction of the sum of the horizontal variances that is due to this source.
     double share;
   };
   /// In the order of the sources.
@@ -36,11 +38,12 @@ struct FloorSummary {
   Row together;
   std::size_t places_with_fix;
 
-  /// The one with the largest share, which is to be improved first.
+  /// Returns the source with the largest fraction, which has the greatest potential for
+  /// improvement.
   const Row& largest() const;
 };
 
-/// Nothing when no place has a fix.
+/// Computes the summary. Returns std::nullopt if no position has a fix.
 std::optional<FloorSummary> summarize(const FloorLimits& limits);
 
 }  // namespace vlp

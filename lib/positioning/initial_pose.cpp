@@ -27,7 +27,7 @@ const Sighting& farthest_from(const Sighting& from, std::span<const Sighting> si
                            });
 }
 
-/// Sum of the squared residuals in z; a lamp that is not above the pose counts as far off.
+/// Returns the sum of the squared residuals in z. A lamp that is not above the pose adds 1e6.
 double disagreement(const Pose& pose, std::span<const Sighting> sightings) {
   const LevelPose camera(pose);
   double sum = 0;

@@ -11,21 +11,22 @@
 
 namespace vlp {
 
-/// Position and yaw from two or more lamps at one height, in closed form: the similarity
-/// p = s + c z of least squares gives H = |c|, g = arg c (the method of [19] in Chen and Guan).
-/// All lamps weigh alike. Precondition: the lamps' heights are equal; their mean is used.
-/// Nothing when the lamps are seen as one.
+/// Computes position and yaw from two or more lamps at one height, in closed form. The
+/// least-squares similarity p = s + c z gives H = |c|, g = arg c (the method of [19] in Chen and
+/// Guan). All lamps have equal weights. Returns std::nullopt if the lamps coincide in the image.
+/// @pre the lamps have equal heights; their mean is used
 std::optional<Pose> fix_coplanar_lamps(std::span<const Sighting> sightings);
 
+/// A pose in closed form and its status.
 struct InitialPose {
-  /// `ok`, or why there is none.
+  /// `ok`, or the reason of failure.
   FixStatus status;
   Pose pose;
 };
 
-/// A pose of two or more lamps in closed form, exact when they are seen without noise: two lamps
-/// alone; the similarity when they hang at one height; otherwise the two that are seen far apart,
-/// and of their solutions the one that the other lamps agree with.
+/// Computes a pose from two or more lamps in closed form, exact without noise. Two lamps:
+/// fix_two_lamps(). Lamps at one height: the similarity. Otherwise the solutions from the two lamps
+/// that are far apart in the image; of these, the one that fits the other lamps best.
 InitialPose initial_pose(std::span<const Sighting> sightings);
 
 }  // namespace vlp

@@ -33,7 +33,7 @@ NormalEquations linearize(std::span<const Sighting> sightings, const LevelPose& 
   return normal;
 }
 
-/// The turn is taken along the tangent: equal to the angle where it counts, for small steps.
+/// Rotates along the tangent, which equals the angle for small steps.
 LevelPose moved(const LevelPose& pose, const Eigen::Vector4d& step) {
   return {pose.position_m + step.head<3>(),
           complex_product(pose.heading, {1, step[3]}).normalized()};
@@ -53,7 +53,7 @@ double residual_px(std::span<const Sighting> sightings, const LevelPose& camera)
 std::optional<LeastSquaresFix> fix_least_squares(std::span<const Sighting> sightings,
                                                  const Pose& start) {
   constexpr int max_iterations = 50;
-  // Of the distance and of a radian: far below any noise, far above rounding.
+  // Relative to the distance and to 1 rad: far below any noise, far above rounding.
   constexpr double small_step = 1e-10;
   // Near the minimum the sum of squares changes by less than it can be computed.
   constexpr double rounding = 1e-12;
@@ -95,7 +95,8 @@ Eigen::Matrix<double, 4, 3> rotation_effect(std::span<const Sighting> sightings,
                 tilt_jacobian(sighting.z);
   }
   Eigen::Matrix<double, 4, 3> effect;
-  effect << fix.covariance * gradient, Eigen::Vector4d(0, 0, 0, -1);  // the yaw takes up the last
+  effect << fix.covariance * gradient,
+      Eigen::Vector4d(0, 0, 0, -1);  // yaw compensates a rotation about z
   return effect;
 }
 

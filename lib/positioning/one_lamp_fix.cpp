@@ -9,8 +9,8 @@ namespace vlp {
 
 namespace {
 
-/// Returns the lamp relative to the centre about which the camera turns, when its row is read,
-/// along the axes of the camera in the middle of the image.
+/// Returns the lamp relative to the center of rotation at the readout time of its row, along the
+/// axes of the camera in the middle of the image.
 Eigen::Vector2d compute_lamp_from_center_m(const Sighting& sighting, double height_m,
                                            const MotionAtReadout& readout) {
   const double turn_rad = readout.motion.yaw_rate_rad_per_s * readout.time_s;

@@ -11,34 +11,36 @@
 
 namespace vlp {
 
-/// Motion of the camera when the row of the lamp is read.
+/// Motion of the camera at the readout time of the lamp's row.
 struct MotionAtReadout {
   /// Motion along the axes of the camera's level frame.
   KnownMotion motion = {};
-  /// Camera relative to the centre about which it turns, along the same axes.
+  /// Position of the camera relative to the center of rotation, along the same axes.
   Eigen::Vector2d arm_m{0, 0};
-  /// Time from the middle of the image to the read-out of the row.
+  /// Time from the middle of the image to the readout of the row.
   double time_s = 0;
 };
 
-/// Computes the position from one lamp when height and yaw are known (eq. 6 solved for s):
+/// Computes the position from one lamp if height and yaw are known (eq. 6 solved for s):
 ///   s = p - e^{jg} (H e^{jwt} z + (e^{jwt} - 1) a + u t)
-/// u, w  velocity and yaw rate;   a  arm;   t  time of the read-out.
+///   u, w  velocity and yaw rate;   a  arm;   t  time of the readout
 /// Returns std::nullopt if the lamp is not above the camera.
 std::optional<Pose> fix_one_lamp(const Sighting& sighting, const HeightAndYaw& known,
                                  const MotionAtReadout& readout = {});
 
-/// Returns the covariance of (X, Y, Zs, g) of that fix for the pixel's noise alone.
-/// @pre fix_one_lamp() gave `pose`
+/// Returns the covariance of (X, Y, Zs, g) from the pixel noise alone.
+/// @pre fix_one_lamp() computed `pose`
 Matrix4 one_lamp_covariance(const Sighting& sighting, const Pose& pose);
 
-/// Returns the covariance of (X, Y, Zs, g) of that fix for the errors of height, yaw and motion.
-/// @pre fix_one_lamp() gave `pose`
+/// Returns the covariance of (X, Y, Zs, g) from the errors of height, yaw and motion.
+/// @pre fix_one_lamp() computed `pose`
 Matrix4 compute_one_lamp_sensor_covariance(const Sighting& sighting, const Pose& pose,
                                            const HeightAndYaw& known,
                                            const MotionAtReadout& readout);
 
-/// What a small rotation of the level frame about each of its axes does to (X, Y, Zs, g) of it.
+/// Returns the derivative of (X, Y, Zs, g) by a small rotation of the level frame about each of its
+/// axes.
+/// @pre fix_one_lamp() computed `pose`
 Eigen::Matrix<double, 4, 3> one_lamp_rotation_effect(const Sighting& sighting, const Pose& pose);
 
 }  // namespace vlp

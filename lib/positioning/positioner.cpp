@@ -71,7 +71,7 @@ bool finite(const Sensors& sensors) {
                      is_sd(known->z_sd_m) && is_sd(known->yaw_sd_rad)));
 }
 
-/// The mean of the lamps' places, so that a map in national coordinates loses no digits.
+/// Returns the mean position of the lamps, relative to which national coordinates lose no digits.
 Eigen::Vector3d center_of(const std::vector<Lamp>& lamps) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const Lamp& lamp : lamps) sum += lamp.position_m - lamps.front().position_m;
@@ -79,7 +79,7 @@ Eigen::Vector3d center_of(const std::vector<Lamp>& lamps) {
 }
 
 /// Returns the horizontal distance of each lamp to the nearest other one; infinity if there is
-/// none. Goes along x from each lamp, and no farther than the nearest lamp so far.
+/// none. Goes along x from each lamp, and no farther than the nearest lamp found.
 std::vector<double> distances_to_nearest(const std::vector<Lamp>& lamps) {
   std::vector<std::size_t> by_x(lamps.size());
   std::iota(by_x.begin(), by_x.end(), 0U);
@@ -104,14 +104,14 @@ std::vector<double> distances_to_nearest(const std::vector<Lamp>& lamps) {
   return nearest_m;
 }
 
-/// Whether more is to be estimated than a pose, or the lamps are not seen from one place.
+/// Returns true if more than a pose is estimated, or if the camera moves during the readout.
 bool needs_body(const Sensors& sensors) {
   return sensors.inclination_sigma_rad > 0 || sensors.height ||
          (sensors.motion && moves(*sensors.motion));
 }
 
-/// The velocity turned from the level frame into the world, and the covariances with it: that of
-/// the fix's own noise, and the common part that comes on top.
+/// Rotates velocity and covariances from the level frame to the world. `common` is added to the
+/// covariance of the fix's own noise.
 BodyEstimate in_world(const BodyFix& fix, const BodyCovariance& common) {
   const Eigen::Rotation2Dd world_from_level(fix.state.pose.yaw_rad);
   const BodyMotion& motion = fix.state.motion;
@@ -189,11 +189,11 @@ class Positioner::Impl {
                        const Matrix4& by_height_and_yaw, Fix& fix) const;
   FixStatus sight_from_body(std::span<const Detection> detections, double time_s, BodyFrame& frame,
                             int& unknown_lamps) const;
-  /// Nothing when fewer than two lamps of the map are seen.
+  /// Returns std::nullopt if the frame has fewer than two lamps of the map.
   std::optional<Fix> locate_body(std::span<const Detection> detections, const Sensors& sensors,
                                  std::span<const EarlierFrame> earlier) const;
 
-  std::vector<Lamp> lamps_;        // in the order of their ids, their places from origin_m_
+  std::vector<Lamp> lamps_;        // in the order of ids, positions relative to origin_m_
   std::vector<double> nearest_m_;  // from each to the nearest other, on the floor plan
   Lens lens_;
   Eigen::Vector3d origin_m_;
@@ -205,7 +205,7 @@ class Positioner::Impl {
   double max_residual_share_;
   double unstated_sigma_px_;
   bool computes_common_chi_squared_;
-  /// Nothing when the calibration lacks the row time or the read-out.
+  /// std::nullopt if the calibration lacks row time or readout direction.
   std::optional<RowClock> row_clock_;
 };
 
@@ -273,12 +273,12 @@ std::size_t Positioner::Impl::index_of(int id) const {
   return static_cast<std::size_t>(lamp - lamps_.begin());
 }
 
-/// Where everything that is uncertain is stated, it decides; else the rules of fix_robustly() do.
+/// Rejects lamps by the reported uncertainties if all are known; otherwise fix_robustly() decides.
 void Positioner::Impl::reject_unexplained(SightedFrame& frame,
                                           const Eigen::Matrix3d& level_from_base,
                                           ConsistentFix& solution) const {
   if (solution.status != FixStatus::ok || frame.size < 4) return;
-  // What the noise alone explains needs nothing else to.
+  // If the noise alone explains the residuals, no other error is needed.
   if (solution.fix.chi_squared <= static_cast<double>(2 * frame.size - 4)) return;
   const LevelPose pose(solution.fix.pose);
   std::array<Matrix2, max_lamps> common;
@@ -390,7 +390,7 @@ std::optional<Fix> Positioner::Impl::locate_body(std::span<const Detection> dete
     if (status != FixStatus::ok) return refused(status, fix.unknown_lamps);
   }
   if (frame.now < 2) return std::nullopt;
-  // Where more than the noise is uncertain, the noise alone decides nothing.
+  // If common errors are known, the noise alone must not reject lamps.
   if (common_.complete()) frame.noise_is_stated = false;
   const Eigen::Vector3d arm_m =
       mount_ ? mount_->position_in_robot_m : Eigen::Vector3d(Eigen::Vector3d::Zero());
@@ -457,7 +457,7 @@ void Positioner::Impl::add_covariances(const SightedFrame& frame, const Inclinat
                                           : Matrix4(Matrix4::Zero());
   if (!frame.is_weighed_by_noise) convert_to_image_noise(frame, lean.level_from_base, fix);
   fix.estimate.covariance += by_height_and_yaw;
-  // The error of the inclination is of this frame, too.
+  // The error of the inclination is independent between frames, too.
   if (mount_) {
     PoseEstimate whole = fix.estimate;
     whole.covariance += common;
@@ -507,7 +507,7 @@ Fix Positioner::Impl::locate(std::span<const Detection> detections, const Sensor
   Matrix4 by_height_and_yaw = Matrix4::Zero();
   InclinationJacobian by_lean = InclinationJacobian::Zero();
   if (frame.size > 1) {
-    // Where all that is uncertain is stated, noise alone decides nothing.
+    // If common errors are known, the noise alone must not reject lamps.
     const bool total = common_.complete();
     if (total) frame.noise_is_stated = false;
     ConsistentFix found = fix_robustly(frame, max_residual_share_);

@@ -9,37 +9,38 @@
 
 namespace vlp {
 
-/// Residuals of many fixes, summed over those that have redundancy. Fixes with a reduced
-/// chi-squared above 25 times the median are left out.
+/// Sums over the residuals of all fixes that have redundancy. Excludes fixes with a reduced
+/// chi-squared above 25 times the median.
 struct ResidualSums {
-  /// Squared residuals, in px^2 and over their variances.
+  /// Sums of the squared residuals in px^2 and of those divided by their variances.
   double squares_px2 = 0, chi_squared = 0;
   /// Expected contribution of the errors of calibration and lamp map to chi_squared.
   double common_chi_squared = 0;
   double degrees_of_freedom = 0;
 };
 
+/// Computes the sums.
 ResidualSums sum_residuals(std::span<const Fix> fixes);
 
-/// Returns the standard deviation of a pixel per axis that the residuals show:
-///   sqrt(sum of squared residuals / degrees of freedom).
-/// Errors of calibration and lamp map count as noise. Within kMinSigma_px and kMaxSigma_px, or
-/// std::nullopt without redundancy.
+/// Estimates the standard deviation of a pixel per axis from the residuals:
+///   sqrt(sum of squared residuals / degrees of freedom)
+/// Errors of calibration and lamp map count as noise. Clamped to [kMinSigma_px, kMaxSigma_px].
+/// Returns std::nullopt without redundancy.
 std::optional<double> estimate_noise_px(const ResidualSums& sums);
 
-/// Estimates the factor by which the noise of the pixels differs from what the fixes were computed
-/// with. Errors that are stated do not count as noise:
-///   factor^2 = (chi_squared - common_chi_squared) / degrees of freedom,
-/// at least a quarter of chi_squared / degrees of freedom: all fixes share one realization of the
-/// errors of calibration and map, which may be far from its expectation.
+/// Estimates the ratio of the pixel noise to the noise with which the fixes were computed. Reported
+/// errors of calibration and map do not count as noise:
+///   factor^2 = (chi_squared - common_chi_squared) / degrees of freedom
+/// but at least a quarter of chi_squared / degrees of freedom. Reason: all fixes share one
+/// realization of the errors of calibration and map, which may be far from its expectation. Returns
 /// std::nullopt without redundancy.
 /// @pre the fixes were computed with PositionerOptions::computes_common_chi_squared
 std::optional<double> estimate_noise_factor(const ResidualSums& sums);
 
-/// Returns the factor by which stated noise is too small according to the residuals, 1 if it is not
-/// (Birge ratio; Birge 1932, Phys. Rev. 40, 207). Twice the expectation of the errors of
-/// calibration and lamp map are attributed to them, since all fixes share one realization of these.
-/// 1 with fewer than 12 degrees of freedom, which determine the factor to 20 % at best.
+/// Estimates the factor by which the reported noise is too small according to the residuals, at
+/// least 1 (Birge ratio; Birge 1932, Phys. Rev. 40, 207). Twice the expectation of the errors of
+/// calibration and lamp map is attributed to them, since all fixes share one realization of these.
+/// Returns 1 with fewer than 12 degrees of freedom, which determine the factor to 20 % at best.
 /// @pre the fixes were computed with PositionerOptions::computes_common_chi_squared
 double estimate_birge_ratio(const ResidualSums& sums);
 

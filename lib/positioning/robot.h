@@ -4,18 +4,18 @@
 
 #include <Eigen/Core>
 
-/// What a robot knows of itself, and not from an image.
+/// Data that a robot has from other sources than images.
 namespace vlp {
 
-/// How the camera sits on the robot. The robot's frame has z up at its centre; the camera stands at
-/// `position_in_robot_m`, its yaw turned by `yaw_in_robot_rad` against the robot's.
+/// Pose of the camera on the robot. The robot's frame has its origin at the center and z up.
+/// `yaw_in_robot_rad` is the yaw of the camera relative to the robot.
 struct CameraMount {
   Eigen::Vector3d position_in_robot_m;
   double yaw_in_robot_rad;
 };
 
-/// Height and yaw of the camera, with their standard deviations; 0: exact. Fixes take the errors of
-/// different frames as independent.
+/// Height and yaw of the camera with their standard deviations; 0: exact. Errors of different
+/// frames are assumed to be independent.
 struct HeightAndYaw {
   double z_m;
   double yaw_rad;
@@ -23,7 +23,7 @@ struct HeightAndYaw {
   double yaw_sd_rad = 0;
 };
 
-/// A height known with a standard deviation.
+/// A height and its standard deviation.
 struct KnownHeight {
   double z_m;
   /// Positive.

@@ -14,19 +14,19 @@ namespace vlp {
 
 namespace {
 
-// The stated noise does not explain residuals beyond five of its standard deviations. A majority
-// of the lamps that it does explain, and a hundred times better, shows that the others are wrong;
-// a tilt or a map that is a little off for all lamps seldom looks so.
+// The reported noise does not explain residuals above five standard deviations. If it explains a
+// majority of the lamps a hundred times better, the others are wrong. A small error of the tilt or
+// of the map affects all lamps and rarely has this pattern.
 constexpr double kTooNoisySigmas = 5;
 constexpr double kTooNoisy = kTooNoisySigmas * kTooNoisySigmas;
 constexpr double kClearGain = 100;
 
-/// Squared residuals over what the stated noise lets expect.
+/// Returns chi-squared over its expectation for the reported noise.
 double excess_of(const LeastSquaresFix& fix, std::size_t lamps) {
   return fix.chi_squared / static_cast<double>(2 * lamps - 4);
 }
 
-/// The largest standard deviation of a z.
+/// Returns the largest standard deviation of z.
 double noise_of(std::span<const Sighting> sightings) {
   double noise = 0;
   for (const Sighting& sighting : sightings) {
@@ -36,7 +36,7 @@ double noise_of(std::span<const Sighting> sightings) {
   return noise;
 }
 
-/// As a camera under the mirrored map would see them.
+/// Mirrors the observations, as by a camera under the mirrored map.
 void mirror(SightedFrame& frame) {
   for (Sighting& sighting : std::span(frame.sightings.data(), frame.size)) {
     sighting.z.y() = -sighting.z.y();
@@ -44,8 +44,8 @@ void mirror(SightedFrame& frame) {
   }
 }
 
-/// How far in z a lamp may be from where the fix sees it. The spreads of the lamps in z and on the
-/// floor plan give the scale, since the fix may be wrong.
+/// Returns the residual limit in z. The RMS radii of the lamps in z and on the floor plan give the
+/// scale, since the fix may be wrong.
 double limit_of(const SightedFrame& frame, double max_residual_share) {
   constexpr double share_of_the_way = 0.15;
   const double n = static_cast<double>(frame.size);
@@ -61,7 +61,7 @@ double limit_of(const SightedFrame& frame, double max_residual_share) {
   return std::min(max_residual_share * spread, share_of_the_way * nearest_m * spread / spread_m);
 }
 
-/// The fix under the mirror image of the map.
+/// Computes the fix with the mirror image of the map.
 ConsistentFix fix_mirrored(SightedFrame& frame, double limit) {
   mirror(frame);
   const ConsistentFix solution = fix_consistent(frame.span(), limit);
@@ -69,7 +69,8 @@ ConsistentFix fix_mirrored(SightedFrame& frame, double limit) {
   return solution;
 }
 
-/// The fix of the majority if the stated noise explains it and not that of all, else that of all.
+/// Returns the fix of the majority if the reported noise explains only this one, else the fix of
+/// all lamps.
 ConsistentFix fix_doubtful(SightedFrame& frame, const ConsistentFix& all,
                            double max_residual_share) {
   const double excess = excess_of(all.fix, frame.size);

@@ -15,71 +15,75 @@
 
 namespace vlp {
 
-/// The most sightings that one frame may have.
+/// Maximum number of observations in a frame.
 inline constexpr std::size_t kMaxSightings = 256;
 
-/// Which sightings agree with a pose.
+/// Observations that agree with a pose.
 struct Consensus {
   Pose pose;
   std::bitset<kMaxSightings> agreeing;
   std::size_t count;
 };
 
-/// The largest set of sightings that one pose explains, each within `max_residual` of the
-/// sighting's z: every pair of lamps proposes its poses, the one with the most agreeing lamps wins,
-/// and of several the one with the least squared residuals. Nothing without a majority of three or
-/// more. Of more than 64 lamps the pairs are a fixed selection. Precondition: at most
-/// kMaxSightings.
+/// Finds the largest set of observations that one pose explains, each with a residual of z of at
+/// most `max_residual`. Every pair of lamps proposes its poses. The pose with the most agreeing
+/// lamps wins; among equals, the one with the smallest sum of squared residuals. With more than 64
+/// lamps the pairs are a fixed selection. Returns std::nullopt without a majority of at least
+/// three.
+/// @pre at most kMaxSightings observations
 std::optional<Consensus> find_consensus(std::span<const Sighting> sightings, double max_residual);
 
+/// A least-squares fix and its status.
 struct ConsistentFix {
-  /// `ok`, or why there is none.
+  /// `ok`, or the reason of failure.
   FixStatus status;
   LeastSquaresFix fix;
 };
 
-/// The least-squares fix of two or more lamps from initial_pose(), looked at critically:
+/// Computes the least-squares fix of two lamps or more from initial_pose() and checks it:
 ///   degenerate    the lamps do not determine it: the standard deviation of the height exceeds the
-///                 height;
-///   inconsistent  of three or more, one is farther in z than `max_residual` from where the fix
-///                 sees it.
+///                 height
+///   inconsistent  of three lamps or more, one has a residual of z above `max_residual`
 ConsistentFix fix_consistent(std::span<const Sighting> sightings, double max_residual);
 
-/// Root of the mean squared distance of the sightings from their mean, in z.
+/// Computes the RMS distance of the observations from their mean, in z.
 double spread_of(std::span<const Sighting> sightings);
 
-/// The lamps of one frame, in room of a fixed size so that nothing is allocated.
+/// Lamps observed in one frame. The arrays have a fixed size, so that no memory is allocated.
 struct SightedFrame {
   std::array<Sighting, kMaxSightings> sightings;
   std::array<int, kMaxSightings> ids;
-  /// Distance on the floor plan from each lamp to the nearest other lamp of the map.
+  /// Horizontal distance from each lamp to the nearest other lamp of the map.
   std::array<double, kMaxSightings> nearest_m;
   std::size_t size = 0;
-  /// Whether every sigma_px is one that a detector stated.
+  /// True if a detector reported every sigma_px.
   bool noise_is_stated = true;
-  /// False if sightings are weighed in the undistorted image, which has other noise.
+  /// False if observations are weighted in the undistorted image, where the noise differs.
   bool is_weighed_by_noise = true;
   int unknown_lamps = 0;
   int rejected_lamps = 0;
   std::array<int, kMaxSightings> rejected_ids;
 
   std::span<const Sighting> span() const { return {sightings.data(), size}; }
-  /// Leaves only the sightings that are `kept`; the others count as rejected.
+  /// Removes all observations except those in `kept`. The removed ones count as rejected.
   void keep(const std::bitset<kMaxSightings>& kept);
 };
 
-/// The fix of a frame of two lamps or more whose identities may be wrong. A lamp contradicts the
-/// fix when it is farther from where the fix sees it than `max_residual_share` of the spread of
-/// all lamps in the image, or than 0.15 of the way to the lamp nearest to one of them, which it
-/// might be. Then, of
+/// Computes the fix of a frame with two lamps or more whose identities may be wrong.
+///
+/// A lamp contradicts the fix if its residual exceeds one of two limits:
+///   `max_residual_share` times the RMS radius of all lamps in the image;
+///   0.15 times the smallest distance from a lamp of the frame to its nearest lamp of the map,
+///   which excludes confusion of neighbors.
+/// On a contradiction, with
 ///   three or more  that fit the mirror image of the map, the status is `mirrored_map`;
-///   four or more   the majority that agrees makes the fix (find_consensus), and the others are
-///                  taken out of the frame and counted as rejected;
+///   four or more   the agreeing majority makes the fix (find_consensus); the others are rejected;
 ///   others         the status is `inconsistent`.
-/// Lamps that do not contradict the fix by so much are looked at again when their noise does not
-/// explain their residuals: if the mirror image is a hundred times better, it is `mirrored_map`;
-/// where all noise is stated and it explains the residuals of a majority, and a hundred times
-/// better, the others are rejected.
+///
+/// Lamps below these limits are tested again if their residuals exceed five standard deviations. If
+/// the mirror image fits a hundred times better, the status is `mirrored_map`. If all noise is
+/// reported, and explains the residuals of a majority a hundred times better, the other lamps are
+/// rejected.
 ConsistentFix fix_robustly(SightedFrame& frame, double max_residual_share);
 
 }  // namespace vlp

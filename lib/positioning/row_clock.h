@@ -9,7 +9,7 @@
 
 namespace vlp {
 
-/// When a pixel is read, from the middle row (or column) of the image.
+/// Readout time of a pixel relative to the middle row (or column) of the image.
 struct RowClock {
   double row_time_s, middle_row;
   Readout readout;
@@ -19,7 +19,7 @@ struct RowClock {
   }
 };
 
-/// Nothing when the camera's row time or read-out is not known.
+/// Returns the row clock of a camera; std::nullopt if its row time or readout direction is unknown.
 inline std::optional<RowClock> row_clock_of(const Camera& camera) {
   if (!camera.row_time_s || !camera.readout) return std::nullopt;
   const int rows = camera.imager_px[*camera.readout == Readout::rows ? 1 : 0];

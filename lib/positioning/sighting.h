@@ -8,25 +8,25 @@
 #include "../geometry/plane.h"
 #include "../geometry/types.h"
 
-/// The positioning equation (Chen and Guan, eq. 1, 3, 6, 7). A level camera at S = (X, Y, Zs)
-/// with yaw g sees a lamp at P = (p, Z) at the normalized point z = (x/z, y/z) of its level
-/// frame. With points of the floor plane as complex numbers, s = X + jY and H = Z - Zs:
+/// The positioning equation (Chen and Guan, eq. 1, 3, 6, 7). A level camera at S = (X, Y, Zs) with
+/// yaw g observes a lamp at P = (p, Z) at the normalized point z = (x/z, y/z) of its level frame.
+/// With points of the floor plane as complex numbers, s = X + jY and H = Z - Zs:
 ///   p = s + H e^{jg} z      so      z = e^{-jg} (p - s) / H.
 namespace vlp {
 
-/// A lamp of the map as the level camera sees it.
+/// Observation of a lamp of the map by a level camera.
 struct Sighting {
   /// P, in the world.
   Eigen::Vector3d lamp_m;
   /// z, measured.
   Eigen::Vector2d z;
-  /// How the pixel moves with z: it turns residuals of z into pixels, which is where noise lives.
+  /// Derivative of the pixel by z. Converts residuals of z to pixels, in which the noise is given.
   Matrix2 d_pixel_d_z;
-  /// Standard deviation of that pixel per axis.
+  /// Standard deviation of the pixel per axis.
   double sigma_px;
 };
 
-/// A pose with e^{jg} in place of g, so that predictions need no trigonometry.
+/// A pose with e^{jg} in place of g, so that predictions need no trigonometric functions.
 struct LevelPose {
   Eigen::Vector3d position_m;
   Eigen::Vector2d heading;
@@ -38,22 +38,27 @@ struct LevelPose {
   Pose pose() const { return {position_m, std::atan2(heading.y(), heading.x())}; }
 };
 
-/// z of a lamp from a pose, and its derivatives. Precondition: the lamp is above the camera.
+/// z of a lamp predicted from a pose, and its derivatives.
 struct Prediction {
   Eigen::Vector2d z;
-  /// By (X, Y, Zs, g).
+  /// Derivative by (X, Y, Zs, g).
   Eigen::Matrix<double, 2, 4> d_z_d_state;
 };
 
+/// Returns the height of a lamp above the camera, in m.
 inline double height_above(const LevelPose& camera, const Eigen::Vector3d& lamp_m) {
   return lamp_m.z() - camera.position_m.z();
 }
 
+/// Computes z of a lamp from a pose.
+/// @pre the lamp is above the camera
 inline Eigen::Vector2d predicted_z(const LevelPose& camera, const Eigen::Vector3d& lamp_m) {
   const Eigen::Vector2d offset = (lamp_m - camera.position_m).head<2>();
   return conj_product(camera.heading, offset) / height_above(camera, lamp_m);
 }
 
+/// Computes z of a lamp from a pose, and its derivatives.
+/// @pre the lamp is above the camera
 inline Prediction predict(const LevelPose& camera, const Eigen::Vector3d& lamp_m) {
   const double inverse_height = 1 / height_above(camera, lamp_m);
   const double c = camera.heading.x() * inverse_height, s = camera.heading.y() * inverse_height;
@@ -64,7 +69,7 @@ inline Prediction predict(const LevelPose& camera, const Eigen::Vector3d& lamp_m
   return prediction;
 }
 
-/// Derivative of z by a small rotation of the level frame about its x and y axes.
+/// Returns the derivative of z by a small rotation of the level frame about its x and y axes.
 inline Eigen::Matrix2d tilt_jacobian(const Eigen::Vector2d& z) {
   Eigen::Matrix2d jacobian;
   jacobian << -z.x() * z.y(), 1 + z.x() * z.x(), -(1 + z.y() * z.y()), z.x() * z.y();

@@ -12,18 +12,18 @@
 namespace vlp {
 namespace {
 
-/// A real root of x^3 + b x^2 + c x + d: of three the one that is farthest from the others, or
-/// nearly so, where the cubic is steep.
+/// Returns a real root of x^3 + b x^2 + c x + d. Of three roots, approximately the one farthest
+/// from the others, where the cubic is steep.
 double steep_root(double b, double c, double d) {
   const double inflection = -b / 3;
-  const double slope = c - b * b / 3;  // there
+  const double slope = c - b * b / 3;  // at the inflection
   const double value = d + inflection * (c + inflection * (b + inflection));
   double x = inflection;
   if (slope < 0) {
-    // Beyond the two turning points, on the side that the root is: the cubic is monotone there.
+    // Outside the two extrema, on the side of the root, the cubic is monotone.
     x += (value > 0 ? -1 : 1) * 2 * std::sqrt(-slope / 3);
   } else if (value != 0) {
-    // Between 0 and both of these is the root of t^3 + slope t + value.
+    // The root of t^3 + slope t + value is between 0 and both of these.
     const double by_cube = std::cbrt(std::abs(value));
     x += (value > 0 ? -1 : 1) * (slope > 0 ? std::min(by_cube, std::abs(value) / slope) : by_cube);
   }
@@ -38,20 +38,21 @@ double steep_root(double b, double c, double d) {
   return x;
 }
 
-/// v^T A w for symmetric A.
+/// Returns v^T A w for symmetric A.
 double form(const Eigen::Matrix3d& a, const Eigen::Vector3d& v, const Eigen::Vector3d& w) {
   return v.dot(a * w);
 }
 
 Eigen::Matrix3d adjugate(const Eigen::Matrix3d& a) {
-  Eigen::Matrix3d adj;  // a is symmetric, so that its cofactors are
+  Eigen::Matrix3d adj;  // a is symmetric, and so are its cofactors
   adj.col(0) = a.col(1).cross(a.col(2));
   adj.col(1) = a.col(2).cross(a.col(0));
   adj.col(2) = a.col(0).cross(a.col(1));
   return adj;
 }
 
-/// The two lines whose product the conic of rank two is; none when they are not real.
+/// Returns the two lines whose product is the conic of rank two; std::nullopt if they are not
+/// real.
 int lines_of(const Eigen::Matrix3d& conic, std::array<Eigen::Vector3d, 2>& lines) {
   const Eigen::Matrix3d adj = adjugate(conic);
   Eigen::Index i = 0;
@@ -86,7 +87,7 @@ Cones cones_of(const std::array<Eigen::Vector3d, 3>& points_m,
   return cones;
 }
 
-/// Newton's steps on the three equations.
+/// Refines the distances by Newton steps on the three equations.
 void polish(const Cones& cones, Eigen::Vector3d& distances) {
   for (int i = 0; i < 3; ++i) {
     Eigen::Matrix3d jacobian;
@@ -98,11 +99,12 @@ void polish(const Cones& cones, Eigen::Vector3d& distances) {
     const Eigen::Vector3d step = 0.5 * (jacobian.inverse() * residual);
     if (!step.allFinite()) return;
     distances -= step;
-    if (step.norm() <= 1e-9 * distances.norm()) return;  // the error is its square
+    if (step.norm() <= 1e-9 * distances.norm()) return;  // the error is the square of the step
   }
 }
 
-/// The frame of three points: columns along the first side, across it, and up.
+/// Returns the frame of three points: columns along the first side, perpendicular to it in the
+/// plane, and normal to the plane.
 Eigen::Matrix3d frame_of(const Eigen::Vector3d& p0, const Eigen::Vector3d& p1,
                          const Eigen::Vector3d& p2) {
   Eigen::Matrix3d frame;
@@ -120,7 +122,7 @@ ThreeLampPoses three_lamp_poses(const std::array<Eigen::Vector3d, 3>& points_m,
   const Cones cones = cones_of(points_m, rays);
   Eigen::Matrix3d first = cones.a12 * cones.m01 - cones.a01 * cones.m12;
   Eigen::Matrix3d second = cones.a12 * cones.m02 - cones.a02 * cones.m12;
-  // Where a lamp is as far from both others and seen so, one of them is a pair of lines itself.
+  // One conic is already a pair of lines if a lamp has equal distances and angles to both others.
   if (std::abs(first.determinant()) > std::abs(second.determinant())) std::swap(first, second);
   // det(first + x second) = 0.
   const Eigen::Matrix3d adj1 = adjugate(first), adj2 = adjugate(second);
@@ -140,7 +142,7 @@ ThreeLampPoses three_lamp_poses(const std::array<Eigen::Vector3d, 3>& points_m,
     const Eigen::Vector3d a = line.unitOrthogonal(), b = line.cross(a);
     const double faa = form(second, a, a), fab = form(second, a, b), fbb = form(second, b, b);
     const double discriminant = fab * fab - faa * fbb;
-    // Where two solutions meet, noise may have taken both away: the middle is near.
+    // Noise may remove two nearly equal solutions; the point between them is close to both.
     constexpr double near = 1e-2;
     if (!(discriminant >= -near * fab * fab)) continue;
     const double root = std::sqrt(std::max(0.0, discriminant));

@@ -7,26 +7,29 @@
 
 namespace vlp {
 
-/// A camera that leans by any angle: x_in_camera = camera_from_world (x_in_world - position_m).
+/// Pose of a camera with any rotation: x_in_camera = camera_from_world (x_in_world - position_m).
 struct FreePose {
   Eigen::Matrix3d camera_from_world;
   Eigen::Vector3d position_m;
 };
 
+/// Up to four poses from three lamps.
 struct ThreeLampPoses {
   int count = 0;
   std::array<FreePose, 4> poses;
 };
 
-/// The poses that see three points along three rays (unit length): up to four. With the distances
-/// d_i and the cosines c_ik between the rays,
+/// Computes the poses, up to four, that project three points along three rays of unit length (P3P).
+/// With the distances d_i and the cosines c_ik between the rays, three cones in d are intersected:
 ///   d_i^2 + d_k^2 - 2 c_ik d_i d_k = |P_i - P_k|^2
-/// is three cones in d. Two of their combinations are conics through the same four points of the
-/// plane of ratios d_1 : d_2 : d_3; one root of a cubic makes a pair of lines of them, on which the
-/// points are the roots of quadratics (Haralick et al., "Review and Analysis of Solutions of the
-/// Three Point Perspective Pose Estimation Problem", 1994, tells of this way and others).
-/// Exact to rounding where the solutions are apart. Where two have just vanished, the one between
-/// them is given, which sees the points only nearly along the rays. None for points on one line.
+/// Two linear combinations of them are conics through the same four points of the plane of ratios
+/// d_1 : d_2 : d_3. One root of a cubic gives a degenerate conic, a pair of lines. On these lines
+/// the points are the roots of quadratics.
+///
+/// Exact to rounding if the solutions are separate. If two solutions have just vanished, returns
+/// the point between them, which fits the rays only approximately. Returns none for collinear
+/// points. Source: Haralick et al., "Review and Analysis of Solutions of the Three Point
+/// Perspective Pose Estimation Problem", 1994, compares this and other methods.
 ThreeLampPoses three_lamp_poses(const std::array<Eigen::Vector3d, 3>& points_m,
                                 const std::array<Eigen::Vector3d, 3>& rays);
 

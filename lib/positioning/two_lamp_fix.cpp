@@ -9,7 +9,7 @@
 namespace vlp {
 namespace {
 
-/// The real roots of a x^2 + 2 b x + c, a > 0, without cancellation.
+/// Computes the real roots of a x^2 + 2 b x + c, a > 0, without cancellation.
 struct Roots {
   int count = 0;
   std::array<double, 2> values{};

@@ -19,40 +19,42 @@
 
 namespace vlp {
 
-/// Covariances of (X, Y, Z, yaw) in metres and radians: what of a fix's error is of each image
-/// alone, and each part of what all fixes of the unit have in common (CommonErrors::only).
+/// Covariances of (X, Y, Z, yaw) in meters and radians. `noise` is independent between images. The
+/// others are the parts of the errors common to all fixes of a camera (CommonErrors::only).
 struct UnitBudget {
   Matrix4 noise, lens, zenith, offset, lamp_map;
-  /// Of each image, too: what comes on top of `noise` because the camera may move, and then because
-  /// it may lean (BodyLimit).
+  /// Increase of `noise` due to unknown motion, and the further increase due to unknown roll and
+  /// pitch (BodyLimit). Independent between images, too.
   Matrix4 motion = Matrix4::Zero(), lean = Matrix4::Zero();
 
   Matrix4 common() const { return lens + zenith + offset + lamp_map; }
   Matrix4 total() const { return noise + motion + lean + common(); }
 };
 
-/// What a calibrated camera's fixes are worth before it takes one: the pixels' noise, and what
-/// calibration and lamp map state of their own errors. What is not stated counts as exact.
+/// Predicts the covariance of a calibrated camera's fixes from pixel noise and from the reported
+/// uncertainties of calibration and lamp map. Uncertainties that are not reported count as zero.
 class UnitErrors {
  public:
-  /// With every correction that the calibration has. Throws std::invalid_argument when the
-  /// intrinsics are not the lens model's.
+  /// Applies every correction of the calibration.
+  /// @throws std::invalid_argument if the intrinsics do not match the lens model
   UnitErrors(const LampMap& map, const Calibration& calibration);
 
   const CommonErrors& common() const { return whole_; }
   bool has_offset() const { return has_offset_; }
 
-  /// Indices in the map of the lamps that the camera, which leans as it does, sees whole from
-  /// `level`, the pose of its level frame: centre, and rim where the diameter is known.
+  /// Returns the indices in the map of the lamps that are fully visible to the camera with its
+  /// calibrated tilt. `level` is the pose of its level frame. Such a lamp has its center, and its
+  /// rim if the diameter is known, in the image.
   std::vector<std::size_t> lamps_seen_from(const Pose& level) const;
 
-  /// Of a fix from these lamps, each with this noise per axis: what Positioner::locate() states
-  /// there. Nothing for fewer than two lamps or more than kMaxSightings, lamps that the lens does
-  /// not see, or lamps that do not determine a fix.
+  /// Computes the budget of a fix from these lamps, with noise `noise_px` per axis. Agrees with the
+  /// covariance of Positioner::locate(). Returns std::nullopt for fewer than two lamps or more than
+  /// kMaxSightings, for lamps that the lens does not image, or for lamps that do not determine a
+  /// fix.
   std::optional<UnitBudget> budget(const Pose& level, std::span<const std::size_t> lamps,
                                    double noise_px) const;
-  /// The same of a camera that may move and lean, as error_budget() has it. Precondition: the
-  /// calibration knows its row clock, where the prior lets it move.
+  /// Computes the budget of a camera that may move and be tilted, as error_budget().
+  /// @pre the calibration has row time and readout direction if the prior leaves the motion free
   std::optional<UnitBudget> budget(const Pose& level, std::span<const std::size_t> lamps,
                                    double noise_px, const BodyPrior& prior) const;
 

@@ -46,7 +46,7 @@ static_assert(VLP_MIRRORED_MAP == static_cast<int>(FixStatus::mirrored_map));
 static_assert(VLP_UNDETERMINED == static_cast<int>(FixStatus::undetermined));
 static_assert(VLP_ROW_TIME_UNKNOWN == static_cast<int>(FixStatus::row_time_unknown));
 
-/// An array without a destructor: a thread may still ask while it ends.
+/// An array without a destructor, since a thread may read it while it ends.
 thread_local std::array<char, 1024> last_error;
 
 std::int32_t failed(std::int32_t code, std::string_view message) {
@@ -87,7 +87,7 @@ Sensors sensors_of(const vlp_sensors& sensors) {
 
 using Covariance6 = Eigen::Map<Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>;
 
-/// (X, Y, Z, yaw) of the pose's covariance, and roll and pitch with all of them of the body's.
+/// Combines (X, Y, Z, yaw) of the pose's covariance with roll and pitch of the body's covariance.
 void fill_covariance(const Matrix4& of_pose, const BodyCovariance& of_body, double* rows) {
   constexpr std::array<int, 6> body = {0, 1, 2, kBodyRoll, kBodyPitch, kBodyYaw};
   Covariance6 covariance(rows);
@@ -101,7 +101,7 @@ void fill_covariance(const Matrix4& of_pose, const BodyCovariance& of_body, doub
   }
 }
 
-/// A body that has not been estimated moves and leans as it was told.
+/// Returns the given motion, roll and pitch of a body that was not estimated.
 BodyEstimate told_body(const Sensors& sensors, double yaw_rad) {
   BodyEstimate body;
   if (sensors.inclination) body.inclination = *sensors.inclination;
@@ -190,7 +190,7 @@ class DetectionBuffer {
   }
 
  private:
-  /// Not constructed before it is filled.
+  /// Elements are constructed when they are filled.
   union {
     std::array<Detection, Positioner::max_lamps> detections_;
   };

@@ -28,7 +28,7 @@
 namespace vlp {
 namespace {
 
-/// The message, without what a name of a file could do to the terminal.
+/// Formatter of messages that escapes control characters, which file names may contain.
 class PrintableMessage : public spdlog::custom_flag_formatter {
  public:
   void format(const spdlog::details::log_msg& message, const std::tm&,
@@ -64,7 +64,7 @@ CLI::Validator number_check(const std::string& name, bool (*accepts)(double)) {
       "");
 }
 
-/// Of what was typed, separated by commas.
+/// Returns the unknown options on the command line, separated by commas.
 std::string unknown_options(const CLI::App& app) {
   std::string names;
   for (const std::string& word : app.remaining()) {
@@ -74,7 +74,8 @@ std::string unknown_options(const CLI::App& app) {
   return names;
 }
 
-/// Returns an unknown command with those that exist, or asks for one; empty if a command was given.
+/// Returns an error about an unknown or missing command, with the list of commands; empty if a
+/// command was given.
 std::string command_problem(const CLI::App& app) {
   const auto commands = app.get_subcommands([](const CLI::App*) { return true; });
   if (commands.empty() || !app.get_subcommands().empty()) return "";
@@ -88,7 +89,7 @@ std::string command_problem(const CLI::App& app) {
   return "there is no command '" + words.front() + "'; the commands are: " + names;
 }
 
-/// Sends all that is printed to nowhere. The descriptor stays open for `--output /dev/stdout`.
+/// Discards everything printed to stdout. The descriptor stays open for `--output /dev/stdout`.
 bool silence_stdout() {
   std::FILE* nowhere = std::fopen("/dev/null", "w");
   if (nowhere == nullptr) return false;
@@ -96,14 +97,14 @@ bool silence_stdout() {
   return true;
 }
 
-/// Reports it if what was printed could not be written, and returns the exit code of the program.
+/// Returns `exit_code`; reports an error and returns kBadInput if stdout could not be written.
 int check_stdout(int exit_code) {
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return exit_code;
   spdlog::error("stdout cannot be written");
   return kBadInput;
 }
 
-/// Whether two outputs, which need not exist, are one file; an empty name is none.
+/// Returns true if two outputs, which need not exist, are the same file; false for an empty name.
 bool same_file(const std::string& one, const std::string& other) {
   const auto of = [](const std::string& file) {
     return std::filesystem::weakly_canonical(std::filesystem::absolute(file));
@@ -177,10 +178,11 @@ int run_app(CLI::App& app, int argc, char** argv, const std::function<void()>& r
   app.add_flag("-v,--verbose", verbose, "Details on stderr")->excludes(quiet_flag);
   app.set_version_flag("--version", app.get_name() + " " + VLP_VERSION);
   log_to_stderr(app.get_name(), false, false);
-  std::signal(SIGXFSZ, SIG_IGN);  // writing beyond a limit fails, and what is temporary is removed
+  std::signal(SIGXFSZ,
+              SIG_IGN);  // a write beyond the size limit fails; temporary files are removed
   if (argc == 3 && std::string_view(argv[1]) == "--reference") {
     const std::string text = reference_of(app, argv[2]);
-    if (!text.empty()) {  // of another name the parser complains
+    if (!text.empty()) {  // the parser reports other names
       std::fputs(text.c_str(), stdout);
       return check_stdout(kDone);
     }
@@ -194,7 +196,8 @@ int run_app(CLI::App& app, int argc, char** argv, const std::function<void()>& r
   } catch (const CLI::Success& success) {  // --help, --version
     return check_stdout(app.exit(success));
   } catch (const CLI::ParseError& error) {
-    const auto unknown = unknown_options(app);  // a misspelt option says more than what it lacks
+    const auto unknown =
+        unknown_options(app);  // a misspelled option is more informative than a missing one
     if (const auto problem = command_problem(app); !problem.empty()) {
       spdlog::error("{}; see {} --help", problem, app.get_name());
     } else if (!unknown.empty()) {
@@ -209,7 +212,7 @@ int run_app(CLI::App& app, int argc, char** argv, const std::function<void()>& r
   } catch (const Undetermined& error) {
     spdlog::error("{}", error.what());
     return check_stdout(kUndetermined);
-  } catch (const std::exception& error) {  // vlp::InputError and std::invalid_argument among them
+  } catch (const std::exception& error) {  // includes InputError and std::invalid_argument
     spdlog::error("{}", error.what());
     return kBadInput;
   }

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-// Its header costs a file that includes it ten seconds of compilation.
+// Forward declarations: including CLI11 costs ten seconds of compilation per file.
 namespace CLI {
 class App;
 class Validator;
@@ -19,43 +19,47 @@ namespace vlp {
 /// Exit codes of every program.
 enum ExitCode : int { kDone = 0, kGateNotMet = 1, kBadInput = 2, kUndetermined = 3 };
 
-/// The data cannot determine the answer; what() says what to add. Exit code 3.
+/// Exception for data that cannot determine the answer; what() names the remedy. Exit code 3.
 class Undetermined : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// All is done and written, but a gate is not met; what() says which. Exit code 1.
+/// Exception for a failed gate after all results are written; what() names the gate. Exit code 1.
 class GateNotMet : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// How many threads there are when nobody says so.
+/// Returns the default number of threads: the number of cores, at least 1.
 int all_cores();
 
-/// Checks for options: a number that is finite, and positive, or not negative.
+/// Return validators of options that accept finite numbers: any, positive, or not negative.
 CLI::Validator finite();
 CLI::Validator finite_positive();
 CLI::Validator finite_not_negative();
 
-/// A file's name that ends so; the name of a picture, .png or .svg.
+/// Returns a validator that accepts file names with this ending.
 CLI::Validator ends_in(const std::string& ending);
+/// Returns a validator that accepts file names of plots: .png or .svg.
 CLI::Validator is_picture();
 
-/// Adds --threads: `what` are done so many at a time.
+/// Adds --threads. `what` describes the parallel items in --help.
 void add_threads_option(CLI::App& app, int& threads, const std::string& what = "Images at a time");
 
-/// Throws std::invalid_argument when `output` is one of the files that are read.
+/// Throws std::invalid_argument if `output` is one of the input files.
 void check_output(const std::string& output, const std::vector<std::string>& inputs);
 
-/// check_output() of all outputs, each with the option that names it, and that no two are one file;
-/// an empty name is none.
+/// Applies check_output() to all outputs and throws std::invalid_argument if two of them are the
+/// same file.
+///
+/// @param outputs  option and file name of each output; an empty name is ignored
 void check_outputs(const std::vector<std::pair<std::string, std::string>>& outputs,
                    const std::vector<std::string>& inputs);
 
-/// The common shell of a program: adds --quiet, --verbose and --version to `app`, makes its --help
-/// fit 80 columns, parses, and calls `run`. Messages go through spdlog to stderr. Bad usage and bad
-/// input end with one line and exit code 2, Undetermined with 3, GateNotMet with 1. `--reference`
-/// prints what is installed beside it (reference.h).
+/// Runs a program: adds --quiet, --verbose and --version to `app`, formats its --help in 80
+/// columns, parses the arguments and calls `run`. Messages go through spdlog to stderr.
+///
+/// Returns the exit code. Errors print one line: bad usage and bad input return 2, Undetermined 3,
+/// GateNotMet 1. `--reference` prints the manual page or a shell completion (reference.h).
 int run_app(CLI::App& app, int argc, char** argv, const std::function<void()>& run);
 
 }  // namespace vlp

@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::size_t kHelpWidth = 80;
 
-/// Where a line can end: the words, those that are wider than `room` in parts, after commas.
+/// Splits a word wider than `room` columns after its commas; returns other words unchanged.
 std::vector<std::string> parts_of(const std::string& word, std::size_t room) {
   std::vector<std::string> parts(1);
   for (const char letter : word) {
@@ -21,8 +21,8 @@ std::vector<std::string> parts_of(const std::string& word, std::size_t room) {
   return parts;
 }
 
-/// Words of `text` in lines of at most kHelpWidth columns; the first line goes on at column `at`,
-/// the others begin at column `indent`.
+/// Wraps `text` to lines of at most kHelpWidth columns. The first line continues at column `at`,
+/// later lines begin at column `indent`.
 std::string filled(const std::string& text, std::size_t at, std::size_t indent) {
   std::istringstream words(text);
   std::string lines;
@@ -42,8 +42,8 @@ std::string filled(const std::string& text, std::size_t at, std::size_t indent) 
   return lines;
 }
 
-/// A name on the left and what it means on the right, from column `column` on; on a line of its own
-/// where the name leaves no room.
+/// Formats a name on the left and its meaning on the right, from column `column` on; on the next
+/// line if the name is too long.
 std::string two_columns(const std::string& name, const std::string& meaning, std::size_t column) {
   constexpr std::size_t kIndent = 2;
   std::string lines = std::string(kIndent, ' ') + filled(name, kIndent, 3 * kIndent);

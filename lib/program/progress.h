@@ -8,18 +8,19 @@
 
 namespace vlp {
 
-/// Shows on stderr how far long work is: one line that is redrawn on a terminal; elsewhere a plain
-/// line now and then. Says nothing under --quiet.
+/// Progress display of long work on stderr: one line that is redrawn on a terminal, otherwise an
+/// occasional plain line. Silent under --quiet.
 class Progress {
  public:
-  /// `things` is what is counted: "captures".
+  /// `things` names the counted items, for example "captures".
   explicit Progress(std::string things);
   /// Ends the line.
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  /// `skipped` things needed no work; they count as done, but not for the speed.
+  /// Updates the display. `skipped` items needed no work: they are included in `done`, but do not
+  /// enter the speed.
   void update(std::size_t done, std::size_t total, std::size_t skipped = 0);
 
  private:

@@ -18,7 +18,7 @@ namespace {
 
 using Options = std::vector<const CLI::Option*>;
 
-/// Those of --help, in its order.
+/// Returns the options in --help, in its order.
 Options options_in(const CLI::App& app) {
   return app.get_options([](const CLI::Option* option) {
     return option->nonpositional() && !option->get_group().empty();
@@ -32,7 +32,7 @@ std::vector<const CLI::App*> commands_in(const CLI::App& app) {
       [](const CLI::App* command) { return !command->get_name().empty(); }));
 }
 
-/// "-o", "--output"; of a flag that has it "--no-report", too.
+/// Returns the names of an option: "-o", "--output", and "--no-report" of a flag that has it.
 std::vector<std::string> names_of(const CLI::Option& option) {
   std::vector<std::string> names;
   for (const std::string& name : option.get_snames()) names.push_back("-" + name);
@@ -40,7 +40,7 @@ std::vector<std::string> names_of(const CLI::Option& option) {
   return names;
 }
 
-/// "a|b" or "TEXT:{a,b}"; empty for others.
+/// Returns the choices of an option of type "a|b" or "TEXT:{a,b}"; empty for other types.
 std::vector<std::string> choices_of(const CLI::Option& option) {
   std::string list = option.get_type_name();
   char separator = '|';
@@ -67,7 +67,7 @@ Value value_of(const CLI::Option& option) {
   return file ? Value::file : Value::other;
 }
 
-/// `text` with each of `letters` after a backslash.
+/// Returns `text` with a backslash before each of `letters`.
 std::string escaped(const std::string& text, std::string_view letters) {
   std::string result;
   for (const char letter : text) {
@@ -83,7 +83,7 @@ std::string in_words(const std::vector<std::string>& words) {
   return line;
 }
 
-/// A line of roff that shows `text`.
+/// Returns a line of roff that prints `text`.
 std::string roff(const std::string& text) {
   std::string line;
   for (const char letter : text) {
@@ -97,7 +97,8 @@ std::string roff(const std::string& text) {
   return line;
 }
 
-/// Lines that begin with a blank, and those that are `verbatim`, as they are; others as paragraphs.
+/// Formats text in roff: lines that begin with a blank, or all if `verbatim`, unchanged; other
+/// lines as paragraphs.
 std::string roff_paragraphs(const std::string& text, bool verbatim) {
   std::istringstream lines(text);
   std::string page;
@@ -106,7 +107,7 @@ std::string roff_paragraphs(const std::string& text, bool verbatim) {
     const bool now = verbatim || line.starts_with(' ');
     if (now != as_is) page.append(now ? ".PP\n.nf\n" : ".fi\n");
     as_is = now;
-    // The examples are of a tree that is built; installed programs are in the path.
+    // Examples are written for the build tree; installed programs are in the path.
     for (auto at = line.find("build/bin/"); at != std::string::npos; at = line.find("build/bin/")) {
       line.erase(at, 10);
     }
@@ -115,7 +116,7 @@ std::string roff_paragraphs(const std::string& text, bool verbatim) {
   return page.append(as_is ? ".fi\n" : "");
 }
 
-/// "vlp-locate - positions from ...": the description up to its first stop.
+/// Returns the line "vlp-locate - positions from ...": the description up to its first stop.
 std::string name_line(const CLI::App& app) {
   std::string summary = app.get_description();
   std::replace(summary.begin(), summary.end(), '\n', ' ');
@@ -144,7 +145,7 @@ std::string roff_options(const Options& options, bool positional) {
   return page;
 }
 
-/// A shell function's name.
+/// Returns the name of the shell function for a program.
 std::string function_of(const std::string& program) {
   std::string name = "_" + program;
   std::replace(name.begin(), name.end(), '-', '_');
@@ -171,7 +172,7 @@ std::string bash_options(const CLI::App& app, const std::string& indent) {
          indent + "esac\n";
 }
 
-/// One of zsh's _arguments: '(-o --output)'{-o,--output}'[text]:TEXT:_files'.
+/// Returns an argument for _arguments of zsh: '(-o --output)'{-o,--output}'[text]:value:_files'.
 std::string zsh_option(const CLI::Option& option) {
   const auto names = names_of(option);
   const bool again = option.get_expected_max() > 1;

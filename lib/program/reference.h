@@ -9,19 +9,20 @@ namespace CLI {
 class App;
 }  // namespace CLI
 
-/// What is installed beside a program, from the same source as its --help: its own options.
-/// `PROGRAM --reference man|bash|zsh` prints it; the build does, and nobody else has to.
+/// Manual page and shell completions of a program, generated from its options as --help is. The
+/// build prints them with `PROGRAM --reference man|bash|zsh` and installs them.
 namespace vlp {
 
-/// The manual page, in section 1, in roff.
+/// Returns the manual page for section 1, in roff.
 std::string manual_page(const CLI::App& app);
 
-/// What the shell completes: options, subcommands, the choices of an option, files where an option
-/// does not want a number.
+/// Return the completion scripts: options, subcommands, the choices of an option, and files for
+/// options that take a text.
 std::string bash_completion(const CLI::App& app);
 std::string zsh_completion(const CLI::App& app);
 
-/// The one of the three that is asked for; nothing of another name.
+/// Returns manual_page() for "man", bash_completion() for "bash", zsh_completion() for "zsh", and
+/// an empty string for other names.
 std::string reference_of(const CLI::App& app, std::string_view which);
 
 }  // namespace vlp

@@ -42,19 +42,19 @@ Request request_in(const std::string& line) {
     if (limit_s.is_number_unsigned() && limit_s >= 1U && limit_s <= kLongest_s) {
       return {json.at("arguments").get<std::vector<std::string>>(), limit_s.get<unsigned>()};
     }
-  } catch (const nlohmann::json::exception&) {  // said below
+  } catch (const nlohmann::json::exception&) {  // reported below
   }
   throw std::invalid_argument(
       "stdin: a line is not {\"arguments\": [\"...\"], \"limit_s\": 1 to 86400}: " + line);
 }
 
-/// What the process does that was split off. It says all to `said`.
+/// Runs the program in the forked process, with stdout and stderr redirected to `said`.
 [[noreturn]] void become(const char* name, Request request, std::FILE* said, pid_t parent,
                          const std::function<int(int, char**)>& program) {
-  // A process that nobody waits for any more would write where another begins.
+  // The process ends with its parent: an orphan could write to the files of its successor.
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (::getppid() != parent) std::_Exit(kBadInput);
-  // Not by freopen(), which would set back for us, too, how far the lines are read.
+  // freopen() would also reset the read position of stdin of the parent.
   const int nothing = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
   const bool ready = ::dup2(nothing, STDIN_FILENO) >= 0 &&
                      ::dup2(::fileno(said), STDOUT_FILENO) >= 0 &&
@@ -110,7 +110,7 @@ void run_each(const char* name, const std::function<int(int argc, char** argv)>&
   std::string line;
   while (std::getline(std::cin, line)) {
     fmt::print("{}\n", answer_to(name, request_in(line), program));
-    if (std::fflush(stdout) != 0) break;  // which run_app() tells
+    if (std::fflush(stdout) != 0) break;  // which run_app() reports
   }
 }
 

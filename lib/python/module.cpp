@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// The Python module vlp: what a notebook wants of the toolbox, in and out as arrays of numpy.
+/// The Python module vlp: functions of the toolbox for notebooks, with numpy arrays.
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
@@ -47,7 +47,7 @@ constexpr int kStatuses = static_cast<int>(FixStatus::row_time_unknown) + 1;
 
 Doubles doubles(std::vector<py::ssize_t> shape) { return Doubles(std::move(shape)); }
 
-/// Of an array of so many columns.
+/// Returns the number of rows of an array with `columns` columns.
 std::size_t rows_of(const Doubles& array, py::ssize_t columns, const char* name) {
   if (array.ndim() != 2 || array.shape(1) != columns) {
     throw std::invalid_argument(std::string(name) + " should have the shape (n, " +
@@ -63,11 +63,11 @@ bool all_fit(const py::array& array) {
                              [](Wide value) { return std::in_range<int>(value); });
 }
 
-/// numpy would cut 1.7 to 1 and wrap what an int does not hold.
+/// Converts to integers with checks: numpy would truncate 1.7 to 1 and wrap larger numbers.
 Integers integers_of(const py::object& given, const char* name) {
   const auto array = py::array::ensure(given);
   const char kind = array ? array.dtype().kind() : '?';
-  // Of an empty list numpy makes an array of floats.
+  // numpy converts an empty list to an array of floats.
   const bool whole = (kind == 'i' && all_fit<std::int64_t>(array)) ||
                      (kind == 'u' && all_fit<std::uint64_t>(array)) ||
                      (kind == 'f' && array.size() == 0);
@@ -93,7 +93,7 @@ Doubles array_of(const Matrix4& matrix) {
   return array;
 }
 
-/// Of a frame without a fix the library says nothing more than why.
+/// Position and covariance of a frame without a fix.
 const Eigen::Vector3d kNowhere(kNone, kNone, kNone);
 const Matrix4 kUnknown = Matrix4::Constant(kNone);
 
@@ -205,7 +205,7 @@ std::vector<Detection> detections_of(const Integers& lamps, const Doubles& pixel
   std::vector<Detection> detections(n);
   for (std::size_t i = 0; i < n; ++i) {
     detections[i] = {lamps.data()[i], Eigen::Vector2d(pixels.data() + 2 * i), {}};
-    // Not stated is NaN in tables.
+    // Tables have NaN for an unknown sigma.
     if (sigma_px && !std::isnan(sigma_px->data()[i])) detections[i].sigma_px = sigma_px->data()[i];
   }
   return detections;
@@ -223,12 +223,12 @@ Fix locate(const Positioner& positioner, const py::object& lamps, const Doubles&
   std::vector<EarlierFrame> frames;
   for (const auto& [ids, at, sigma, before_s] : earlier) {
     before.push_back(detections_of(integers_of(ids, "lamps"), at, sigma));
-    frames.push_back({before.back(), before_s});  // the detections of a frame stay where they are
+    frames.push_back({before.back(), before_s});  // a frame's detections keep their address
   }
   return positioner.locate(detections, sensors, frames);
 }
 
-/// Where each run of equal numbers begins, and the end.
+/// Returns the index at which each run of equal numbers begins, and the number of elements.
 std::vector<std::size_t> frames_in(const Integers& frames) {
   const auto n = static_cast<std::size_t>(frames.shape(0));
   std::vector<std::size_t> begins;
@@ -315,7 +315,7 @@ std::string shown(const Fix& fix) {
 
 // Lamps in images
 
-/// Returns a view of the array's own memory, where its rows follow each other.
+/// Returns a view of the array's memory, whose rows are in order.
 ImageView image_of(const py::array& array) {
   const bool bytes = py::isinstance<py::array_t<std::uint8_t>>(array);
   if (array.ndim() != 2 || array.size() == 0 ||
@@ -338,7 +338,7 @@ py::tuple arrays_of(const std::vector<Detection>& detections) {
   return py::make_tuple(lamps, pixels, sigma_px);
 }
 
-/// And the size of the images that it is for.
+/// A detector and the image size for which it was made.
 struct ImageDetector {
   LightDetector detector;
   std::array<int, 2> imager_px;
@@ -453,8 +453,8 @@ py::dict truth_table(const std::filesystem::path& file) {
 }
 
 /// Throws ImportError if this module cannot read the arrays of the installed numpy: pybind11 before
-/// 2.12 takes the size of an element from a place where NumPy 2 has none, and every element of an
-/// array would be its first.
+/// 2.12 reads the size of an element from an offset that NumPy 2 does not use, and would return the
+/// first element of an array for all.
 void check_numpy() {
   constexpr unsigned first_with_numpy_2 = 0x020C0000;
   if (PYBIND11_VERSION_HEX >= first_with_numpy_2) return;

@@ -14,14 +14,14 @@ namespace {
 
 std::string six_digits(double value) { return significant(value, 6); }
 
-/// Of a standard deviation.
+/// Formats a standard deviation.
 std::string rough(double value) { return significant(value, 2); }
 
 std::string pair(const Eigen::Vector2d& values, const std::string& unit) {
   return six_digits(values.x()) + ", " + six_digits(values.y()) + " " + unit;
 }
 
-/// ", standard deviation 0.1, 0.2 px" of a pair; nothing without a covariance.
+/// Returns "; standard deviation 0.1, 0.2 px" for a pair; empty without a covariance.
 std::string deviations(const std::optional<Matrix2>& covariance, double scale,
                        const std::string& unit) {
   if (!covariance) return "";

@@ -9,13 +9,14 @@
 
 namespace vlp {
 
-/// What the calibration says, as tables in HTML.
+/// Return the parts of a calibration as HTML tables.
 std::string camera_table(const Camera& camera);
 std::string intrinsics_table(const IntrinsicsReport& report);
 std::string rotation_table(const RotationCenter& center);
 std::string dispersion_table(const Dispersion& dispersion, const Eigen::Vector2d& focal_px);
 
-/// Program, version and options of each part, and the digests of its inputs, to be folded away.
+/// Returns a foldable list in HTML: program, version and options of each part, and the digests of
+/// its inputs.
 std::string history_list(const std::vector<HistoryEntry>& entries);
 
 }  // namespace vlp

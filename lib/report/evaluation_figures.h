@@ -10,14 +10,16 @@
 
 namespace vlp {
 
-/// The figures of an evaluation as the report words them. Precondition: there is a fix.
+/// Returns the statistics of an evaluation, formatted for the report.
+/// @pre there is at least one fix
 std::vector<ReportFigure> report_figures(const Evaluation& evaluation);
 
-/// Sentences to go with them: captures without a fix, what the intervals drew, the comparison,
-/// what few stations or captures mean.
+/// Returns sentences on the statistics: reference of the errors, captures without a fix, resampling
+/// unit of the intervals, comparison, and warnings about small samples.
 std::vector<std::string> report_notes(const Evaluation& evaluation);
 
-/// Of a drive: the fitted line's distances and the jitter; begins with the drive's name.
+/// Returns the statistics of a drive: distances of the fitted line, and jitter. Each label begins
+/// with the name of the drive.
 std::vector<ReportFigure> report_figures(const std::string& drive, const LineFit& fit);
 
 }  // namespace vlp

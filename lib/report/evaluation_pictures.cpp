@@ -74,7 +74,7 @@ std::optional<ReportPicture> budget_picture(const std::vector<FixRow>& fixes, co
       const auto& left_out = row.rejected;
       return std::find(left_out.begin(), left_out.end(), lamps.lamps[lamp].id) != left_out.end();
     });
-    constexpr double any_px = 1;  // the division does not depend on it
+    constexpr double any_px = 1;  // arbitrary: the proportions do not depend on it
     const auto budget = unit.budget(row.fix->pose, seen, any_px);
     if (!budget) continue;
     const double common_m = spread_of(budget->common()).horizontal_m;

@@ -14,25 +14,32 @@
 
 namespace vlp {
 
-/// Draws the errors of the fixes on the floor plan. Throws InputError when image names do not
-/// match.
+/// Plots the errors of the fixes on the floor plan.
+/// @throws InputError if image names do not match
 Drawing draw_floor_plan(const EvaluationInput& input, const LampMap& lamps);
 
-/// Errors on the floor and their distribution; with a commanded line the drive along it instead of
-/// the floor. Throws InputError, see svg_of(). Precondition: there is a fix.
+/// Returns plots of the errors on the floor and of their distribution. With a commanded line, the
+/// drive along it takes the place of the floor.
+/// @pre there is at least one fix
+/// @throws InputError if image names do not match, and as svg_of()
 std::vector<ReportPicture> evaluation_pictures(const EvaluationInput& input,
                                                const Evaluation& evaluation, const LampMap& lamps);
 
-/// What the stated uncertainty of fixes comes from, horizontally: of each its noise, and the part
-/// of calibration and map, divided as a level camera's fix from all lamps in view there, without
-/// those that were left out, would be (UnitErrors). Fixes whose lean was estimated, of which that
-/// is not true, are left out. Precondition, which the fixes do not tell: they are of the camera,
-/// not of a robot's centre. Nothing when no fix states such a part. Throws InputError, see
-/// svg_of().
+/// Returns a plot of the contributions to the reported horizontal variance of each fix.
+///
+/// The noise is that of the fix. The common part of calibration and map is divided in proportion to
+/// the error budget of a level camera (UnitErrors) that sees all lamps in view there, without
+/// rejected ones. Fixes with an estimated roll and pitch are omitted, as this does not hold for
+/// them.
+///
+/// Returns std::nullopt if no fix reports such a common part.
+/// @pre the fixes are positions of the camera, not of a robot's center; this cannot be checked here
+/// @throws InputError as svg_of()
 std::optional<ReportPicture> budget_picture(const std::vector<FixRow>& fixes, const LampMap& lamps,
                                             const Calibration& calibration);
 
-/// A drive along a commanded line. Precondition: `fit` is that of the fixes.
+/// Returns a plot of a drive along a commanded line.
+/// @pre `fit` is the line fit of `fixes`
 ReportPicture drive_picture(const std::string& title, const std::vector<FixRow>& fixes,
                             const CommandedLine& commanded_m, const LineFit& fit);
 

@@ -13,8 +13,8 @@ namespace {
 
 std::string base64(const std::string& bytes) {
   constexpr std::size_t group = 3, letters = 4;
-  std::string text((bytes.size() + group - 1) / group * letters + 1, '\0');  // and a final zero
-  // The library's interface is C's: it wants unsigned characters.
+  std::string text((bytes.size() + group - 1) / group * letters + 1, '\0');  // + 1: final zero
+  // The C interface takes unsigned characters.
   const int length = EVP_EncodeBlock(reinterpret_cast<unsigned char*>(text.data()),
                                      reinterpret_cast<const unsigned char*>(bytes.data()),
                                      static_cast<int>(bytes.size()));
@@ -76,7 +76,7 @@ std::string html_section(const std::string& heading, const std::string& body) {
 }
 
 std::string html_table(const HtmlTable& table) {
-  // Who has no mouse can scroll what has the focus.
+  // Focusable, so that it can be scrolled without a mouse.
   std::string html = "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"" +
                      html_text(table.caption.empty() ? "Table" : table.caption) + "\">\n<table>\n";
   if (!table.caption.empty()) html += html_element("caption", table.caption);

@@ -11,21 +11,21 @@
 
 namespace vlp {
 
-/// Text for HTML, in elements and in attributes: nothing in it is taken for markup, and control
-/// characters become U+FFFD.
+/// Escapes text for HTML elements and attributes. Line breaks and tabs become spaces, other control
+/// characters U+FFFD.
 std::string html_text(std::string_view text);
 
-/// `<name>text</name>`, the text being escaped.
+/// Returns `<name>text</name>` with escaped text.
 std::string html_element(std::string_view name, std::string_view text);
 
-/// A whole page that needs nothing else, with the report's style: `content` is HTML.
+/// Returns a self-contained page with the report's style. `content` is HTML.
 std::string html_page(const std::string& title, const std::string& content);
 
-/// With a heading; empty without a body, which is HTML.
+/// Returns a section with a heading. `body` is HTML; the result is empty if the body is.
 std::string html_section(const std::string& heading, const std::string& body);
 
-/// A table that scrolls on its own when it is too wide. Each row begins with its own header. The
-/// cells are escaped; an empty caption or header is left out. Marked rows stand out.
+/// Table that scrolls on its own if it is too wide. The first cell of each row is its header. Cells
+/// are escaped. An empty caption or header is omitted. Marked rows are highlighted.
 struct HtmlTable {
   std::string caption;
   std::vector<std::string> header;
@@ -34,7 +34,7 @@ struct HtmlTable {
 };
 std::string html_table(const HtmlTable& table);
 
-/// A picture inside the page, with its caption, and its table below.
+/// Returns a figure with the embedded image, its caption, and its table below.
 std::string html_figure(const ReportPicture& picture);
 
 }  // namespace vlp

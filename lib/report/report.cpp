@@ -12,7 +12,7 @@
 namespace vlp {
 namespace {
 
-/// No-break: a unit stays with its number.
+/// No-break space, which keeps a unit next to its number.
 const std::string kSpace = "\u00a0";
 
 std::string with_unit(const std::string& text, const std::string& unit) {

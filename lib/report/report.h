@@ -13,54 +13,59 @@
 
 namespace vlp {
 
-/// A line of the table of figures, as it is to be read.
+/// Row of the table of statistics, formatted.
 struct ReportFigure {
-  /// For example "mean horizontal error", "0.0137", "mm", "0.0131 to 0.0143".
+  /// Example: "mean horizontal error", "0.0137", "mm", "0.0131 to 0.0143".
   std::string label, value, unit;
-  /// Empty where there is none.
+  /// Confidence interval; empty if there is none.
   std::string interval;
 };
 
-/// A verdict that was given elsewhere, and why.
+/// Verdict of another program, with its causes.
 struct ReportVerdict {
   std::string word;
-  /// How the box looks.
+  /// Style of the verdict box.
   enum class Look { pass, fail, none } look = Look::none;
-  /// The root first; empty when there is nothing to be said.
+  /// Causes, the root cause first; may be empty.
   std::vector<std::string> causes;
 };
 
-/// An image that was not used, and why.
+/// Rejected image and the reason.
 struct ReportRefusal {
   std::string image, reason;
 };
 
-/// What a person at a calibration station gets to see. What is empty is left out.
+/// Content of a report for the operator of a calibration station. Empty parts are omitted.
 struct Report {
   std::string title;
-  /// Without gates there is no verdict, which the report says.
+  /// Gates; without gates the report states that there is no verdict.
   std::vector<CheckedMetric> gates;
   std::vector<ReportFigure> figures;
-  /// Sentences below the figures: how they were come by, what is missing.
+  /// Sentences below the statistics: methods and missing data.
   std::vector<std::string> notes;
   std::optional<Calibration> calibration;
-  /// In any order; those of one part stay in theirs.
+  /// Plots in any order. Plots of the same part keep their order.
   std::vector<ReportPicture> pictures;
-  /// How the figures were made; part "evaluation".
+  /// Provenance of the statistics; its part is "evaluation".
   std::optional<HistoryEntry> evaluation;
-  /// What the verdict does not see, said beside it; for example of captures without a fix.
+  /// Caution inside the verdict box about an issue that the verdict does not cover, for example
+  /// captures without a fix.
   std::string caution = {};
-  /// In place of the gates' own; a gate without a figure was then not reached.
+  /// Verdict that replaces the verdict of the gates. A gate without a value then counts as not
+  /// reached.
   std::optional<ReportVerdict> verdict = {};
   std::vector<ReportRefusal> refused = {};
-  /// Label and value of what identifies the measurement, shown below the verdict: who, when.
+  /// Label and value of the data that identify the measurement, such as operator and time, shown
+  /// below the verdict.
   std::vector<std::pair<std::string, std::string>> facts = {};
 };
 
-/// One HTML page that needs nothing else: style and pictures are inside, there is no script.
-/// Verdict, facts, fixes on the floor, gates, figures, camera, rotation centre, dispersion,
-/// distribution, tracks, refused images, history; for a screen, a phone and A4 paper. Same report,
-/// same bytes.
+/// Renders a report as one self-contained HTML page with embedded style and images, without
+/// scripts.
+///
+/// Order: verdict, facts, fixes on the floor, gates, statistics, camera, rotation center,
+/// dispersion, distribution, tracks, other plots, rejected images, history. Laid out for a screen,
+/// a phone and A4 paper. The same report yields the same bytes.
 std::string report_html(const Report& report);
 
 }  // namespace vlp

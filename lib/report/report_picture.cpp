@@ -66,7 +66,7 @@ constexpr std::array<Kind, 8> kKinds = {
       "What accuracy the room and the camera allow over the floor, by one standard deviation.",
       "Map of the theoretical limit over the floor with the lamps."}}};
 
-/// Between <title> and </title>; empty without.
+/// Returns the text between <title> and </title>; empty if there is none.
 std::string_view svg_title(std::string_view svg) {
   constexpr std::string_view opening = "<title>";
   const std::size_t start = svg.find(opening);
@@ -75,7 +75,7 @@ std::string_view svg_title(std::string_view svg) {
   return svg.substr(start + opening.size(), end - start - opening.size());
 }
 
-/// It ends in the chunk IEND and its check sum.
+/// Returns true if the file ends in the chunk IEND with its checksum.
 bool is_whole_png(std::string_view png) {
   constexpr std::string_view end("IEND\xAE\x42\x60\x82");
   return png.ends_with(end);

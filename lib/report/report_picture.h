@@ -10,25 +10,28 @@
 
 namespace vlp {
 
-/// What part of the report a picture belongs to.
+/// Part of the report that a plot belongs to.
 enum class ReportPart { camera, rotation, dispersion, floor, distribution, tracks, other };
 
+/// Plot or image with its texts.
 struct ReportPicture {
   ReportPart part;
-  /// An SVG or a PNG, whole.
+  /// Complete content of an SVG or PNG file.
   std::string image;
-  /// What it shows, how to read it; for those who see it and for those who do not.
+  /// Caption: content of the plot and how to read it. Alt: description for readers who cannot see
+  /// it.
   std::string caption, alt;
-  /// Drawing::table.
+  /// Table below the plot, see Drawing::table.
   std::vector<std::vector<std::string>> table = {};
 };
 
-/// A picture that a program drew. It is recognised by its title; one that is not (a PNG has none)
-/// belongs to `other` and has its name for a caption. Throws InputError when the file cannot be
-/// read, is longer than 16 MiB, or is neither SVG nor PNG.
+/// Reads a plot of another program. An SVG is recognized by its title. Images without a known title
+/// (a PNG has none) belong to `other`, with the file name as caption.
+/// @throws InputError if the file cannot be read, is longer than 16 MiB, or is neither SVG nor PNG
 ReportPicture read_report_picture(const std::filesystem::path& file);
 
-/// The same of a picture that is drawn here. Throws InputError, see svg_of().
+/// Renders a drawing as a report picture.
+/// @throws InputError as svg_of()
 ReportPicture report_picture(const Drawing& drawing);
 
 }  // namespace vlp

@@ -28,7 +28,7 @@ constexpr int kMostTags = 1000;
 constexpr int kLeastSquares = 4, kMostSquares = 100;
 constexpr int kLargestId = 1'000'000;  // families have fewer
 constexpr double kLeastTag_m = 1e-4, kLargestTag_m = 2;
-constexpr double kMaxPrintSd = 0.02;  // beyond, the board shows it (check_board())
+constexpr double kMaxPrintSd = 0.02;  // check_board() detects larger errors
 
 IdOrder read_id_order(const YamlValue& value) {
   std::string names;
@@ -50,7 +50,7 @@ std::string read_family(const YamlValue& value) {
   throw value.unknown("the families are: " + names);
 }
 
-/// Without tags.
+/// Returns a board of squares without tags.
 Board board_of_squares(BoardKind kind) {
   Board board{"", 0, 0, 0, 1, 1, false, 0, {false, BoardCorner::top_left}};
   board.kind = kind;
@@ -95,7 +95,7 @@ Board read_squares(YamlMap& map, BoardKind kind) {
   return board;
 }
 
-/// Kalibr's checkerboard counts corners.
+/// Reads Kalibr's checkerboard, which counts corners.
 Board read_kalibr_checkerboard(YamlMap& map) {
   Board board = board_of_squares(BoardKind::chessboard);
   board.cols = map.required("targetCols").integer_within(kLeastSquares - 1, kMostSquares - 1) + 1;
@@ -111,9 +111,9 @@ Board read_kalibr_checkerboard(YamlMap& map) {
   return board;
 }
 
-/// Kalibr's target of kind aprilgrid, as its documentation describes it: tag36h11 with a border of
-/// two bits and squares at the corners, ids from codeOffset, or 0, along the rows, from the bottom
-/// left; or of kind checkerboard.
+/// Reads Kalibr's target of kind checkerboard, or aprilgrid as in its documentation: tag36h11 with
+/// a border of two bits and squares at the corners. Ids count from codeOffset, or 0, along the rows
+/// from the bottom left.
 Board read_kalibr_target(YamlMap& map) {
   const YamlValue kind = map.required("target_type");
   if (kind.text() == "checkerboard") return read_kalibr_checkerboard(map);

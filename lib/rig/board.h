@@ -7,66 +7,70 @@
 
 namespace vlp {
 
-/// The corner where the ids of a board begin, the board seen as printed and upright.
+/// Corner of a board at which the ids begin, with the board as printed and upright.
 enum class BoardCorner { bottom_left, bottom_right, top_left, top_right };
 
-/// The order in which ids are counted over a board: along its rows or along its columns, from a
-/// corner. In YAML: "row-major-from-bottom-left" (Kalibr), "column-major-from-top-left", ...
+/// Order of the ids on a board: along rows or columns, from a corner. In YAML:
+/// "row-major-from-bottom-left" (Kalibr), "column-major-from-top-left", ...
 struct IdOrder {
   bool column_major;
   BoardCorner from;
 };
 
-/// The order as YAML names it.
+/// Returns the name of an order in YAML.
 std::string name_of(const IdOrder& order);
 
-/// What is printed: AprilTags in rows; black and white squares; the same with an ArUco marker in
-/// each white square, as OpenCV's CharucoBoard has it. In YAML: "apriltags", "chessboard",
-/// "charuco".
+/// Pattern of a board: AprilTags in rows; black and white squares; squares with an ArUco marker in
+/// each white square, as OpenCV's CharucoBoard. In YAML: "apriltags", "chessboard", "charuco".
 enum class BoardKind { apriltags, chessboard, charuco };
 
 /// A printed board, flat and upright.
 struct Board {
-  /// AprilTag family, for example "tag36h11"; of a ChArUco board OpenCV's dictionary, for example
+  /// AprilTag family, for example "tag36h11". ChArUco boards: OpenCV's dictionary, for example
   /// "DICT_5X5_100".
   std::string family;
-  /// Tags along the board's width and height; of the other kinds squares.
+  /// Number of tags, or of squares, along the board's width and height.
   int cols;
   int rows;
-  /// Edge of a tag's black border, or of a ChArUco board's marker.
+  /// Edge length of a tag's black border, or of a ChArUco board's marker.
   double tag_size_m;
   /// Gap between tags / tag size.
   double tag_spacing;
   /// 1, or 2 for Kalibr's boards.
   int border_bits;
-  /// Black squares that touch the tags' corners (Kalibr's boards).
+  /// True if black squares touch the corners of the tags (Kalibr's boards).
   bool corner_squares;
   int first_id;
   IdOrder id_order;
   BoardKind kind = BoardKind::apriltags;
-  /// Of boards of squares: their edge.
+  /// Boards of squares: edge length of a square.
   double square_size_m = 0;
-  /// Of ChArUco boards: the top left square is white, as on boards of an even number of rows that
-  /// OpenCV before version 4.6 drew ("legacy pattern"). Ids go along the rows of white squares,
-  /// from the top left.
+  /// ChArUco boards: true if the top left square is white, as on boards with an even number of rows
+  /// by OpenCV before version 4.6 ("legacy pattern"). Ids follow the rows of white squares from the
+  /// top left.
   bool top_left_white = false;
-  /// Relative standard deviation of printed lengths, independent along the board's width and its
-  /// height; 0 if it is not stated.
+  /// Relative standard deviation of printed lengths, independent along width and height; 0 if
+  /// unknown.
   double print_sd = 0;
 
   bool has_squares() const { return kind != BoardKind::apriltags; }
 };
 
-/// Reads `vlp-board/1`: of a board of AprilTags every field up to id_order is a key of the same
-/// name, of a chessboard `kind`, `cols`, `rows` and `square_size_m`, of a ChArUco board these and
-/// `marker_size_m`, `dictionary`, `first_id?` (0) and `top_left?` (black, or white); of all
-/// `print_sd?`. Or the YAML
-/// file that Kalibr describes a target by: an AprilGrid (target_type, tagCols, tagRows, tagSize in
-/// m, tagSpacing, codeOffset), or a checkerboard (targetCols, targetRows: of corners;
-/// rowSpacingMeters, colSpacingMeters). Throws InputError.
+/// Reads a board from `vlp-board/1` or from a target file of Kalibr.
+///
+/// Keys of `vlp-board/1`:
+///   apriltags   the fields up to id_order, by name
+///   chessboard  kind, cols, rows, square_size_m
+///   charuco     as chessboard, with marker_size_m, dictionary, first_id? (0), top_left? (black, or
+///               white)
+///   all         print_sd?
+/// Keys of Kalibr's targets:
+///   AprilGrid     target_type, tagCols, tagRows, tagSize in m, tagSpacing, codeOffset
+///   checkerboard  targetCols, targetRows (of corners), rowSpacingMeters, colSpacingMeters
+/// @throws InputError if the file cannot be read or is invalid
 Board read_board(const std::filesystem::path& file);
 
-/// Writes what read_board() reads, whole or not at all. Throws InputError.
+/// Writes a file for read_board(), atomically. Throws InputError if it cannot be written.
 void write_board(const std::filesystem::path& file, const Board& board);
 
 }  // namespace vlp

@@ -10,30 +10,30 @@
 
 namespace vlp {
 
-/// The board frame: origin at the top left corner of the top left tag's black border, or, of a
-/// board of squares, where the top left square touches the one across; the board seen as printed
-/// and upright; x right, y down, z into the paper, away from who looks at it.
+/// A tag in the board frame, with the board as printed and upright. Axes: x right, y down, z into
+/// the paper, away from the viewer. Origin: top left corner of the top left tag's black border.
+/// Boards of squares: the corner at which the top left square touches the diagonally adjacent one.
 struct BoardTag {
   int id;
-  /// Corners of the black border in libapriltag's order: bottom left, bottom right, top right,
-  /// top left.
+  /// Corners of the black border in libapriltag's order: bottom left, bottom right, top right, top
+  /// left.
   std::array<Eigen::Vector2d, 4> corners_m;
 };
 
-/// From one tag's (or square's) left (or top) edge to the next one's.
+/// Returns the distance from the left (top) edge of a tag, or square, to that of the next one.
 double tag_pitch_m(const Board& board);
 
-/// From the first tag's left (top) edge to the last one's right (bottom) edge, or from the first
-/// corner in which squares touch to the last.
+/// Returns the distance from the first tag's left (top) edge to the last tag's right (bottom) edge.
+/// Boards of squares: from the first inner corner to the last.
 Eigen::Vector2d tag_field_m(const Board& board);
 
-/// The square of a board of squares is black; counted from the top left one.
+/// Returns true if the square is black. `col` and `row` count from the top left square.
 bool is_black(const Board& board, int col, int row);
 
-/// Every corner in which squares touch, row by row from the top left; of boards of squares.
+/// Returns the inner corners of a board of squares, row by row from the top left.
 std::vector<Eigen::Vector2d> square_corners_m(const Board& board);
 
-/// Every tag or marker of the board, row by row from the top left; of a chessboard none.
+/// Returns the tags or markers of a board, row by row from the top left; none for a chessboard.
 std::vector<BoardTag> board_layout(const Board& board);
 
 }  // namespace vlp

@@ -16,16 +16,16 @@ namespace {
 
 constexpr int kLarge = std::numeric_limits<int>::max();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-/// Largest standard deviation of a pixel, a lens parameter or a place: nothing is known beyond it,
-/// and products of covariances stay finite.
+/// Largest standard deviation of a pixel, a lens parameter or a position: larger values carry
+/// no information, and products of covariances remain finite.
 constexpr double kMaxSd = 1e6;
 /// Largest derivative of a calibrated quantity by another, for the same reason.
 constexpr double kMaxDerivative = 1e12;
-/// Most lamps that share errors with a dispersion, which is of a few captures: their joint
+/// Maximum number of lamps correlated with a dispersion, which has few captures: their joint
 /// covariance is dense.
 constexpr std::size_t kMaxUncertainLamps = 1000;
 
-/// `rows` rows of `cols` numbers.
+/// Reads `rows` rows of `cols` numbers.
 Eigen::MatrixXd read_matrix(const YamlValue& value, std::size_t rows, std::size_t cols) {
   const auto list = value.list();
   if (list.size() != rows) {
@@ -43,13 +43,13 @@ Eigen::MatrixXd read_matrix(const YamlValue& value, std::size_t rows, std::size_
   return matrix;
 }
 
-/// Throws InputError if a variance is beyond what can be known.
+/// Throws InputError if a standard deviation exceeds kMaxSd.
 void check_variances(const YamlValue& value, const Eigen::MatrixXd& covariance) {
   if (covariance.diagonal().maxCoeff() <= kMaxSd * kMaxSd) return;
   throw value.error("states a standard deviation beyond 1,000,000: is it in the right unit?");
 }
 
-/// The rows of the lower triangle, 1, 2, 3 ... numbers.
+/// Reads the rows of the lower triangle: 1, 2, 3 ... numbers.
 Eigen::MatrixXd read_joint_covariance(const YamlValue& value, std::size_t size) {
   const auto list = value.list();
   if (list.size() != size) {
@@ -63,8 +63,7 @@ Eigen::MatrixXd read_joint_covariance(const YamlValue& value, std::size_t size) 
       const auto i = static_cast<Eigen::Index>(row), j = static_cast<Eigen::Index>(col);
       matrix(i, j) = matrix(j, i) = numbers[col];
     }
-    // Of any two, the correlation: what makes a matrix no covariance is mostly a slip in one
-    // number.
+    // Checks each correlation: an invalid covariance usually has a mistake in one number.
     for (std::size_t col = 0; col <= row; ++col) {
       const auto i = static_cast<Eigen::Index>(row), j = static_cast<Eigen::Index>(col);
       constexpr double rounding = 1e-9;
@@ -132,7 +131,7 @@ RotationCenter read_rotation_center(YamlMap map, std::size_t intrinsics) {
   center.center_px = Eigen::Vector2d(map.required("center_px").numbers(2).data());
   const YamlValue zenith = map.required("zenith_in_camera");
   center.zenith_in_camera = Eigen::Vector3d(zenith.numbers(3).data());
-  // Six digits, as a person would type them, are enough.
+  // Six digits, as typed by a person, suffice.
   if (std::abs(center.zenith_in_camera.norm() - 1) > 1e-5 || center.zenith_in_camera.z() <= 0) {
     throw zenith.error("should be a unit vector with z > 0");
   }

@@ -10,7 +10,7 @@
 namespace vlp {
 namespace {
 
-/// The pixel of the zenith in the undistorted image.
+/// Updates center_px to the pixel of the zenith in the undistorted image.
 void recenter(Calibration& calibration) {
   if (!calibration.rotation_center) return;
   RotationCenter& center = *calibration.rotation_center;

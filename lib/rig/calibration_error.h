@@ -7,27 +7,29 @@
 
 #include "calibration.h"
 
-/// A calibration with an error added to one of its parts, in the units in which covariances and
-/// what a step passes on state it: intrinsics, and normalized points (x/z, y/z).
+/// Adds errors to parts of a calibration, for numeric derivatives. The units are those of the
+/// covariances: intrinsics, and normalized points (x/z, y/z).
 namespace vlp {
 
-/// How many of the intrinsics have errors that a calibration states, and steps pass on: all; of a
-/// splined lens, whose control points are known each from a few corners, fx, fy, cx, cy, which
-/// stand for the whole. What its control points lack is in IntrinsicsReport::uncertainty_px alone.
+/// Returns the number of intrinsics with reported errors, which later steps propagate: all
+/// intrinsics. Splined lenses: 4, for fx, fy, cx, cy, since few corners determine each control
+/// point. Errors of the control points are only included in IntrinsicsReport::uncertainty_px.
 Eigen::Index stated_intrinsics(const Camera& camera);
 
-/// The zenith's normalized point.
+/// Returns the normalized point of the zenith.
 Eigen::Vector2d zenith_point(const RotationCenter& center);
 
-/// With errors added to the stated_intrinsics(); the zenith stays, and center_px with it. A lever
-/// arm moves as it does with them, but for what goes with the zenith.
+/// Adds an error to the stated_intrinsics(). The zenith does not change; center_px is updated. The
+/// lever arm changes by its derivative by the intrinsics, without the part through the zenith.
 Calibration with_lens_error(Calibration calibration, const Eigen::VectorXd& error);
 
-/// With an error added to the zenith's normalized point, and what goes with it to the lever arm.
-/// Precondition: there is a rotation centre.
+/// Adds an error to the zenith's normalized point. center_px and the correlated lever arm are
+/// updated.
+/// @pre there is a rotation center
 Calibration with_zenith_error(Calibration calibration, const Eigen::Vector2d& error);
 
-/// With an error added to offset_px / f. Precondition: there is a dispersion.
+/// Adds an error to offset_px / f.
+/// @pre there is a dispersion
 Calibration with_offset_error(Calibration calibration, const Eigen::Vector2d& error);
 
 /// Computes the covariance of offset_px from captures and lamp map, in px^2, with lens and zenith

@@ -6,11 +6,11 @@
 
 #include "calibration.h"
 
-// Not installed: nothing for the shared library to show.
+// Not installed, and not exported by the shared library.
 #pragma GCC visibility push(hidden)
 namespace vlp {
 
-/// The text that write_calibration() writes.
+/// Returns the text that write_calibration() writes.
 std::string calibration_text(const Calibration& calibration);
 
 }  // namespace vlp

@@ -14,7 +14,7 @@ void begin_part(YAML::Emitter& out, const char* key) {
   out << YAML::Key << key << YAML::Value << YAML::BeginMap;
 }
 
-/// The keys that must be there come last, see write_calibration().
+/// Required keys come last, see write_calibration().
 void emit_camera(YAML::Emitter& out, const Camera& camera) {
   begin_part(out, "camera");
   emit_text(out, "id", camera.id);
@@ -38,7 +38,7 @@ void emit_matrix(YAML::Emitter& out, const char* key, const Eigen::MatrixXd& mat
   out << YAML::EndSeq;
 }
 
-/// The rows of the lower triangle.
+/// Writes the rows of the lower triangle.
 void emit_joint_covariance(YAML::Emitter& out, const Eigen::MatrixXd& covariance) {
   out << YAML::Key << "covariance" << YAML::Value << YAML::BeginSeq;
   for (Eigen::Index row = 0; row < covariance.rows(); ++row) {
@@ -55,7 +55,7 @@ void emit_intrinsics_report(YAML::Emitter& out, const IntrinsicsReport& report) 
   emit_integer(out, "outliers", report.outliers);
   emit_number(out, "rms_px", report.rms_px);
   if (report.board_warp_m) emit_numbers(out, "board_warp_m", *report.board_warp_m);
-  // Infinite where the lens has no ray; a gate tells of it, YAML has no number for it.
+  // Infinite if the lens has no ray, which YAML cannot represent; a gate reports it.
   if (report.uncertainty_px && std::isfinite(*report.uncertainty_px)) {
     emit_number(out, "uncertainty_px", *report.uncertainty_px);
   }

@@ -7,7 +7,7 @@
 
 namespace vlp {
 
-/// What a standard deviation of a pixel can be; any other is a mistake.
+/// Range of valid standard deviations of a pixel; values outside indicate a mistake.
 inline constexpr double kMinSigma_px = 1e-4;
 inline constexpr double kMaxSigma_px = 1e3;
 
@@ -15,10 +15,10 @@ inline constexpr double kMaxSigma_px = 1e3;
 struct Detection {
   /// Id in the lamp map.
   int lamp;
-  /// Image of the lamp's centre; the centre of the top-left pixel is (0, 0).
+  /// Image of the lamp's center; the center of the top left pixel is (0, 0).
   Eigen::Vector2d pixel;
-  /// Standard deviation of `pixel` per axis, when the detector states it: from
-  /// kMinSigma_px to kMaxSigma_px.
+  /// Standard deviation of `pixel` per axis, from kMinSigma_px to kMaxSigma_px; std::nullopt if the
+  /// detector does not report it.
   std::optional<double> sigma_px;
 };
 

@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Every failure names the file the user asked for.
+/// Errors name the file that the user specified.
 [[noreturn]] void fail(const fs::path& wanted) {
   throw InputError(wanted, std::string("cannot be written: ") + std::strerror(errno));
 }
@@ -38,7 +38,7 @@ fs::path without_links(fs::path path, const std::optional<fs::path>& descriptors
   return path;
 }
 
-/// A path without its links.
+/// Path with symbolic links resolved.
 struct Target {
   fs::path path;
   /// Descriptor of this process that the path names, as /dev/stdout does.
@@ -101,7 +101,7 @@ std::size_t check_kind(const fs::path& path, int descriptor, std::size_t max_byt
   return bytes;
 }
 
-/// Opens a file with a name that nobody else has, not even another thread, beside `target`.
+/// Creates a file in the folder of `target` with a name that is unique among processes and threads.
 int create_beside(const fs::path& target, mode_t mode, fs::path& temporary) {
   constexpr std::size_t most_bytes = 200;  // of the 255 of a file name
   const std::string name = "." + target.filename().string().substr(0, most_bytes) + ".tmp-" +
@@ -114,7 +114,7 @@ int create_beside(const fs::path& target, mode_t mode, fs::path& temporary) {
 }
 
 /// Creates the file that will replace `target`, with its permissions, and its owner and group as
-/// far as the system allows. Nobody but the owner can read it before it has them.
+/// far as the system allows. Until then only the owner can read it.
 int create_replacement(const fs::path& target, fs::path& temporary) {
   constexpr mode_t as_user_set = 0666, private_to_owner = 0600;
   struct stat old {};
@@ -129,7 +129,8 @@ int create_replacement(const fs::path& target, fs::path& temporary) {
   return -1;
 }
 
-/// Makes a rename last through a power cut. Not every file system can; the file is whole anyway.
+/// Makes a rename durable against a power failure. Not every file system supports this; the file is
+/// complete in any case.
 void sync_folder(const fs::path& folder) {
   const int descriptor = ::open(folder.c_str(), O_RDONLY | O_CLOEXEC);
   if (descriptor < 0) return;
@@ -148,7 +149,7 @@ bool is_control_character(char character) {
   return byte < 0x20 && byte != '\n' && byte != '\r' && byte != '\t';
 }
 
-/// Looks at all of it: without a way out of the loop the compiler takes many characters at a time.
+/// Checks all characters without an early exit, which lets the compiler vectorize the loop.
 bool has_control_characters(const std::string& text) {
   bool found = false;
   for (const char character : text) found |= is_control_character(character);

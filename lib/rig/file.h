@@ -9,20 +9,21 @@
 
 namespace vlp {
 
-/// A file that is read in blocks, or a stream that this process was given (/dev/stdin, /dev/fd/N).
+/// File that is read in blocks, or a stream that this process was given (/dev/stdin, /dev/fd/N).
 class InputFile {
  public:
-  /// Throws InputError if it cannot be opened, is a folder, another pipe or a device, or has more
-  /// than `max_bytes`. Never waits for the writer of a pipe.
+  /// Opens the file. Never waits for the writer of a pipe.
+  /// @throws InputError if it cannot be opened, is a folder, another pipe or a device, or has more
+  /// than `max_bytes`
   [[gnu::visibility("hidden")]] InputFile(const std::filesystem::path& path, std::size_t max_bytes);
   [[gnu::visibility("hidden")]] ~InputFile();
   InputFile(const InputFile&) = delete;
   InputFile& operator=(const InputFile&) = delete;
 
-  /// Size of the file when it was opened; 0 for a stream.
+  /// Returns the size of the file when it was opened; 0 for a stream.
   std::size_t bytes() const { return bytes_; }
-  /// Reads up to `bytes` into `data` and returns how many; 0 at the end. Throws InputError if it
-  /// cannot be read, or if there are more than `max_bytes` by now.
+  /// Reads up to `bytes` into `data` and returns the number read; 0 at the end. Throws InputError
+  /// if it cannot be read, or if the total exceeds `max_bytes`.
   [[gnu::visibility("hidden")]] std::size_t read(char* data, std::size_t bytes);
 
  private:
@@ -31,32 +32,35 @@ class InputFile {
   int descriptor_;
 };
 
-/// Reads the whole of a file. Throws InputError as InputFile.
+/// Reads an entire file. Throws InputError as InputFile.
 [[gnu::visibility("hidden")]] std::string read_file(const std::filesystem::path& path,
                                                     std::size_t max_bytes);
 
-/// Reads a text file by read_file(). Throws InputError also if it is empty, holds control
-/// characters (a binary file), or if its last line has no end: it looks like a file cut short.
+/// Reads a text file by read_file(). Throws InputError also if it is empty or has control
+/// characters (a binary file), or if the last line has no end (a truncated file).
 [[gnu::visibility("hidden")]] std::string read_text_file(const std::filesystem::path& path,
                                                          std::size_t max_bytes);
 
-/// A file in the making that appears as a whole or not at all: a temporary file beside it, fsync,
-/// rename. Whatever interrupts it, `path` holds the old content or the new. A file that is replaced
-/// keeps its permissions, and its owner and group as far as this process may set them. A symbolic
-/// link is followed. A pipe, a device or a stream of this process (/dev/stdout, /dev/fd/N) is
-/// written to directly. Killed, it may leave its temporary file, ".NAME.tmp-PID-N", which nothing
-/// reads.
+/// Atomic file writer: a temporary file in the same folder, fsync, rename. After any interruption
+/// `path` has the old content or the new.
+///
+/// A replaced file keeps its permissions, and its owner and group as far as this process may set
+/// them. Symbolic links are followed. A pipe, a device or a stream of this process (/dev/stdout,
+/// /dev/fd/N) is written directly. A killed process may leave its temporary file,
+/// ".NAME.tmp-PID-N", which no program reads.
 class WholeFile {
  public:
-  /// Each throws InputError when the file cannot be written.
+  /// Creates the temporary file. This and the next functions throw InputError if the file cannot be
+  /// written.
   [[gnu::visibility("hidden")]] explicit WholeFile(const std::filesystem::path& path);
   [[gnu::visibility("hidden")]] void write(std::string_view content);
+  /// Flushes the content to disk and renames the file to `path`.
   [[gnu::visibility("hidden")]] void save();
-  /// Without waiting for the disk: a power cut may leave a part of it, and whoever reads it has to
-  /// notice. For what can be made again.
+  /// Saves without waiting for the disk, for content that can be produced again. After a power
+  /// failure the file may be truncated, which its reader must detect.
   [[gnu::visibility("hidden")]] void save_unsynced();
 
-  /// Without save() nothing has happened to `path`.
+  /// Without save(), `path` is unchanged.
   [[gnu::visibility("hidden")]] ~WholeFile();
   WholeFile(const WholeFile&) = delete;
   WholeFile& operator=(const WholeFile&) = delete;
@@ -66,7 +70,7 @@ class WholeFile {
   int descriptor_ = -1;
 };
 
-/// Replaces `path` by `content` as a whole (WholeFile). Throws InputError.
+/// Replaces `path` by `content` atomically (WholeFile). Throws InputError.
 [[gnu::visibility("hidden")]] void write_file(const std::filesystem::path& path,
                                               std::string_view content);
 

@@ -8,7 +8,7 @@
 
 namespace vlp {
 
-/// The lamp with this id; null when there is none.
+/// Returns the lamp with this id; nullptr if there is none.
 const Lamp* find_lamp(std::span<const Lamp> lamps, int id);
 
 }  // namespace vlp

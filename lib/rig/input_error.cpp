@@ -7,7 +7,7 @@
 namespace vlp {
 namespace {
 
-/// One line that a terminal shows as it is.
+/// Returns one line without control characters.
 std::string printable(std::string text) {
   std::replace_if(
       text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '?');

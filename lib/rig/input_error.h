@@ -8,13 +8,14 @@
 
 namespace vlp {
 
-/// Bad input: what() is one line "file:line: key: what is wrong and what to do". Programs catch
-/// it once, in main, print the line and exit with 2.
+/// Invalid input. what() is one line, "file:line: key: problem and remedy". Programs catch it once,
+/// in main, print the line and exit with 2.
 class InputError : public std::runtime_error {
  public:
   InputError(const std::filesystem::path& file, const std::string& problem);
-  /// `line` counts from 1; 0 when it is not known. `key` is the YAML key or the CSV column with
-  /// its way there, such as "lamps[3].position_m"; it may be empty.
+  /// @param line  from 1; 0 if unknown
+  /// @param key   YAML key with its path, such as "lamps[3].position_m", or CSV column; may be
+  /// empty
   InputError(const std::filesystem::path& file, std::size_t line, const std::string& key,
              const std::string& problem);
 };

@@ -16,9 +16,9 @@ namespace vlp {
 namespace {
 
 constexpr const char* kLampsFormat = "vlp-lamps/1";
-constexpr double kTooHigh_m = 200;  // a ceiling above this was given in millimetres
+constexpr double kTooHigh_m = 200;  // higher ceilings indicate millimeters
 constexpr double kCoincident_m = 1e-3;
-constexpr double kWorstSurvey_m = 1;  // beyond it was given in millimetres
+constexpr double kWorstSurvey_m = 1;  // larger values indicate millimeters
 
 std::optional<double> optional_within(YamlMap& map, const std::string& key, double min, double max,
                                       std::string_view unit) {

@@ -15,7 +15,7 @@ namespace vlp {
 namespace {
 
 constexpr double kMinSize_m = 1e-3, kMaxSize_m = 10;
-constexpr double kMaxYaw_rad = 6.3;  // a turn; larger values were given in degrees
+constexpr double kMaxYaw_rad = 6.3;  // a full turn; larger values indicate degrees
 
 /// Lists the names of all shapes, or of those with two sizes.
 std::string list_names(bool only_two_sizes) {

@@ -11,7 +11,7 @@
 
 namespace vlp {
 
-/// Shape of a lamp: a figure in a horizontal plane, with two axes at right angles.
+/// Shape of a lamp: a plane figure with two perpendicular axes, in a horizontal plane.
 enum class ShapeKind { disc, rectangle };
 
 /// Properties of a shape.
@@ -19,9 +19,11 @@ struct ShapeTraits {
   ShapeKind kind;
   /// Name in lamps.yaml and lights.csv.
   std::string_view name;
-  /// True if the outline is the ellipse with these axes; otherwise it is the box around that.
+  /// True if the outline is the ellipse with these axes; false if it is the box around that
+  /// ellipse.
   bool is_round;
-  /// True if lamps.yaml states size_m and yaw_rad; otherwise diameter_m, the length of both axes.
+  /// True if lamps.yaml has size_m and yaw_rad; false if it has diameter_m, the length of both
+  /// axes.
   bool has_two_sizes;
 };
 
@@ -37,10 +39,12 @@ static_assert([] {
   return true;
 }());
 
+/// Returns the properties of a shape.
 inline const ShapeTraits& traits_of(ShapeKind kind) {
   return kShapeTraits[static_cast<std::size_t>(kind)];
 }
 
+/// Shape of a lamp with size and direction.
 struct LampShape {
   ShapeKind kind = ShapeKind::disc;
   /// Lengths of the two axes; std::nullopt for a disc of unknown diameter.
@@ -49,6 +53,7 @@ struct LampShape {
   double yaw_rad = 0;
 };
 
+/// Returns a disc.
 inline LampShape make_disc(double diameter_m) {
   return {ShapeKind::disc, Eigen::Vector2d::Constant(diameter_m)};
 }
@@ -58,8 +63,9 @@ inline LampShape make_disc(double diameter_m) {
 Eigen::Vector3d world_from_shape(const LampShape& shape, const Eigen::Vector3d& center_m,
                                  const Eigen::Vector2d& point);
 
-/// Computes points of the outline in the world frame, counter-clockwise seen from above; none if
-/// the size is unknown. Those of a box include its corners if `count` is a multiple of 8.
+/// Computes points of the outline in the world frame, counter-clockwise seen from above. Returns
+/// none if the size is unknown. The points of a box include its corners if `count` is a multiple of
+/// 8.
 std::vector<Eigen::Vector3d> outline_of(const LampShape& shape, const Eigen::Vector3d& center_m,
                                         int count = 16);
 

@@ -6,23 +6,27 @@
 
 #include "calibration.h"
 
-/// How a stage of the calibration adds its part. Each part rests on those before it:
-///   camera -> rotation_center -> dispersion;
-/// an adjustment makes camera and rotation_center anew, together, and leaves no dispersion.
-/// A stage replaces its own part, keeps the parts that its own rests on, and drops those that
-/// rested on the old one; the history goes with the parts. `entry.part` is filled in here.
+/// Steps of the calibration. Each part depends on those before it:
+///   camera -> rotation_center -> dispersion
+/// An adjustment replaces camera and rotation_center together and removes the dispersion. A step
+/// replaces its part, keeps the parts before it, and removes the parts that depend on the old one.
+/// The history changes with the parts. The functions set `entry.part`.
 namespace vlp {
 
-/// The first stage: every other part rests on the camera, so nothing of an older file is kept.
+/// Returns a calibration with this camera alone. All other parts depend on the camera and are
+/// removed.
 Calibration with_camera(Camera camera, std::optional<IntrinsicsReport> report, HistoryEntry entry);
 
+/// Sets the rotation center, and removes dispersion and adjustment.
 Calibration with_rotation_center(Calibration calibration, const RotationCenter& rotation_center,
                                  HistoryEntry entry);
 
-/// `calibration` has the adjusted camera, and keeps its intrinsics_report.
+/// Sets rotation center and adjustment, and removes the dispersion. `calibration` has the adjusted
+/// camera and keeps its intrinsics_report.
 Calibration with_adjustment(Calibration calibration, const RotationCenter& rotation_center,
                             Adjustment adjustment, HistoryEntry entry);
 
+/// Sets the dispersion.
 Calibration with_dispersion(Calibration calibration, const Dispersion& dispersion,
                             HistoryEntry entry);
 

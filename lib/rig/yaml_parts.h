@@ -10,32 +10,32 @@
 #include "lamp_map.h"
 #include "yaml_reader.h"
 
-// Not installed: nothing for the shared library to show.
+// Not installed, and not exported by the shared library.
 #pragma GCC visibility push(hidden)
 namespace vlp {
 
-/// The parts that more than one kind of document holds. Each asks `map` for the keys that are the
-/// fields of what it returns and leaves finish() to the caller, who may have keys of its own.
-/// Throws InputError.
+/// Readers of the parts that several kinds of documents contain. Each reads the keys of `map` that
+/// are the fields of its result. The caller reads its own keys and calls finish(). All throw
+/// InputError if a value is invalid.
 Lamp read_lamp(YamlMap& map);
-/// Its size is unknown if it is a disc without diameter_m.
+/// Reads a shape. Its size is unknown for a disc without diameter_m.
 LampShape read_shape(YamlMap& map);
 Board read_board(YamlMap& map);
 Camera read_camera(YamlMap& map);
 
-/// Writes the keys that read_shape() reads.
+/// Writes the keys for read_shape().
 void emit_shape(YAML::Emitter& out, const LampShape& shape);
 
-/// Lamps that were read so far, by id and place.
+/// Lamps that were already read, by id and position.
 class EarlierLamps {
  public:
-  /// Throws InputError at `item` if an earlier lamp has the id or the place of this one.
+  /// Throws InputError at `item` if an earlier lamp has the same id or position.
   void check(const Lamp& lamp, const YamlValue& item) const;
   void add(const Lamp& lamp);
 
  private:
   std::unordered_set<int> ids_;
-  /// By x in metres.
+  /// Lamps by x in meters.
   std::multimap<double, Lamp> lamps_;
 };
 

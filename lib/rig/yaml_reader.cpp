@@ -18,8 +18,8 @@ namespace vlp {
 
 namespace {
 
-/// Builds the tree of a file. Aliases are refused because a few lines of them can stand for
-/// gigabytes, depth because yaml-cpp recurses.
+/// Builds the tree of a file. Rejects aliases, because a few lines of them can expand to gigabytes,
+/// and deep nesting, because yaml-cpp recurses.
 class TreeBuilder : public YAML::EventHandler {
  public:
   explicit TreeBuilder(const std::filesystem::path& file) : file_(file) {}
@@ -142,7 +142,7 @@ std::optional<YamlValue> YamlMap::optional(const std::string& key) {
   if (std::find(known_.begin(), known_.end(), key) == known_.end()) known_.push_back(key);
   for (const Entry& entry : entries_) {
     if (entry.key != key) continue;
-    // yaml-cpp takes the place of what comes next for the place of nothing.
+    // yaml-cpp gives an empty value the position of the next node.
     const bool is_null = entry.value->kind == YamlNode::Kind::null;
     const std::size_t line = is_null ? entry.line : entry.value->line;
     return YamlValue(entry.value, file_, prefix_.empty() ? key : prefix_ + "." + key, line);

@@ -14,7 +14,7 @@
 
 #include "input_error.h"
 
-// Not installed: nothing for the shared library to show.
+// Not installed, and not exported by the shared library.
 #pragma GCC visibility push(hidden)
 namespace vlp {
 
@@ -24,36 +24,37 @@ class YamlMap;
 struct YamlNode {
   enum class Kind { null, scalar, list, map };
   Kind kind = Kind::null;
-  /// Counted from 1; 0 if it is unknown.
+  /// Line in the file, counted from 1; 0 if unknown.
   std::size_t line = 0;
   /// Text of a scalar.
   std::string text;
-  /// Items of a list; keys and values of a map, by turns.
+  /// Items of a list; keys and values of a map, alternating.
   std::vector<YamlNode> children;
 };
 
-/// Part of a document, which is kept in memory as long as one of its parts is used.
+/// Part of a document. The document stays in memory as long as one of its parts is used.
 using YamlPart = std::shared_ptr<const YamlNode>;
 
-/// One value of a YAML document that knows where it stands. Each reader throws InputError with
-/// file, line and key when the value is of another kind.
+/// A value of a YAML document with its position in the file. Each reader throws InputError with
+/// file, line and key if the value has another type.
 class YamlValue {
  public:
   YamlValue(YamlPart node, const std::filesystem::path* file, std::string key, std::size_t line);
 
-  /// A finite number, in [min, max] when given; `unit` is for the message.
+  /// Returns a finite number. number_within() also throws InputError if it is outside [min, max];
+  /// `unit` is for the message.
   double number() const;
   double number_within(double min, double max, std::string_view unit) const;
   int integer_within(int min, int max) const;
   bool boolean() const;
   std::string text() const;
-  /// Exactly `count` numbers.
+  /// Returns exactly `count` numbers.
   std::vector<double> numbers(std::size_t count) const;
   std::vector<YamlValue> list() const;
   YamlMap map() const;
 
   InputError error(const std::string& problem) const;
-  /// A word that is not among those that are known.
+  /// Returns the error for a word that is not among the valid ones, `known`.
   InputError unknown(const std::string& known) const;
 
  private:
@@ -63,7 +64,7 @@ class YamlValue {
   std::size_t line_;
 };
 
-/// A mapping: ask for every key that it may have, then call finish(). `file` outlives it.
+/// A mapping. The caller reads every valid key, then calls finish(). `file` must outlive it.
 class YamlMap {
  public:
   YamlMap(const YamlPart& node, const std::filesystem::path* file, std::string key);
@@ -71,10 +72,10 @@ class YamlMap {
   bool has(const std::string& key) const;
   YamlValue required(const std::string& key);
   std::optional<YamlValue> optional(const std::string& key);
-  /// Throws InputError for the first key that nobody asked for.
+  /// Throws InputError for the first key that was not read.
   void finish() const;
 
-  /// About the mapping as a whole.
+  /// Returns an error of the entire mapping.
   InputError error(const std::string& problem) const;
 
  private:
@@ -96,15 +97,18 @@ class YamlMap {
 /// InputError as read_yaml().
 YAML::Node parse_yaml(const std::filesystem::path& file, const std::string& text);
 
-/// Longest YAML file that is parsed: yaml-cpp needs 500 times as much memory for a YAML::Node.
+/// Maximum size of a YAML file that is parsed: yaml-cpp needs 500 times as much memory for a
+/// YAML::Node.
 inline constexpr std::size_t kMaxYamlBytes = std::size_t{1} << 20;
 
-/// A YAML file that is a mapping. Throws InputError when it cannot be read or parsed, is longer
-/// than 1 MiB, is not UTF-8, holds aliases or a second document, or is nested more than 20 levels
-/// deep.
+/// Reads a YAML file that is a mapping.
+/// @throws InputError if it cannot be read or parsed, is longer than 1 MiB, is not UTF-8, contains
+/// aliases or a second document, or is nested more than 20 levels deep
 YamlMap read_yaml(const std::filesystem::path& file);
-/// One whose first key is `format: NAME/VERSION`; throws InputError for other formats, too.
+/// Reads a YAML file with the first key `format: NAME/VERSION`. Throws InputError for other
+/// formats, too.
 YamlMap read_yaml(const std::filesystem::path& file, const std::string& format);
+/// Throws InputError if the key `format` is missing or has another value.
 void require_format(YamlMap& map, const std::string& format);
 
 }  // namespace vlp

@@ -9,7 +9,7 @@
 namespace vlp {
 namespace {
 
-/// Length of the character that `text` begins with; 0 when it is not UTF-8.
+/// Returns the length of the first character of `text`; 0 if it is not UTF-8.
 std::size_t character_length(std::string_view text) {
   const auto first = static_cast<unsigned char>(text.front());
   if (first < 0x80) return 1;

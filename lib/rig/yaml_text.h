@@ -8,22 +8,23 @@
 #include <string>
 #include <string_view>
 
-// Not installed: nothing for the shared library to show.
+// Not installed, and not exported by the shared library.
 #pragma GCC visibility push(hidden)
 namespace vlp {
 
-/// The fewest digits that read back as the same double. With an exponent it has a point, too
-/// ("1.0e-07"): without one, YAML 1.1 readers such as PyYAML take it for text.
+/// Returns the shortest decimal text that parses to the same double. Text with an exponent has a
+/// point, too ("1.0e-07"): without a point, YAML 1.1 readers such as PyYAML parse it as text.
 std::string shortest(double value);
 
-/// Text for a message, its end left out when it is long.
+/// Returns a text for a message, truncated to `enough` bytes.
 std::string shortened(std::string_view text, std::size_t enough);
+/// Returns a text in quotes for a message, truncated to 40 bytes.
 std::string in_quotes(std::string_view text);
 
-/// Counted from 1; 0 when it is not known.
+/// Returns the line of a mark, from 1; 0 if unknown.
 std::size_t line_of(const YAML::Mark& mark);
 
-/// The length of the longest beginning of `text` that is UTF-8.
+/// Returns the length of the longest prefix of `text` that is UTF-8.
 std::size_t utf8_length(std::string_view text);
 
 }  // namespace vlp

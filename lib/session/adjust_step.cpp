@@ -23,7 +23,7 @@
 namespace vlp {
 namespace {
 
-/// Of each image of a turn, its spot: one a height.
+/// Returns the spot of each image of a rotation in place: one spot per height.
 std::map<std::string, std::string> spots_of(const AdjustSet& set, const AdjustStepInput& input,
                                             AdjustStepResult& result) {
   const SpotCaptures turn = spot_captures(set.frames, input.lamps, input.calibration.camera);
@@ -112,7 +112,7 @@ void add_warnings(AdjustStepResult& result, const MapErrors& map_errors) {
   const AdjustmentResult& found = result.found;
   for (const auto& lamp : found.lamps) {
     if (!lamp.moved) continue;
-    // The adjustment knows more than the check of the map: heights, places, motion.
+    // The adjustment uses more data than the check of the map: heights, places, motion.
     for (const MapError& error : map_errors.errors) {
       if (error.lamps == std::vector<int>{lamp.id}) std::erase(result.warnings, describe(error));
     }
@@ -162,7 +162,7 @@ AdjustStepResult solve_adjustment(const AdjustStepInput& input, HistoryEntry ent
   AdjustStepResult result;
   const Calibration alone = camera_alone(input.calibration);
   const AdjustmentInput all = adjustment_of(input, result);
-  // Inclined captures are left to the adjustment: the check takes all for level.
+  // The check of the map assumes level captures: it skips inclined ones.
   LampCaptures captures{{}, all.lamps, input.lamps_file, input.calibration};
   for (const AdjustmentCapture& capture : all.captures) {
     if (capture.inclination) continue;

@@ -14,47 +14,56 @@
 
 namespace vlp {
 
-/// Captures that were taken together, and what is known of them.
+/// Captures that were taken together, with their table.
 struct AdjustSet {
   std::string name;
   std::vector<Frame> frames;
   CapturesTable captures;
-  /// Those without a `spot` are a turn on the spot; heights are told apart as SpotCaptures does.
+  /// Captures without a `spot` are a rotation in place, grouped by height as in SpotCaptures.
   bool turn = false;
 };
 
-/// Gives sets of one name the paths that they were given by: a spot is one of its set. Throws
-/// std::invalid_argument for a path that stands twice.
+/// Replaces the names of sets that share one name by their paths, because a spot is identified by
+/// the name of its set. `paths` are in the order of `sets`. Throws std::invalid_argument if a path
+/// occurs twice.
 void name_apart(std::vector<AdjustSet>& sets, const std::vector<std::string>& paths);
 
+/// Input of solve_adjustment().
 struct AdjustStepInput {
   std::vector<AdjustSet> sets;
   LampMap lamps;
   std::filesystem::path lamps_file;
   Calibration calibration;
   std::filesystem::path calibration_file;
-  /// Of lamps, and of places, that state none.
+  /// Standard deviations, per axis, of lamps and of places without one of their own.
   std::optional<double> map_sd_m, place_sd_m;
-  /// Of a lens that states none: stated_lens_covariance(); without it such a lens is exact.
+  /// Standard deviation of a lens without a covariance (stated_lens_covariance()). std::nullopt:
+  /// such a lens is exact.
   std::optional<double> lens_sd_px = {};
-  /// How cameras move, and turn, whose captures.csv has no velocity; the latter's standard
-  /// deviation of the yaw rate (motion_of()).
+  /// Motion of captures without velocity and yaw rate in captures.csv, and the standard deviation
+  /// of the yaw rates in captures.csv (motion_of()).
   std::optional<KnownMotion> motion = {};
   double yaw_rate_sd_rad_per_s = 0;
-  /// The covariance that is kept is that of the refined map, else that of the map as surveyed.
+  /// Keeps the covariance and the lamps of the refined map; otherwise those of the surveyed map.
   bool refine_map = false;
 };
 
+/// Result of solve_adjustment().
 struct AdjustStepResult : StepResult {
   AdjustmentResult found;
 };
 
-/// One adjustment of all sets (calibration/adjustment). Metrics: tilt_deg, and where it is known
-/// lever_arm_mm. undetermined, wrong_map. Warns of lamps that have moved, of places and of a lens
-/// that the captures contradict, of residuals that sigma_px does not explain. Throws InputError
-/// when a lamp or a place states no standard deviation, when the lens states one and lens_sd_px
-/// does, too, or the calibration is adjusted already; std::invalid_argument when a camera moves
-/// whose calibration lacks row_time_s or readout.
+/// Adjusts the captures of all sets jointly (calibration/adjustment).
+///
+/// Metrics: tilt_deg, and lever_arm_mm if the lever arm is known. Failures: undetermined,
+/// wrong_map. Warns of moved lamps, of places and of a lens that contradict the captures, and of
+/// residuals larger than sigma_px explains. Places without a standard deviation are ignored with a
+/// warning.
+///
+/// @throws InputError if a lamp has no standard deviation, a place has a standard deviation of 0,
+///         lens_sd_px is given for a lens with a covariance, or the calibration is adjusted already
+/// @throws std::invalid_argument if the camera moves and its calibration lacks row_time_s or
+/// readout
 AdjustStepResult solve_adjustment(const AdjustStepInput& input, HistoryEntry entry);
 
 }  // namespace vlp

@@ -13,20 +13,23 @@
 
 namespace vlp {
 
-/// How the camera of a capture moves: velocity and yaw rate of captures.csv, wherever there are
-/// some, that with the table's standard deviation and this one with that which is given; else as
-/// `otherwise` says, which is nothing for one that stands.
+/// Returns the motion of the camera in a capture: velocity and yaw rate of captures.csv, each
+/// replaced by that of `otherwise` if the table lacks it.
+///
+/// @param otherwise              motion without a table; std::nullopt: the camera stands
+/// @param yaw_rate_sd_rad_per_s  standard deviation of the table's yaw rate; the standard deviation
+///                               of its velocity is in the table
 std::optional<KnownMotion> motion_of(const Capture& capture,
                                      const std::optional<KnownMotion>& otherwise,
                                      double yaw_rate_sd_rad_per_s);
 
-/// The same of each frame; none where all stand.
+/// Returns motion_of() for each frame; an empty vector if the camera stands in all of them.
 std::vector<KnownMotion> motions_of(std::span<const Frame> frames, const CapturesTable& captures,
                                     const std::optional<KnownMotion>& otherwise,
                                     double yaw_rate_sd_rad_per_s);
 
-/// Motion wants to know when each row is read: throws std::invalid_argument when the camera lacks
-/// row_time_s or readout.
+/// Throws std::invalid_argument if the camera lacks row_time_s or readout, which motion
+/// compensation requires.
 void check_row_time(const Camera& camera);
 
 }  // namespace vlp

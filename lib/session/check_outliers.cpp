@@ -13,13 +13,13 @@
 namespace vlp {
 namespace {
 
-/// Fewer errors do not show what is typical of them.
+/// Minimum number of errors for a typical value.
 constexpr std::size_t kMinErrors = 5;
 /// Ratio to the median error.
 constexpr double kMinRatio = 8;
 constexpr double kMmPerM = 1e3;
 
-/// Smaller residuals are no fault of the captures: stations accept a turn that has them on average.
+/// Smaller residuals are acceptable: stations accept a rotation in place with this average.
 constexpr double kMinResidual_px = 0.2;
 
 /// Name of the image and index of the capture in the folder.

@@ -45,7 +45,8 @@ Fix fix_of(const Positioner& positioner, const StationCapture& capture) {
   return positioner.locate(capture.detections, sensors);
 }
 
-/// The captures with places of the camera. Those without a fix have no yaw, and keep theirs.
+/// Returns the captures with places of the camera. Captures without a fix have no yaw and keep
+/// their places.
 std::vector<StationCapture> at_cameras(const KnownPlaces& places, const LampMap& lamps,
                                        const Calibration& levelled) {
   std::vector<StationCapture> captures = places.captures;
@@ -61,7 +62,7 @@ std::vector<StationCapture> at_cameras(const KnownPlaces& places, const LampMap&
   return captures;
 }
 
-/// Of the first lamp of the map over the cameras; 0 without a fix.
+/// Returns the mean height of the first lamp of the map above the cameras, m; 0 without a fix.
 double mean_height_m(const KnownPlaces& places, const LampMap& lamps, const Calibration& levelled) {
   const Positioner positioner(lamps, levelled);
   double height_m = 0;
@@ -75,7 +76,7 @@ double mean_height_m(const KnownPlaces& places, const LampMap& lamps, const Cali
   return fixes > 0 ? height_m / fixes : 0;
 }
 
-/// An offset d acts as a camera that is H d / f beside where it is.
+/// Warns of an offset that equals the lever arm. An offset d acts as a camera displaced by H d / f.
 void warn_of_lever_arm(DispersionResult& result, const KnownPlaces& places, const LampMap& lamps,
                        const Calibration& levelled) {
   const auto& center = levelled.rotation_center;
@@ -94,10 +95,11 @@ void warn_of_lever_arm(DispersionResult& result, const KnownPlaces& places, cons
       1e3 * arm_m.norm(), 1e3 * beside_m.norm()));
 }
 
-/// The captures with their places, which of an axis depend on the calibration.
+/// Function that returns the captures with their places; places of an axis depend on the
+/// calibration.
 using CapturesWith = std::function<std::vector<StationCapture>(const Calibration& calibration)>;
 
-/// How the offset moves with lens and zenith, where these say how well they are known.
+/// Propagates the errors of lens and zenith into the offset, if their covariances are known.
 void pass_on(DispersionResult& result, const CapturesWith& captures_with, const LampCaptures& input,
              DispersionMethod method, DispersionCircle circle) {
   Dispersion& dispersion = result.fit.dispersion;
@@ -118,7 +120,7 @@ void pass_on(DispersionResult& result, const CapturesWith& captures_with, const 
     told = dispersion.by_intrinsics.has_value();
   }
   if (const auto& center = input.calibration.rotation_center; center && center->covariance) {
-    constexpr double least = 1e-5;  // of second order in it: 1e-10 is left
+    constexpr double least = 1e-5;  // smallest step: second-order error 1e-10
     const double sd =
         std::sqrt(center->covariance->trace()) / input.calibration.camera.focal_px().x();
     const double step = std::max(least, sd);
@@ -135,8 +137,8 @@ void pass_on(DispersionResult& result, const CapturesWith& captures_with, const 
       "part of them: vlp-adjust states them");
 }
 
-/// Places of the axis are good to what the lever arm is: what does not go with the zenith goes into
-/// the offset.
+/// Adds the covariance of the lever arm, without its part that depends on the zenith, to that of
+/// the offset. Places of the axis have the uncertainty of the lever arm.
 void add_lever_arm(Dispersion& dispersion, const LampCaptures& input, double height_m) {
   const RotationCenter& center = *input.calibration.rotation_center;
   if (!center.lever_arm_covariance || !dispersion.covariance || !(height_m > 0)) return;
@@ -152,7 +154,7 @@ void add_lever_arm(Dispersion& dispersion, const LampCaptures& input, double hei
 }
 
 void warn_of_few_captures(DispersionResult& result, DispersionMethod method) {
-  constexpr int min_captures = 4;  // three leave two degrees of freedom
+  constexpr int min_captures = 4;  // three have only two degrees of freedom
   if (method != DispersionMethod::camera || result.fit.noise_is_stated ||
       result.fit.dispersion.captures >= min_captures) {
     return;

@@ -13,29 +13,36 @@
 
 namespace vlp {
 
-/// Captures at known places, and how many have none.
+/// Captures at known places.
 struct KnownPlaces {
   std::vector<StationCapture> captures;
-  /// Of each, whose place it is.
+  /// Point to which each place refers, in the order of `captures`: camera or axis.
   std::vector<PlaceOf> of = {};
+  /// Number of captures without a place.
   std::size_t without = 0;
 };
 
-/// A capture is where the table says it is, or else at `place_m`, if that is given, a place of
-/// `place_of`. The inclination is the table's.
+/// Collects the captures at known places, with the inclinations of the table. A place is that of
+/// the table, or `place_m` of the point `place_of` for captures without one in the table.
 KnownPlaces at_known_places(std::span<const Frame> frames, const CapturesTable& table,
                             const std::optional<Eigen::Vector2d>& place_m = {},
                             PlaceOf place_of = PlaceOf::camera);
 
+/// Result of solve_dispersion().
 struct DispersionResult : StepResult {
   DispersionFit fit;
 };
 
-/// What fixes at known places still lack. Places of the axis are taken to the camera by the
-/// calibration's lever arm and the fixes' yaws; without a lever arm: undetermined. Warns of an
-/// offset that equals the lever arm, as places of the axis make it that are taken for the camera's.
-/// Metrics: dispersion_mm, dispersion_offset_px, and where it is known world_mm. wrong_map,
-/// wrong_place, undetermined. Precondition: there is a capture.
+/// Estimates the dispersion offset, the remaining heading-dependent error of fixes, from captures
+/// at known places. Propagates the errors of lens, zenith and lever arm into the result.
+///
+/// Places of the axis are moved to the camera by the calibration's lever arm and the yaw of the
+/// fix; without a lever arm the result is undetermined. Warns of an offset that equals the lever
+/// arm, which results if places of the axis are labeled as places of the camera.
+///
+/// Metrics: dispersion_mm, dispersion_offset_px, and world_mm if the world offset is known.
+/// Failures: wrong_map, wrong_place, undetermined.
+/// @pre at least one capture
 DispersionResult solve_dispersion(const LampCaptures& input, const KnownPlaces& places,
                                   DispersionMethod method, DispersionCircle circle,
                                   HistoryEntry entry);

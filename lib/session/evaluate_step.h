@@ -13,38 +13,40 @@
 
 namespace vlp {
 
+/// Result of evaluate_fixes().
 struct EvaluateResult : StepResult {
   Evaluation evaluation;
-  /// Of captures without a fix that no gate asks for, to be said beside the verdict; may be empty.
+  /// Caution for the verdict: captures without a fix that no gate limits; may be empty.
   std::string caution;
 };
 
-/// The distance within which captures are of one place: 1 mm, and what a turn about the
-/// calibration's lever arm adds.
+/// Returns the distance within which captures are at the same place, in m: 1 mm plus twice the
+/// length of the calibration's lever arm.
 double place_radius_m(const Calibration& calibration);
 
-/// What fixes are worth. Metrics: those that can be gates. undetermined: no capture has a fix.
-/// Throws InputError when image names do not match.
+/// Evaluates fixes against ground truth. Metrics: all that gates can limit (metrics_of()). Failure:
+/// undetermined, if no capture has a fix. Throws InputError if the image names do not match.
 EvaluateResult evaluate_fixes(const EvaluationInput& input, const std::vector<Gate>& gates);
 
-/// A drive along a commanded line.
+/// Fixes of a drive along a commanded straight line.
 struct Drive {
   FromFile<FixRow> fixes;
   CommandedLine commanded_m;
 };
 
-/// What a report of fixes shows. References are to what outlives it.
+/// Content of a report of fixes. The referenced objects must outlive it.
 struct EvaluationReport {
   const EvaluationInput& input;
   const EvaluateResult& result;
   LampMap lamps;
   std::vector<Drive> drives;
-  /// What else it shows: all gates, of the steps before, too; the calibration, its pictures, how
-  /// the fixes were evaluated. report_page() adds title, figures, notes and pictures of the fixes.
+  /// Other content: the gates of all steps, the calibration, its plots, and the history entry of
+  /// the evaluation. report_page() adds title, metrics, notes and plots of the fixes.
   Report page;
 };
 
-/// report_html() of all of it. Throws InputError when no line can be fitted to a drive.
+/// Renders the report as HTML (report_html()). Throws InputError if no line can be fitted to a
+/// drive.
 std::string report_page(EvaluationReport report);
 
 }  // namespace vlp

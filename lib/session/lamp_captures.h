@@ -18,7 +18,7 @@ struct LampCaptures {
   LampMap lamps;
   std::filesystem::path lamps_file;
   Calibration calibration;
-  /// Motion of the camera in each frame; empty: it stands still.
+  /// Motion of the camera in each frame; empty: the camera stands.
   std::vector<KnownMotion> motions = {};
 };
 

@@ -18,7 +18,7 @@
 namespace vlp {
 namespace {
 
-/// A region of more of the image than this is all of it.
+/// Fraction of the image above which the region is the whole image.
 constexpr double kWholeImage = 0.999;
 
 IntrinsicsReport make_report(const LensEstimate& lens) {

@@ -13,20 +13,21 @@
 
 namespace vlp {
 
-/// Images of a board and what is known of the camera.
+/// Images of a board and the known properties of the camera.
 struct LensInput {
-  /// Those that are not rejected are used.
+  /// Observations of the board; rejected images are ignored.
   Observations seen;
   Board board;
   std::filesystem::path board_file;
   /// Id, lens model, row time, readout and pixel pitch; imager and intrinsics are estimated.
   Camera camera;
-  /// As in LensViews.
+  /// Every n-th view is held out of the solve for validation (LensViews); 0: none.
   int held_out = 0;
   WarpChoice warp = WarpChoice::automatic;
   bool choose_lens_model = false;
 };
 
+/// Result of solve_lens().
 struct LensResult : StepResult {
   LensEstimate lens;
 };
@@ -36,15 +37,24 @@ struct LensResult : StepResult {
 /// Failures: wrong_board, undetermined. Throws std::invalid_argument as BoardLattice does.
 LensResult solve_lens(LensInput input, HistoryEntry entry);
 
-/// Returns rms_px, uncertainty_px, halves_px, coverage, views, board_tilt_deg; board_print_px of a
-/// board with print_sd; with the edges of
-/// AprilTags mtf50, mtf50_worst_ratio, mtf50_asymmetry, black_ratio, local_loss, local_shadow.
+/// Returns the metrics rms_px, uncertainty_px, coverage, views and board_tilt_deg, and if available
+///
+///   halves_px                           if both halves of the views could be solved
+///   board_print_px                      for a board with print_sd
+///   mtf50, mtf50_worst_ratio, mtf50_asymmetry, black_ratio, local_loss, local_shadow
+///                                       from the edges of AprilTags
 std::vector<Metric> lens_metrics(const LensEstimate& lens);
 
-/// Returns the limits of the metrics unless others are stated, from rendered and real boards of 800
-/// to 4000 px. rms_px above 1: blurred images or the wrong lens model. uncertainty_px above 2 or
-/// halves_px above 1: too few views, or too similar ones. The others ask that the board was seen in
-/// most of the image, in several places, and tilted, which no metric of the fit shows.
+/// Returns the default limits of lens_metrics(), chosen from rendered and real boards of 800 to
+/// 4000 px.
+///
+///   rms_px <= 1            larger: blurred images or the wrong lens model
+///   uncertainty_px <= 2    larger: too few views, or too similar ones
+///   halves_px <= 1         larger: too few views, or too similar ones
+///   coverage >= 0.4, views >= 6, board_tilt_deg >= 20
+///
+/// The last three require a tilted board in several places over most of the image, which the
+/// metrics of the fit do not check.
 std::vector<Gate> lens_gates();
 
 }  // namespace vlp

@@ -11,33 +11,36 @@
 
 namespace vlp {
 
-/// The positions of the cameras of a set of images.
+/// Position fixes of the cameras of a set of images.
 struct LocatedImages {
-  /// The detections that the fixes rest on.
+  /// Detections from which the fixes are estimated.
   Observations seen;
   LocateResult located;
 };
 
-/// Detects the lamps in images (observe_lamps()) and locates the camera of each. `input` states
-/// everything except frames. Where a camera's tilt is estimated, its lamps are detected again in
-/// the plane that is level by its fix (redetect_tilted()).
+/// Detects the lamps in images (observe_lamps()) and locates the camera of each image. `input`
+/// holds everything except the frames. If the tilt of a camera is estimated, its lamps are detected
+/// again in the plane that is level by its fix (redetect_tilted()).
 ///
-/// Skipped images and remarks of the intake are part of the result, which fails as locate_frames()
-/// does, or if no lamp is identified. Throws as observe_lamps() and locate_frames() do.
+/// Skipped images and remarks of the intake are part of the result. It fails as locate_frames()
+/// does, or if no lamp is identified.
+/// @throws as observe_lamps() and locate_frames()
 LocatedImages locate_images(const LampImages& images, ImageUse use, LocateInput input,
                             const FrontendOptions& options, const IntakeProgress& progress = {});
 
-/// Detects the lamps of the named images in their level planes again: a frame per image, by name.
+/// Function that detects the lamps of the named images again, in their level planes. Returns a
+/// frame per image, by name.
 using Redetector = std::function<std::vector<Frame>(const LevelRotations&)>;
 
-/// Lamps are discs in the level plane; centres that are detected in another plane are biased. For
-/// captures whose tilt is estimated, detections are repeated in the plane that is level by the fix,
-/// until the fix moves by less than a tenth of its standard deviations. Where the tilt may be large
-/// or there is no fix yet, the first repetition fits ellipses, which are close to the image of a
-/// disc in any plane. A fix that a detection in its plane does not confirm is discarded. A capture
-/// without a fix either way keeps the detection with more lamps.
+/// Repeats the detection of lamps in captures whose tilt is estimated, in the plane that is level
+/// by the fix. Stops when the fix moves by less than a tenth of its standard deviations.
 ///
-/// Replaces the frames of `input`. Returns the level rotations of those that changed.
+/// Reason: lamps are discs in the level plane, and centers detected in another plane are biased. If
+/// the tilt may be large or no fix exists yet, the first repetition fits ellipses. They are close
+/// to the image of a disc in any plane. A fix that a detection in its plane does not confirm is
+/// discarded. A capture without a fix either way keeps the detection with more lamps.
+///
+/// Replaces the frames of `input`. Returns the level rotations of the frames that changed.
 LevelRotations redetect_tilted(LocateInput& input, const Redetector& redetect);
 
 }  // namespace vlp

@@ -39,7 +39,7 @@ Sensors sensors_of(const std::string& image, const LocateInput& input) {
                                           input.height_sd_m.value_or(0), input.yaw_sd_rad};
   }
   if (input.height_sd_m && capture.z_m) {
-    // The table's is the camera's.
+    // The height in the table is that of the camera.
     const double above_m = input.how.mount ? input.how.mount->position_in_robot_m.z() : 0;
     sensors.height = KnownHeight{*capture.z_m - above_m, *input.height_sd_m};
   }
@@ -48,7 +48,7 @@ Sensors sensors_of(const std::string& image, const LocateInput& input) {
 
 namespace {
 
-/// The frames that come within this before each, latest first, by their time stamps.
+/// Longest time between the frames of a joint fix.
 constexpr double kLongestTogether_s = 0.2;
 
 class EarlierFrames {
@@ -81,7 +81,8 @@ class EarlierFrames {
   std::multimap<double, std::size_t> by_time_;
 };
 
-/// What drove otherwise in between, or was another pass, is fixed by itself.
+/// Estimates a joint fix with the earlier frames. If that fails, as after a change of velocity,
+/// estimates the fix of the frame alone.
 Fix fix_of(const Frame& frame, const Positioner& positioner, const EarlierFrames& frames,
            const Sensors& sensors) {
   const auto earlier = frames.before(sensors.time_s);
@@ -113,7 +114,7 @@ void check_motion(const LocateInput& input) {
   if (motion) check_row_time(input.calibration.camera);
 }
 
-/// Returns the input with the stated noise in all detections.
+/// Returns the input with LocateInput::sigma_px in all detections.
 LocateInput with_sigma(LocateInput input) {
   for (Frame& frame : input.frames) {
     for (Detection& detection : frame.detections) detection.sigma_px = input.sigma_px;
@@ -152,8 +153,8 @@ FixRow row_of(const Frame& frame, const CapturesTable& captures, const Fix& fix,
   return row;
 }
 
-/// Warns if the residuals are much larger than the stated noise, and returns true. `factor` is that
-/// by which standard deviations are scaled.
+/// Warns if the residuals are much larger than the given noise, and returns true. `factor` scales
+/// the standard deviations.
 bool warn_of_noise(LocateResult& result, const std::vector<Frame>& frames, double factor) {
   double stated_px = 0;
   for (const Frame& frame : frames) {
@@ -175,7 +176,7 @@ bool warn_of_noise(LocateResult& result, const std::vector<Frame>& frames, doubl
   return true;
 }
 
-/// Returns true if nothing is stated about the motion of the camera.
+/// Returns true if no motion of the camera is given.
 bool is_taken_to_stand(const LocateInput& input) {
   return std::none_of(input.frames.begin(), input.frames.end(), [&](const Frame& frame) {
     return sensors_of(frame.image, input).motion.has_value();
@@ -208,7 +209,7 @@ std::optional<double> find_speed_m_per_s(const std::vector<Fix>& fixes) {
   return median(speeds);
 }
 
-/// Warns if motion explains failed frames or residuals of a camera that is taken to stand.
+/// Warns if motion explains failed frames or residuals of a camera that is assumed to stand.
 /// Criterion: half as many failures, or half the residual.
 void warn_of_motion(LocateResult& result, const LocateInput& input, bool is_noisy) {
   const std::size_t failed = input.frames.size() - count_fixes(result.fixes);
@@ -226,7 +227,7 @@ void warn_of_motion(LocateResult& result, const LocateInput& input, bool is_nois
   const bool fits =
       is_noisy ? moving_px && *moving_px < *standing_px / 2 : 2 * still_failed < failed;
   const auto speed_m_per_s = find_speed_m_per_s(fixes);
-  // Velocity and yaw rate take up what few residuals leave.
+  // Velocity and yaw rate fit the errors if there are few residuals.
   constexpr double min_degrees_of_freedom = 12;
   if (!fits || !speed_m_per_s || *speed_m_per_s > max_speed_m_per_s ||
       sum_residuals(fixes).degrees_of_freedom < min_degrees_of_freedom) {
@@ -238,14 +239,15 @@ void warn_of_motion(LocateResult& result, const LocateInput& input, bool is_nois
       *speed_m_per_s));
 }
 
-/// Locates all frames and computes what stated errors of calibration and map add to the residuals.
+/// Locates all frames and computes the contribution of the reported errors of calibration and map
+/// to the residuals.
 std::vector<Fix> locate_with_expected_residuals(const LocateInput& input) {
   PositionerOptions how = input.how;
   how.computes_common_chi_squared = true;
   return locate_all(input, how);
 }
 
-/// Multiplies the stated noise of all detections, and leaves out those that `fixes` reject.
+/// Scales the given noise of all detections and removes the detections that `fixes` reject.
 LocateInput scale_stated_noise(LocateInput input, const std::vector<Fix>& fixes, double factor) {
   for (std::size_t i = 0; i < input.frames.size(); ++i) {
     const Fix& fix = fixes[i];
@@ -264,7 +266,7 @@ LocateInput scale_stated_noise(LocateInput input, const std::vector<Fix>& fixes,
   return input;
 }
 
-/// Locates frames again, with scaled noise, from the lamps that their fixes rest on.
+/// Locates frames again, with scaled noise, from the lamps that their fixes use.
 void locate_again(const LocateInput& input, const PositionerOptions& how, double factor,
                   std::vector<Fix>& fixes) {
   std::vector<Fix> again = locate_all(scale_stated_noise(input, fixes, factor), how);
@@ -277,8 +279,8 @@ void locate_again(const LocateInput& input, const PositionerOptions& how, double
   }
 }
 
-/// Locates all frames, with the noise that the residuals show: in place of noise that is not
-/// stated, and where stated noise is too small. Returns true if the noise is known.
+/// Locates all frames. Uses the noise estimated from the residuals if none is given or the given
+/// one is too small. Returns true if the noise is known.
 bool locate_with_noise(const LocateInput& input, LocateResult& result) {
   result.fixes = locate_with_expected_residuals(input);
   std::vector<Fix> stated, unstated;
@@ -299,7 +301,8 @@ bool locate_with_noise(const LocateInput& input, LocateResult& result) {
   bool is_known = true;
   if (!unstated.empty()) {
     auto unstated_factor = estimate_noise_factor(sum_residuals(unstated));
-    // Few frames without stated noise may have no redundancy: the others show the noise in pixels.
+    // Few frames without given noise may have no redundancy: then the noise in pixels is estimated
+    // from all frames.
     if (!unstated_factor) unstated_factor = estimate_noise_px(sum_residuals(result.fixes));
     is_known = unstated_factor.has_value();
     if (is_known) {
@@ -332,8 +335,8 @@ void warn_of_image(LocateResult& result, const LocateInput& input) {
       outside, width, height));
 }
 
-/// A lens that boards showed in part of the image is only known there. Marks the fixes that rest on
-/// lamps elsewhere.
+/// Marks the fixes that use lamps outside the calibrated region of the image, where the board was
+/// not seen.
 void mark_outside_region(LocateResult& result, const LocateInput& input) {
   const auto& report = input.calibration.intrinsics_report;
   if (!report || report->region_px.empty()) return;
@@ -375,7 +378,7 @@ void warn_of_captures(LocateResult& result, const LocateInput& input) {
       without, input.frames.size(), input.frames.front().image, captures.begin()->first));
 }
 
-/// Finds errors of the lamp map by the captures in which the camera stands.
+/// Finds errors of the lamp map from the captures in which the camera stands.
 MapErrors find_errors_while_standing(const LocateInput& input, const std::vector<Fix>& fixes) {
   std::vector<Frame> frames;
   MapErrorOptions options;

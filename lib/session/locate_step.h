@@ -15,54 +15,61 @@
 
 namespace vlp {
 
-/// Captures to locate, and how.
+/// Captures to locate, with the options of the positioner.
 struct LocateInput {
   std::vector<Frame> frames;
   LampMap lamps;
   Calibration calibration;
-  /// What is known of them besides their images; inclinations count, wherever there are some.
+  /// Table of the captures: times, motions, heights, yaws. Its inclinations are always used.
   CapturesTable captures = {};
   PositionerOptions how = {};
-  /// Standard deviation of the lamps' pixels; overrides that of the detections.
+  /// Standard deviation of the lamp positions in the image, per axis; overrides that of the
+  /// detections.
   std::optional<double> sigma_px = {};
-  /// Standard deviation of the inclination's angles; 0 leaves it out.
+  /// Standard deviation of the angles of an inclination in `captures`, rad; 0: exact.
   double inclination_sigma_rad = 0;
-  /// Takes height and yaw from `captures` if one lamp is seen.
+  /// Uses height and yaw of `captures` if only one lamp is detected.
   bool one_lamp = false;
-  /// Standard deviation of that yaw; 0: exact. That of the height is height_sd_m.
+  /// Standard deviation of this yaw; 0: exact. The standard deviation of the height is height_sd_m.
   double yaw_sd_rad = 0;
-  /// Cameras that move and lean. Where `captures` has no velocity: how fast the camera, or the
-  /// robot, can drive and turn; nothing: it stands. Velocities in `captures` count wherever there
-  /// are some, with that standard deviation of the yaw rate.
+  /// Prior of the motion of captures without velocity and yaw rate in `captures`: speed and yaw
+  /// rate of the camera or robot. std::nullopt: the camera stands. Velocities and yaw rates in
+  /// `captures` are always used, yaw rates with the standard deviation `yaw_rate_sd_rad_per_s`.
   std::optional<KnownMotion> motion = {};
   double yaw_rate_sd_rad_per_s = 0;
-  /// Standard deviation of roll and pitch about level where `captures` has no inclination; 0:
-  /// level.
+  /// Standard deviation of roll and pitch of captures without an inclination in `captures`, about
+  /// level; 0: level.
   double lean_sd_rad = 0;
-  /// Standard deviation of the z_m of `captures`, which then counts.
+  /// Standard deviation of z_m of `captures`. std::nullopt: z_m is not used as a measurement.
   std::optional<double> height_sd_m = {};
-  /// Of every lamp, too.
+  /// Computes the offsets of all lamps (StepResult::lamp_offsets).
   bool lamp_offsets = false;
-  /// Captures that are fixed together, with one velocity: this and those before it, within 0.2 s.
+  /// Number of captures in a joint fix with a common velocity: the capture and those up to 0.2 s
+  /// before it.
   int frames_together = 1;
 };
 
-/// What is known of a capture besides its image.
+/// Returns the sensor data of a capture: motion, time, inclination, height and yaw.
 Sensors sensors_of(const std::string& image, const LocateInput& input);
 
+/// Result of locate_frames().
 struct LocateResult : StepResult {
-  /// Of each frame.
+  /// Fix of each frame, in the order of LocateInput::frames.
   std::vector<Fix> fixes;
   std::vector<FixRow> rows;
   FixSummary summary;
 };
 
-/// The fix of each frame. Metrics: residual_ratio, the noise that the residuals show over the
-/// largest that is stated, where all state it. Where not every detection states its sigma_px, one
-/// is taken from the residuals, if they show it. Throws std::invalid_argument when a camera moves
-/// whose calibration lacks row_time_s or readout. Warns of residuals that the stated noise does not
-/// explain, of detections outside the image or where the lens is not known (region_px), of images
-/// that `captures` lacks, of lamps left out. undetermined: no frame has a fix.
+/// Estimates the fix of each frame.
+///
+/// Frames with detections without sigma_px use the noise estimated from the residuals, if these
+/// have redundancy. Standard deviations follow residuals that exceed the reported noise.
+///
+/// Metrics: residual_ratio, the noise estimated from the residuals divided by the largest sigma_px,
+/// if all detections have one. Failure: undetermined, if no frame has a fix.
+/// Warnings: residuals larger than the reported noise explains; detections outside the image or the
+/// calibrated region (region_px); images missing in `captures`; rejected lamps.
+/// @throws std::invalid_argument if a camera moves and its calibration lacks row_time_s or readout
 LocateResult locate_frames(const LocateInput& input);
 
 }  // namespace vlp

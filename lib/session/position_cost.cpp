@@ -16,8 +16,8 @@ namespace {
 
 /// A pose needs three lamps. Where lights are left out, three others may agree by chance.
 constexpr std::size_t kMinLights = 3, kMinMajority = 4;
-/// Standard deviation of the lean of a camera that is mounted, or held, to look up.
-/// fix_body_frame() refuses more than five times as much.
+/// Standard deviation of roll and pitch of a camera that is mounted, or held, to look up.
+/// fix_body_frame() rejects more than five times this value.
 constexpr double kLeanSd_rad = 0.15;
 constexpr double kMaxSquare = kMaxResidualSds * kMaxResidualSds;
 
@@ -141,7 +141,7 @@ std::vector<double> squared_residuals(const GroupedLights& image, const RowTimeC
   return squares;
 }
 
-/// Groups that can be one lamp at most, whatever the candidate.
+/// Returns the groups that can be one lamp at most for every candidate.
 std::vector<bool> are_unique(const RowTimeCandidates& found) {
   std::vector<bool> unique(found.groups.size(), true);
   for (const RowTimeCandidate& candidate : found.candidates) {
@@ -159,7 +159,7 @@ std::vector<double> compute_position_costs(const RowTimeCandidates& found,
                                            const LampMap& lamps, const std::optional<Lens>& lens) {
   const std::vector<bool> unique = are_unique(found);
   const Tolerance& tolerance = lens ? kWithLens : kWithoutLens;
-  // By candidate and group, of each image.
+  // Squared residuals of the images by candidate and group.
   std::vector<std::vector<std::vector<double>>> squares(
       found.candidates.size(), std::vector<std::vector<double>>(found.groups.size()));
   for (GroupedLights image : images) {

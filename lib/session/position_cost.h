@@ -30,30 +30,36 @@ struct GroupedLights {
   std::vector<GroupedLight> lights;
 };
 
-/// Computes how badly the places of the lights in the images fit those of the lamps that each
-/// candidate assigns to them.
+/// Computes the position cost of each candidate: the mismatch between the positions of the lights
+/// in the images and the positions of the lamps that the candidate assigns to them.
 ///
-/// @param images  only those with three lights or more count
+/// @param images  images with fewer than three lights are ignored
 /// @param lens    std::nullopt: a pinhole camera with half of the image's diagonal as focal length
-/// @return        cost of each candidate, in the unit of RowTimeCandidate::cost; all 0 where no
-///                image counts
+/// @return        cost of each candidate, in the unit of RowTimeCandidate::cost; all 0 if no image
+///                has three lights
 ///
-/// In each image the pose of a camera below the lamps, which leans by 0.15 rad (sd), is fitted to
-/// the lights with a lamp. fix_body_frame() leaves a minority of wrong ones out, where four agree,
-/// and refuses a mirrored map. The squared residual of a light is
+/// In each image the pose of a camera below the lamps is fitted to the lights with a lamp; its roll
+/// and pitch have a prior of 0.15 rad (sd). fix_body_frame() rejects a minority of wrong lights if
+/// four agree, and rejects a mirrored map. The squared residual of a light is
 ///
 ///     r^2 = |pixel - predicted pixel|^2 / sd^2 + (lean / 0.15 rad)^2 / lights,
-///     sd^2 = sigma_px^2 + (spread_px max(e, sd_m / spread_m))^2,
+///     sd^2 = sigma_px^2 + (spread_px max(e, sd_m / spread_m))^2
 ///
-/// spread_px and spread_m the root mean squared distances of the lights and of their lamps from
-/// their mean, sd_m the one that the map states, and e = 0.03 with a lens (what a lamp map that was
-/// measured by hand, and a camera that drives, change), 0.1 without (distortion and lamps at
-/// several heights as well). It is kMaxResidualSds^2 at most, and of lights without a lamp or in an
-/// image without a pose. The cost is
+/// with
 ///
-///     sum over groups of log(1 + median over images of r^2):
+///     lean       tilt by roll and pitch
+///     spread_px  root mean squared distance of the lights from their mean
+///     spread_m   root mean squared distance of their lamps from their mean
+///     sd_m       standard deviation of the lamp positions in the map
+///     e          0.03 with a lens: covers a lamp map measured by hand and a moving camera;
+///                0.1 without: covers distortion and lamps at several heights as well
 ///
-/// an error of the map or of the lens is the same in all images, so that images do not add up.
+/// r^2 is limited to kMaxResidualSds^2, the value for lights without a lamp or in an image without
+/// a pose. The cost is
+///
+///     sum over groups of log(1 + median over images of r^2).
+///
+/// An error of the map or of the lens is the same in all images; therefore images are not summed.
 std::vector<double> compute_position_costs(const RowTimeCandidates& found,
                                            std::span<const GroupedLights> images,
                                            const LampMap& lamps, const std::optional<Lens>& lens);

@@ -46,7 +46,7 @@ RotationFit fit_of(const SpotCaptures& spot, const Camera& camera, RotationMetho
   return fit_circle_centers(spot, camera).mean;
 }
 
-/// The zenith's point, and the lever arm where there is one.
+/// Returns the zenith point and, if known, the lever arm.
 Eigen::VectorXd solved_of(const RotationCenter& center) {
   Eigen::VectorXd solved(center.lever_arm_m ? 4 : 2);
   solved.head<2>() = zenith_point(center);
@@ -54,8 +54,8 @@ Eigen::VectorXd solved_of(const RotationCenter& center) {
   return solved;
 }
 
-/// How zenith and lever arm move with the lens, where that says how well it is known. `center_with`
-/// is the centre with another lens, or nothing.
+/// Propagates the errors of the lens into zenith and lever arm, if the covariance of the lens is
+/// known. `center_with` estimates the center with another lens; std::nullopt if that fails.
 void pass_on_lens(
     RotationCenter& center, const LampCaptures& input,
     const std::function<std::optional<RotationCenter>(const Camera& camera)>& center_with,
@@ -88,8 +88,8 @@ bool has_same_sightings(const SpotCaptures& a, const SpotCaptures& b) {
                     });
 }
 
-/// Passes on the lens's errors through a fit of the same sightings: a fit that leaves out others
-/// differs by more than the lens does.
+/// Propagates the errors of the lens through a fit of the same sightings. A fit that rejects other
+/// sightings changes by more than the lens causes.
 void pass_on_lens(RotationResult& result, const LampCaptures& input, RotationMethod method) {
   const auto center_with = [&](const Camera& camera) -> std::optional<RotationCenter> {
     const SpotCaptures spot = spot_captures(input.frames, input.lamps, camera);
@@ -101,7 +101,7 @@ void pass_on_lens(RotationResult& result, const LampCaptures& input, RotationMet
   pass_on_lens(result.fit.center, input, center_with, result);
 }
 
-/// A height in metres, without a sign where it rounds to zero.
+/// Formats a height in meters, without a sign if it rounds to zero.
 std::string metres(double z_m) {
   const std::string text = fmt::format("{:.3f}", z_m);
   return text == "-0.000" ? "0.000" : text;
@@ -151,8 +151,8 @@ void add_metrics(RotationResult& result) {
   }
 }
 
-/// Finds errors of the map by the captures in which the camera stands. Of moving cameras, whose
-/// lamps are sheared by some millimetres, only errors of the map as a whole are found.
+/// Finds errors of the map from the captures in which the camera stands. From captures of a moving
+/// camera, which shear lamps by several millimeters, finds only errors of the map as a whole.
 MapErrors find_errors(const LampCaptures& input, const Calibration& calibration,
                       double min_offset_px) {
   std::vector<Frame> frames;
@@ -199,7 +199,7 @@ void blame_map(const LampCaptures& input, const Calibration& calibration, StepRe
   const bool has_lamps = std::any_of(found.errors.begin(), found.errors.end(),
                                      [](const MapError& error) { return !error.lamps.empty(); });
   if (found.errors.empty() || (!has_lamps && result.failure == StepFailure::wrong_map)) return;
-  // A fit that diverges because of a lamp gives advice that does not help.
+  // The advice of a fit that diverges because of a lamp is misleading.
   result.fail(StepFailure::wrong_map, describe(found.errors), input.lamps_file);
   for (const MapError& error : found.errors) std::erase(result.warnings, describe(error));
 }

@@ -10,40 +10,45 @@
 
 namespace vlp {
 
-/// Without rotation centre and dispersion.
+/// Returns the camera part of a calibration, without rotation center and dispersion.
 Calibration camera_alone(const Calibration& calibration);
 
-/// Checks the lamp map by the captures in which the camera stands (calibration/map/map_errors.h).
-/// Warns of lamps that hang elsewhere. If the map cannot be used the step fails: wrong_map.
+/// Checks the lamp map with the captures in which the camera stands (calibration/map/map_errors.h).
+/// Adds warnings of lamps that hang elsewhere to `result`. Fails with wrong_map if the map is
+/// unusable.
 MapErrors check_map(const LampCaptures& input, const Calibration& calibration, StepResult& result);
 
-/// Changes the failure of a step to wrong_map if the lamp map has errors, and its reason to these.
+/// Replaces the failure of a step by wrong_map if the lamp map has errors, and its message by a
+/// description of them.
 void blame_map(const LampCaptures& input, const Calibration& calibration, StepResult& result);
 
+/// Estimator of the rotation center.
 enum class RotationMethod {
   axis,   // fit_turning_axis()
   joint,  // fit_joint_center()
   circle  // fit_circle_centers()
 };
 
+/// Result of solve_rotation().
 struct RotationResult : StepResult {
   SpotCaptures spot;
   RotationFit fit;
   CircleCenters circles;
 };
 
-/// Rotation centre and tilt from captures of a turn on the spot. Metrics: rotation_px,
-/// rotation_spread_px, tilt_deg, and where they are known rotation_sd_px, lever_arm_mm. wrong_map,
-/// undetermined.
+/// Estimates rotation center and tilt from captures of a rotation in place. Metrics: rotation_px,
+/// tilt_deg, and if available rotation_spread_px, rotation_sd_px, lever_arm_mm. Failures:
+/// wrong_map, undetermined.
 RotationResult solve_rotation(const LampCaptures& input, RotationMethod method, HistoryEntry entry);
 
+/// Result of solve_levelling().
 struct LevellingResult : StepResult {
   Levelling levelling;
 };
 
-/// Tilt, and on request the lamp map, from captures taken anywhere (calibration/levelling).
-/// Metrics: tilt_deg. wrong_map, undetermined. Throws std::invalid_argument when a camera moves
-/// whose calibration lacks row_time_s or readout.
+/// Estimates the tilt from captures taken anywhere (calibration/levelling), and the lamp map if
+/// `refine_map` is set. Metrics: tilt_deg. Failures: wrong_map, undetermined. Throws
+/// std::invalid_argument if the camera moves and its calibration lacks row_time_s or readout.
 LevellingResult solve_levelling(const LampCaptures& input, bool refine_map, HistoryEntry entry);
 
 }  // namespace vlp

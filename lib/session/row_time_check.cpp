@@ -33,11 +33,11 @@ std::string compare_row_times(const RowTime& measured, const StatedRowTime& stat
 namespace {
 
 /// Collects the periods of identified lamps. A period found by modulation is excluded: its search
-/// begins at the stated row time.
+/// begins at the given row time.
 std::vector<MeasuredPeriod> collect_lamp_periods(const std::vector<Observation>& images) {
   std::vector<MeasuredPeriod> periods;
   for (const Observation& image : images) {
-    if (!image.is_kept()) continue;  // copies, and images of another camera
+    if (!image.is_kept()) continue;  // excludes copies and images of another camera
     for (const Light& light : image.lights) {
       const bool is_measured = light.kind == LightKind::lamp && light.lamp &&
                                !light.by_modulation && trustworthy(light.stripes);

@@ -14,14 +14,14 @@
 
 namespace vlp {
 
-/// Row time that a file or an option states.
+/// Row time given by a file or an option.
 struct StatedRowTime {
   double row_time_s;
   /// Name of the file or of the option.
   std::string source;
 };
 
-/// Row time measured from identified lamps, compared with the stated one.
+/// Row time measured from identified lamps, compared with the given one.
 struct RowTimeCheck {
   /// std::nullopt: fewer than three lamps show trustworthy stripes.
   std::optional<RowTime> measured = {};
@@ -36,7 +36,7 @@ struct RowTimeCheck {
 std::string compare_row_times(const RowTime& measured, const StatedRowTime& stated);
 
 /// Estimates the row time from the identified lamps of the kept images (estimate_row_time()) and
-/// compares it with the stated one. They contradict each other if
+/// compares it with the given one. They contradict each other if
 ///
 ///     |log(measured / stated)| > kLampDrift + 3 sd / measured.
 ///
@@ -47,17 +47,17 @@ RowTimeCheck check_row_time(const std::vector<Observation>& images, const LampMa
                             const StatedRowTime& stated);
 
 /// Finds another row time that makes the lights of the images lamps of the map, by their periods
-/// and places, however they were identified (choose_row_time()): a wrong row time leaves lights
-/// unknown or exchanges lamps.
+/// and positions, independently of their identification (choose_row_time()): a wrong row time leaves
+/// lights unknown or exchanges lamps.
 ///
-/// @return  the contradiction in one line; empty without at least three lamps that contradict the
-///          stated row time as in check_row_time()
+/// @return  the contradiction in one line; empty unless at least three lamps contradict the given
+///          row time as in check_row_time()
 std::string find_row_time_error(const std::vector<Observation>& images, const LampMap& lamps,
                                 const std::optional<Lens>& lens, const StatedRowTime& stated);
 
-/// Returns the error of check_row_time() with the row time of `camera`, if there is a result of the
-/// images. Otherwise, and if identified lamps do not contradict it because each was taken for its
-/// neighbour, returns that of find_row_time_error(). Returns an empty string if the row time is
+/// Returns the error of check_row_time() for the row time of `camera`, if the images gave a result.
+/// Otherwise, and if identified lamps agree because each was taken for its neighbor, returns the
+/// error of find_row_time_error(). Returns an empty string if the row time is
 /// unknown.
 std::string describe_row_time_error(const std::vector<Observation>& images, const LampMap& lamps,
                                     const Camera& camera, const std::string& source,

@@ -20,8 +20,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// The lights of all folders' images with their periods, and the images' sizes. LightPeriod::image
-/// counts through all folders.
+/// Lights of the images of all folders with their periods, and the sizes of the images.
+/// LightPeriod::image is an index into the images of all folders.
 struct PeriodsOfImages {
   std::vector<LightPeriod> lights;
   std::vector<std::array<int, 2>> sizes_px;
@@ -37,8 +37,8 @@ struct PeriodsOfImages {
     }
   }
 
-  /// The lights of each image by their groups. A group that several lights of an image belong to is
-  /// left out there: one of them is not the lamp.
+  /// Returns the lights of each image with their groups. Omits a group in an image with several of
+  /// its lights, because at most one of them is the lamp.
   std::vector<GroupedLights> by_group(const std::vector<PeriodGroup>& groups) const {
     std::vector<GroupedLights> images;
     for (const std::array<int, 2>& size_px : sizes_px) images.push_back({size_px, {}});
@@ -91,7 +91,7 @@ SeenLights see_lights(const std::vector<fs::path>& folders, const LampMap& lamps
     imager_px = calibration->camera.imager_px;
     if (!readout) readout = calibration->camera.readout;
   }
-  // The estimate must not depend on the row time that is stated.
+  // The estimate must not depend on the given row time.
   if (!with_row_time) seen.camera.row_time_s.reset();
   std::vector<std::vector<fs::path>> images;
   std::vector<fs::path> all;
@@ -154,7 +154,7 @@ RowTimeStepResult find_row_time(const SeenLights& seen,
   result.calibration.camera.readout = seen.camera.readout;
   entry.part = "camera";
   auto& history = result.calibration.history;
-  std::erase_if(history, [&](const HistoryEntry& other) {  // of a search before
+  std::erase_if(history, [&](const HistoryEntry& other) {  // entry of an earlier search
     return other.part == "camera" && other.program == entry.program &&
            other.options.find("--row-time") != std::string::npos;
   });

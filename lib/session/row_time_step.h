@@ -16,9 +16,9 @@
 
 namespace vlp {
 
-/// The lights in folders of images, whatever their lamps.
+/// Lights in folders of images, not identified as lamps.
 struct SeenLights {
-  /// The observations of each folder.
+  /// Observations of each folder.
   std::vector<Observations> folders;
   DetectorCamera camera;
 };
@@ -33,23 +33,24 @@ SeenLights see_lights(const std::vector<std::filesystem::path>& folders, const L
 /// Adds the remarks of all folders to the result of a step, see add_remarks().
 void add_remarks(const SeenLights& seen, StepResult& result);
 
-/// Chooses a row time by periods and duties of the lights in the images of each folder. Uses their
-/// places, too, if several row times fit (compute_position_costs()).
+/// Chooses a row time by periods and duty cycles of the lights in the images of each folder. Also
+/// uses their positions if several row times fit (compute_position_costs()).
 ///
-/// @param labels  lights of each folder that are lamps; none: all lights, whatever their lamps
+/// @param labels  lights of each folder that are lamps; empty: all lights
 RowTimeResult choose_row_time_by_places(const std::vector<const std::vector<Observation>*>& folders,
                                         const std::vector<std::vector<Frame>>& labels,
                                         const LampMap& lamps, const std::optional<Lens>& lens);
 
+/// Result of find_row_time().
 struct RowTimeStepResult : StepResult {
   RowTime found{};
 };
 
-/// Finds the row time from lamps whose frequencies the map knows (estimate_row_time()) and, where
-/// several row times explain their periods, from their places (compute_position_costs()). It
-/// completes the camera of `calibration`, where there is one, and warns if it states another row
-/// time (compare_row_times()).
-/// Throws InputError when no lamp has a frequency. undetermined.
+/// Estimates the row time from lamps with a frequency in the map (estimate_row_time()). If several
+/// row times explain their periods, chooses by their positions (compute_position_costs()). Adds row
+/// time and readout direction to the camera of `calibration`, if given, and warns if it states
+/// another row time (compare_row_times()). Failure: undetermined. Throws InputError if no lamp has a
+/// frequency.
 RowTimeStepResult find_row_time(const SeenLights& seen,
                                 const std::vector<std::vector<Frame>>& labels, const LampMap& lamps,
                                 const std::filesystem::path& lamps_file,

@@ -36,7 +36,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Which program this is: another build need not give the same results.
+/// Returns a text that identifies the build of the program: results may differ between builds.
 std::string build_of(const ProgramVersion& program) {
   std::error_code unknown;
   const fs::path file = fs::read_symlink("/proc/self/exe", unknown);
@@ -45,7 +45,8 @@ std::string build_of(const ProgramVersion& program) {
                      changed);
 }
 
-/// What a folder is called is of no interest in the results; where a name begins with it.
+/// Removes the path of a folder from the beginnings of file names in a text: results must not
+/// depend on it.
 std::string without_folder(std::string text, const fs::path& named) {
   const std::string folder = (named / "").string();
   for (auto at = text.find(folder); at != std::string::npos; at = text.find(folder, at)) {
@@ -76,7 +77,7 @@ const char* step_of(MetricSource source) {
   return "";
 }
 
-/// Those of a lens that is found here, and those that the session asks for.
+/// Returns the gates of the session: those of the lens, if it is estimated, and those of its file.
 std::vector<Gate> gates_for(const SessionFolder& session, const SessionOptions& options) {
   std::vector<Gate> gates;
   if (!session.camera()) gates = lens_gates();
@@ -85,13 +86,13 @@ std::vector<Gate> gates_for(const SessionFolder& session, const SessionOptions& 
   return with_changes(std::move(gates), read_gates(file, session_metrics()));
 }
 
-/// What a step comes to, and how it is written once it is known.
+/// Result of a step, and the function that writes its outputs.
 struct Work {
   StepResult result;
   std::function<void()> write = [] {};
 };
 
-/// session.json last: without it the results are of a run that was killed.
+/// Writes the summaries, session.json last: without it the results are those of a killed run.
 void write_summaries(const SessionResults& results, const SessionResult& result,
                      const SessionOptions& options) {
   write_file(results.file("junit.xml"), session_junit(result));
@@ -150,7 +151,7 @@ class SessionRun {
     return options_.report ? session_.lines() : std::vector<fs::path>();
   }
 
-  /// The steps of this session, and what each writes.
+  /// Returns the steps of this session with their outputs.
   std::vector<StepOutputs> outputs() const {
     const auto with_picture = [&](std::vector<std::string> names, const char* picture) {
       if (options_.report) names.emplace_back(picture);
@@ -192,8 +193,8 @@ class SessionRun {
     return sha256_of_text(text);
   }
 
-  /// Does a step, unless inputs, options, program and outputs are as when it last ended. False when
-  /// it fails.
+  /// Runs a step unless inputs, options, program and outputs are unchanged since it last ended.
+  /// Returns false if the step failed.
   bool step(const std::string& name, const std::vector<fs::path>& inputs,
             const std::string& options, const std::function<Work()>& work) {
     if (observer_.begins) observer_.begins(name);
@@ -214,7 +215,8 @@ class SessionRun {
     return result_.steps.back().result.ok();
   }
 
-  /// What a session without the step measures of it is nothing, and its gates are not met.
+  /// Adds the gates of steps that the session lacks: they fail, because their metrics have no
+  /// value.
   void add_gates_of_no_step() {
     for (const char* name : {"lens", "rotation", "dispersion"}) {
       const bool there = std::any_of(result_.steps.begin(), result_.steps.end(),
@@ -225,7 +227,7 @@ class SessionRun {
     }
   }
 
-  /// Those of what a step measures.
+  /// Returns the gates of the metrics of a step.
   std::vector<Gate> gates_of(const std::string& step) const {
     std::vector<Gate> gates;
     for (const Gate& gate : gates_) {
@@ -234,7 +236,8 @@ class SessionRun {
     return gates;
   }
 
-  /// A bad file is the session's; what cannot be written is not.
+  /// Runs the work of a step and writes its outputs. A bad input becomes the failure bad_input;
+  /// errors of writing are thrown.
   StepResult attempt(const std::function<Work()>& work) const {
     Work done;
     try {
@@ -260,7 +263,7 @@ class SessionRun {
     if (options_.report && result.drawing) draw(out(name), result.drawing());
   }
 
-  /// How the camera's options stand in the history.
+  /// Returns the options of the camera as text for the history.
   std::string camera_options() const {
     std::string text = "--camera-id " + options_.camera_id;
     if (options_.frontend.row_time_s)
@@ -327,7 +330,7 @@ class SessionRun {
 
   FrontendOptions lamp_options() const {
     FrontendOptions options = options_.frontend;
-    options.readout.reset();  // part of the calibration by now
+    options.readout.reset();  // already part of the calibration
     if (const auto classifier = session_.classifier()) options.classifier = *classifier;
     return options;
   }
@@ -372,13 +375,13 @@ class SessionRun {
     return !session_.classifier() && (session_.camera() || options_.frontend.row_time_s);
   }
 
-  /// Name of the file or the option that states the row time.
+  /// Returns the name of the file or the option that gives the row time.
   std::string row_time_source() const {
     if (session_.camera()) return session_.camera()->filename().string();
     return options_.frontend.row_time_s ? "--row-time-s" : "camera.yaml";
   }
 
-  /// Adds the remarks on the images, and what they measure, to the result of a step.
+  /// Adds the remarks and metrics of the images to the result of a step.
   template <typename Result>
   static void add(const StepResult& remarks, Result& result) {
     result.metrics.insert(result.metrics.end(), remarks.metrics.begin(), remarks.metrics.end());
@@ -486,7 +489,7 @@ class SessionRun {
     return true;
   }
 
-  /// A camera.yaml that cannot be read is a step that failed.
+  /// Runs the step lens for a given camera.yaml, which fails if the file cannot be read.
   bool readable(const fs::path& camera) {
     const std::string unused = stated_of_the_camera();
     return step("lens", {camera}, unused, [&] {
@@ -501,7 +504,7 @@ class SessionRun {
     });
   }
 
-  /// "name, row time"; empty where all is left as it is.
+  /// Returns the changed options of the camera, such as "name, row time"; empty if none is changed.
   std::string stated_of_the_camera() const {
     const SessionOptions unstated;
     std::string stated;
@@ -591,7 +594,8 @@ class SessionRun {
     std::vector<CheckError> errors;
     for (const FixError& error : errors_of(*input, input->fixes).errors) {
       const FixRow& row = input->fixes.rows[error.fix];
-      constexpr int min_lamps = 3;  // fixes of two lamps may be far off at the edge of a room
+      constexpr int min_lamps =
+          3;  // fixes of two lamps may have large errors at the edge of a room
       if (row.lamps < min_lamps) continue;
       errors.push_back({row.image, error.horizontal_m.norm(), error.fix});
     }
@@ -620,7 +624,7 @@ class SessionRun {
     return pictures;
   }
 
-  /// Verdict, what is left of a run that failed, and session.json.
+  /// Sets the verdict, removes outputs of later steps if the run failed, and writes the summaries.
   void conclude() {
     const SessionStep& last = result_.steps.back();
     if (!last.result.ok()) {
@@ -685,7 +689,7 @@ SessionResult run_session(const fs::path& session, const fs::path& results,
     result.failure = StepFailure::bad_input;
     result.reason = without_folder(error.what(), session);
     if (folder) {
-      taken.forget_evaluation();  // the rest is as good as before
+      taken.forget_evaluation();  // other results remain valid
     } else {
       taken.forget_all();
     }

@@ -18,8 +18,8 @@
 namespace vlp {
 
 // clang-format off
-/// The steps of the procedure, in their order. A drive along a line, "line-x", is a step of its own
-/// between check and evaluate.
+/// Options of run_session(). The steps of the procedure, in their order; each drive along a line,
+/// "line-x", is a separate step between check and evaluate:
 ///
 ///   lens        boards -> lens.yaml, lens.cameramodel, lens.svg      unless there is camera.yaml
 ///   row-time    rotation -> camera.yaml                              unless the row time is known
@@ -33,68 +33,76 @@ struct SessionOptions {
   ProgramVersion program;
   std::string camera_id = "camera";
   LensModel lens_model = LensModel::opencv8;
-  /// Takes the model that the views call for instead (calibration/intrinsics/lens_choice.h).
+  /// Uses the model selected by cross-validation instead (calibration/intrinsics/lens_choice.h).
   bool choose_lens_model = false;
-  /// Threads, limits of the images, and the camera's row time and readout direction.
+  /// Threads, limits for images, row time and readout direction of the camera.
   FrontendOptions frontend = {};
-  /// vlp-gates/1 of session_metrics(), for a session that has no gates.yaml of its own; may be
-  /// empty. They hold beside lens_gates(), and in their place where they are of the same metric.
+  /// File in format vlp-gates/1 with gates of session_metrics(), for a session without its own
+  /// gates.yaml; may be empty. Its gates are added to lens_gates(), or replace the gates of the
+  /// same metric.
   std::filesystem::path gates_file = {};
-  /// Pictures, drives along lines and report.html, which take longer than the rest.
+  /// Makes plots, drives along lines and report.html, which take longer than all other results.
   bool report = true;
   /// Steps to run even if nothing has changed.
   std::vector<std::string> redo = {};
 };
 
-/// One step of a run, with what it rests on.
+/// Name and result of one step of a run.
 struct SessionStep {
   std::string name;
-  /// Nothing was done: inputs, options, program and outputs are as they were.
+  /// True if the step was not run because its inputs, options, program and outputs are unchanged.
   bool as_before = false;
   StepResult result;
 };
 
+/// Verdict of a session.
 enum class SessionVerdict {
   pass,
-  gate,      // there is a result, and it misses a gate
+  gate,      // a result exists, but fails a gate
   no_result  // a step failed
 };
 
-/// The word in session.json: "pass", "gate", "no result".
+/// Returns the word in session.json: "pass", "gate" or "no result".
 std::string name_of(SessionVerdict verdict);
 
+/// Result of run_session().
 struct SessionResult {
   SessionVerdict verdict = SessionVerdict::pass;
-  /// Why there is no result, or which gates are not met; empty when it passes.
+  /// Reason why there is no result, or the failed gates; empty if the session passes.
   std::string reason;
-  /// Of the step that failed, or bad_input of a session that is not whole.
+  /// Failure of the step that failed; bad_input if the session is incomplete.
   StepFailure failure = StepFailure::none;
   std::vector<SessionStep> steps;
-  /// Met and not; those of what was not measured are not met.
+  /// All gates, passed and failed; gates of metrics without a value fail.
   std::vector<CheckedMetric> gates;
-  /// As far as it came.
+  /// Calibration after the last successful step.
   std::optional<Calibration> calibration;
 };
 
-/// What gets to know how far a run is.
+/// Callbacks for the progress of a run: start and end of each step, and images done.
 struct SessionObserver {
   std::function<void(const std::string& step)> begins = {};
   IntakeProgress progress = {};
   std::function<void(const SessionStep& step)> ends = {};
 };
 
-/// What the procedure measures, and what its gates can be of.
+/// Returns the metrics of the procedure, which its gates can limit.
 std::vector<MetricKind> session_metrics();
 
-/// The whole procedure: calibrates a camera from a session's folder, checks it, and writes a
-/// report, all into `results`, which is made when it is not there. A step whose inputs, options and
-/// outputs are as when it last ended, with this program, is not run again. What this run does not
-/// make, or cannot, is removed. Every file appears whole; killed, the next run goes on.
-/// session.json (session_file.h) and junit.xml say how it went, whatever the verdict. What is wrong
-/// with the session, a bad file or a step that fails, is in the result; thrown is what is wrong
-/// with the options (std::invalid_argument) and with `results` (InputError): a folder of captures,
-/// one that another session's results are in or another run is at work in, or that cannot be
-/// written.
+/// Runs the whole procedure: calibrates a camera from the folder of a session, checks it, and
+/// writes a report. All outputs are written into `results`, which is created if it does not exist.
+///
+/// A step is skipped if its inputs, options, program and outputs are unchanged since it last ended.
+/// Outputs of earlier runs that this run does not produce are removed. Every file is written
+/// atomically; after a kill, the next run resumes. session.json (session_file.h) and junit.xml
+/// report the outcome for every verdict.
+///
+/// Errors in the session, such as a bad file or a step that fails, are part of the result.
+/// @throws std::invalid_argument if the options are invalid
+/// @throws InputError if `session` is not a folder, the file of gates is invalid, or `results`
+/// holds
+///         captures or the results of another session, is in use by another run, or cannot be
+///         written
 SessionResult run_session(const std::filesystem::path& session,
                           const std::filesystem::path& results, const SessionOptions& options,
                           const SessionObserver& observer = {});

@@ -76,7 +76,7 @@ Json history_of(const Calibration& calibration) {
   return history;
 }
 
-/// Each with its gate, where it has one.
+/// Returns the metrics of all steps, each with its gate if it has one.
 Json metrics_of(const SessionResult& result) {
   Json metrics = Json::array();
   for (const SessionStep& step : result.steps) {

@@ -14,40 +14,41 @@
 
 namespace vlp {
 
-/// What is known of the captures in a folder: the rules.
+/// Tables of the captures in a folder:
 ///
-///  - captures.csv tells the inclination of every capture that has one, and where the camera was;
-///  - truth.csv tells where the camera was. Where both do, truth.csv holds.
+///  - captures.csv holds the inclinations of captures and the places of the camera;
+///  - truth.csv holds the places of the camera and takes precedence over captures.csv.
 ///
-/// Each throws InputError for a table that cannot be read.
+/// All functions throw InputError if a table cannot be read.
 
-/// captures.csv, with the places of truth.csv; empty without either.
+/// Returns captures.csv with the places of truth.csv; an empty table without both files.
 CapturesTable captures_in(const std::filesystem::path& folder);
-/// The table that fixes of the folder are held against: truth.csv, or captures.csv when that tells
-/// places; nothing without.
+/// Returns the table with the ground truth of the folder: truth.csv, or captures.csv if it has
+/// places of the camera. Returns std::nullopt if neither exists.
 std::optional<std::filesystem::path> truth_file(const std::filesystem::path& folder);
-/// The places in it, in its order; captures.csv need not tell one of every image, and is in the
-/// order of the images. Precondition: there is one.
+/// Returns the places in truth_file(): in the order of truth.csv, or in the order of the image
+/// names for captures.csv, which need not have a place for every image.
+/// @pre truth_file() returns a file
 std::vector<TruthRow> truth_in(const std::filesystem::path& folder);
 
 // clang-format off
-/// The folder of a camera's captures, which is only read:
+/// Folder with the captures of a camera, which is only read:
 ///
 ///   lamps.yaml            the lamps, with their frequencies or with classifier.yaml
-///   boards/, board.yaml   images of the board, and what it is; or
-///   camera.yaml           the camera part of a calibration, which goes before them
-///   rotation/             captures while the camera turns on the spot
-///   dispersion/           at known places, turning (optional)
-///   check/                to locate, and with places to evaluate (optional)
-///   line-*/               each along a straight line, with places (optional)
-///   classifier.yaml       what tells the lamps apart, by vlp-train (optional)
-///   gates.yaml            what the figures have to keep to (optional)
+///   boards/, board.yaml   images of the board, and its geometry; or
+///   camera.yaml           camera part of a calibration, which takes precedence over boards/
+///   rotation/             captures of a rotation in place
+///   dispersion/           captures at known places, at several yaws (optional)
+///   check/                captures to locate and, with places, to evaluate (optional)
+///   line-*/               captures along a straight line, with places (optional)
+///   classifier.yaml       classifier of the lamps, by vlp-train (optional)
+///   gates.yaml            limits of the metrics (optional)
 ///
-/// Other files and folders are left alone.
+/// Other files and folders are ignored.
 // clang-format on
 class SessionFolder {
  public:
-  /// Throws InputError when something is missing.
+  /// Throws InputError if a required file or folder is missing.
   explicit SessionFolder(const std::filesystem::path& folder);
 
   const std::filesystem::path& path() const { return folder_; }
@@ -60,8 +61,8 @@ class SessionFolder {
   std::optional<std::filesystem::path> check() const { return if_there("check"); }
   std::optional<std::filesystem::path> classifier() const { return if_there("classifier.yaml"); }
   std::optional<std::filesystem::path> gates() const { return if_there("gates.yaml"); }
-  /// Drives along a line whose places are known, by name; one whose table cannot be read is there,
-  /// for its step to say so.
+  /// Folders of the drives along a line with known places, sorted by name. Includes drives whose
+  /// table cannot be read: their steps report the error.
   const std::vector<std::filesystem::path>& lines() const { return lines_; }
 
  private:
@@ -71,10 +72,11 @@ class SessionFolder {
   std::vector<std::filesystem::path> lines_;
 };
 
-/// Whether a folder is a session's, or one of the captures in it: no place for results.
+/// Returns true if `results` is the folder of the session or a folder of captures in it, where
+/// results must not be written.
 bool holds_captures(const std::filesystem::path& session, const std::filesystem::path& results);
 
-/// The first and the last place of a drive. Throws InputError when they are one.
+/// Returns the first and the last place of a drive, in m. Throws InputError if they are equal.
 std::array<Eigen::Vector2d, 2> ends_of(const std::filesystem::path& truth,
                                        const std::vector<TruthRow>& places);
 

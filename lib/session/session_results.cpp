@@ -32,21 +32,21 @@ constexpr std::array kResults{
     "rotation.svg", "calibration.yaml", "dispersion.svg", "check-fixes.csv", "evaluation.json",
     "junit.xml",    "report.html",      "session.json"};
 
-/// Steps except the drives.
+/// Steps other than drives.
 constexpr std::array kNamedSteps{"lens", "row-time", "rotation", "dispersion", "check", "evaluate"};
 
 bool contains(std::span<const char* const> names, std::string_view name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-/// Says whose results they are.
+/// Returns the file with the path of the session of these results.
 fs::path mark_of(const fs::path& results) { return results / "steps/session"; }
 
 std::string mark_text(const fs::path& session) {
   return fs::weakly_canonical(session / "").string() + "\n";
 }
 
-/// That neither another session's results are there, nor what is not of this procedure.
+/// Throws InputError if the folder holds results of another session or files of other origin.
 void check_owner(const fs::path& results, const fs::path& session) {
   const fs::path mark = mark_of(results);
   constexpr std::size_t most_bytes = 1 << 16;
@@ -139,7 +139,8 @@ SessionResults::SessionResults(fs::path folder, const fs::path& session)
   lock_ = lock_of(steps, folder_);
   steps.find_folder({"corners", folder_, "step"});  // throws if it is a link
   if (steps.has("session")) return;
-  // Before the mark, without which the folder is not taken: the files that need no plan.
+  // The list of files that do not require a plan, written before the mark: a folder without the
+  // mark is free.
   steps.replace(kOutputs, "junit.xml\nsession.json\n");
   steps.replace("session", mark_text(session));
 }
@@ -190,7 +191,7 @@ void SessionResults::plan(std::vector<StepOutputs> steps) {
   }
   wanted.merge(remove_outputs(wanted));  // the next run tries again
   const SharedFolder records = steps_in(folder_);
-  // The same list need not wait for the disk again.
+  // An unchanged list is not written again, which avoids waiting for the disk.
   if (wanted == written && records.has(kOutputs)) return;
   std::string list;
   for (const std::string& name : wanted) list.append(name).append("\n");

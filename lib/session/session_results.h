@@ -12,28 +12,28 @@
 
 namespace vlp {
 
-/// What a step writes into the folder of results.
+/// Files that a step writes into the folder of results.
 struct StepOutputs {
   std::string step;
   std::vector<std::string> files;
 };
 
-/// The folder of a session's results: whose they are, and what of an earlier run still holds.
+/// Folder with the results of a session, and the records by which steps of an earlier run are
+/// reused:
 ///
 ///   lens.yaml, report.html, ...   the outputs of the steps
-///   session.json                  how the last run went
-///   steps/STEP.json               how a step ended, on what inputs, with which outputs
-///   steps/session                 whose results these are
+///   session.json                  outcome of the last run
+///   steps/STEP.json               result of a step, digests of its inputs and outputs
+///   steps/session                 path of the session of these results
 ///   steps/outputs                 names of all files above that runs wrote or may have written
-///   steps/lock                    held while a run is at work
+///   steps/lock                    locked while a run uses the folder
 ///
 /// Only files named in steps/outputs are ever removed or overwritten.
 class SessionResults {
  public:
-  /// Takes the folder for this session, and makes it where it is not there. Throws InputError when
-  /// another session's results are in it, when what is in it is not of this procedure, when another
-  /// run is at work there, and when it cannot be written to. The system lets go of the folder when
-  /// the run ends, however it does.
+  /// Locks the folder for this session and creates it if missing. The operating system releases the
+  /// lock when the process ends, also after a crash. Throws InputError if the folder holds results
+  /// of another session or files of other origin, is in use by another run, or cannot be written.
   SessionResults(std::filesystem::path folder, const std::filesystem::path& session);
   ~SessionResults();
   SessionResults(const SessionResults&) = delete;
@@ -41,25 +41,28 @@ class SessionResults {
 
   const std::filesystem::path& path() const { return folder_; }
   std::filesystem::path file(const std::string& name) const { return folder_ / name; }
-  /// Where corners of boards are kept between runs.
+  /// Returns the folder with the cached corners of boards.
   std::filesystem::path corners() const { return folder_ / "steps/corners"; }
 
-  /// The steps of this run, in their order. What another run wrote and this one does not is
-  /// removed. Throws InputError if the run would overwrite a file that no run wrote.
+  /// Sets the steps of this run, in their order, and removes files of earlier runs that this run
+  /// does not write. Throws InputError if the run would overwrite a file that no run wrote.
   void plan(std::vector<StepOutputs> steps);
 
-  /// How a step ended when it last ran, when that holds still: `key`, the digest of all that it
-  /// depends on, is as it was, and so are its outputs. What was a bad file may be mended by now.
+  /// Returns the result of the last execution of a step if it is up to date. `key`, the digest of
+  /// all that the step depends on, and the outputs must be unchanged. Returns std::nullopt
+  /// otherwise, and after bad_input, because the file may have been corrected.
   std::optional<StepResult> kept(const std::string& step, const std::string& key) const;
+  /// Records the result of a step, with its key and the digest of its outputs.
   void keep(const std::string& step, const std::string& key, const StepResult& result) const;
 
-  /// Removes what a step wrote, and how it ended.
+  /// Removes the outputs and the record of a step.
   void forget(const std::string& step) const;
-  /// Of all the steps behind it, too.
+  /// Removes outputs and records of all later steps.
   void forget_behind(const std::string& step) const;
-  /// What the last step wrote, which gates are a part of; not needing a plan.
+  /// Removes outputs and record of the step evaluate, which depend on the gates. Does not require
+  /// plan().
   void forget_evaluation() const;
-  /// Of every step there can be; not needing a plan.
+  /// Removes outputs and records of all steps. Does not require plan().
   void forget_all() const;
 
  private:

@@ -17,7 +17,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr const char* kFormat = "vlp-step/1";
-/// Longest record of a step: one of 100,000 images with the reason why each is not used.
+/// Largest size of a record: a step with 100,000 skipped images and their reasons.
 constexpr std::size_t kMaxStepBytes = std::size_t{64} << 20;
 
 Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
@@ -115,7 +115,7 @@ void write_step(const std::filesystem::path& file, const KeptStep& step) {
                   {"result", json_of(step.result)}};
   WholeFile whole(file);
   whole.write(json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
-  whole.save_unsynced();  // in part it is none, and the step is run again
+  whole.save_unsynced();  // an incomplete record is ignored, and the step runs again
 }
 
 }  // namespace vlp

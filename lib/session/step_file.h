@@ -11,24 +11,27 @@
 
 namespace vlp {
 
-/// In a metre, of what JSON has in mm.
+/// Millimeters per meter, for the lengths in JSON.
 inline constexpr double kMillimetres = 1e3;
 
-/// How a step ended, kept beside its outputs so that it need not be run again.
+/// Record of a step, stored with its outputs so that an unchanged step is not run again.
 struct KeptStep {
-  /// Digest of all that the step depends on, and of what it wrote.
+  /// Digests of all inputs of the step and of its outputs.
   std::string key, outputs;
-  /// Without calibration and drawing.
+  /// Result without gates, details, calibration and drawing.
   StepResult result;
 };
 
-/// Nothing when there is no such file, or it is not of this version of the toolbox.
+/// Reads the record of a step. Returns std::nullopt if the file is missing, damaged, or of another
+/// format version.
 std::optional<KeptStep> read_step(const std::filesystem::path& file);
-/// Whole or not at all. Throws InputError.
+/// Writes the record of a step atomically. Throws InputError if the file cannot be written.
 void write_step(const std::filesystem::path& file, const KeptStep& step);
 
-/// A result as it stands there and in session.json. Figures that are not finite are null.
+/// Returns a result in the form of the record and of session.json. Metrics that are not finite are
+/// null.
 nlohmann::ordered_json json_of(const StepResult& result);
+/// Returns a checked gate in the form of session.json.
 nlohmann::ordered_json json_of(const CheckedMetric& gate);
 
 }  // namespace vlp

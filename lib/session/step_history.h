@@ -11,32 +11,34 @@
 
 namespace vlp {
 
-/// Who makes a part of a calibration, for its history.
+/// Name and version of the program that makes a part of a calibration, for its history.
 struct ProgramVersion {
   std::string program, version;
 };
 
-/// SHA-256 of files and folders, each file read once.
+/// SHA-256 digests of files and folders; each file is read once.
 class InputDigests {
  public:
-  /// Of a file's content. Throws InputError.
+  /// Returns the digest of a file's content. Throws InputError if the file cannot be read.
   const std::string& of_file(const std::filesystem::path& file);
-  /// Of the images in a folder: of a line "SHA-256  NAME" for each, by name. Throws InputError.
+  /// Returns the digest of the images in a folder: that of a text with a line "SHA-256  NAME" per
+  /// image, by name. Throws InputError if an image cannot be read.
   std::string of_images(const std::filesystem::path& folder);
-  /// Of everything in a folder, likewise; a file that cannot be read counts as that.
+  /// Returns the digest of all files in a folder and its subfolders, likewise. A file that cannot
+  /// be read enters as "cannot be read".
   std::string of_all(const std::filesystem::path& folder);
 
  private:
   std::map<std::filesystem::path, std::string> known_;
 };
 
-/// An entry for the history: inputs are files and folders of images, an empty name is an input that
-/// was not given; they stand there without their folders, which are another on each machine. Throws
-/// InputError.
+/// Returns an entry for the history, without the part's name. `inputs` are files and folders of
+/// images; an empty name is an input that was not given. Stores only the last component of each
+/// path, because folders differ between machines. Throws InputError if an input cannot be read.
 HistoryEntry history_of(const ProgramVersion& program, const std::string& options,
                         const std::vector<std::filesystem::path>& inputs, InputDigests& digests);
 
-/// A file's or folder's name without its folders; "." has one, too.
+/// Returns the last component of a path, also for ".".
 std::string last_name(const std::filesystem::path& path);
 
 }  // namespace vlp

@@ -16,52 +16,52 @@
 
 namespace vlp {
 
-/// Why a step of the calibration came to nothing. What is wrong with a single file, a step throws
-/// as InputError; who runs steps one after another makes a bad_input of it.
+/// Reason why a step of the calibration failed. A step throws InputError for a bad file; a caller
+/// that runs several steps converts it to bad_input.
 enum class StepFailure {
   none,
   bad_input,     // a file that cannot be used
   undetermined,  // the captures do not determine the answer
-  wrong_board,   // the images show another board than board.yaml says
+  wrong_board,   // the board in the images differs from board.yaml
   wrong_map,     // the captures contradict the lamp map
-  wrong_place    // the captures were taken elsewhere than is said
+  wrong_place    // the captures were taken elsewhere than given
 };
 
-/// An image that was not used, and why.
+/// Image that was not used, with the reason.
 struct SkippedImage {
   std::string image;
   std::string reason;
 };
 
-/// In how many captures a lamp was left out, because the others contradict it.
+/// Number of captures in which a lamp was rejected because the other lamps contradict it.
 struct LampLeftOut {
   int lamp;
   int captures;
 };
 
-/// What every step of the calibration tells of how it went; the words are for people, a line each.
+/// Outcome common to all steps of the calibration. Texts are human-readable, one line each.
 struct StepResult {
   StepFailure failure = StepFailure::none;
-  /// Why there is no result, and what to add or to correct.
+  /// Reason why there is no result, and the remedy.
   std::string why = {};
-  /// The file that is to be corrected; empty where it is the captures.
+  /// File to correct; empty if the captures are the cause.
   std::filesystem::path subject = {};
 
   std::vector<Metric> metrics = {};
-  /// Of some of them, met and not.
+  /// Checked gates of some of the metrics, passed and failed.
   std::vector<CheckedMetric> gates = {};
-  /// What may be wrong though there is a result; what was decided; what is of interest to those who
-  /// look closely.
+  /// Warnings of possible errors in the result; notes of decisions; details for a closer analysis.
   std::vector<std::string> warnings = {}, notes = {}, details = {};
   std::vector<SkippedImage> skipped = {};
   std::vector<LampLeftOut> lamps_left_out = {};
   std::vector<LampOffset> lamp_offsets = {};
-  /// The calibration with the step's part, of the steps that have one.
+  /// Calibration with the part of this step; default for steps without one.
   Calibration calibration = {};
-  /// Makes the step's picture, later; may be empty.
+  /// Makes the plot of the step on demand; may be empty.
   std::function<Drawing()> drawing = {};
 
   bool ok() const { return failure == StepFailure::none; }
+  /// Sets failure, message and file to correct.
   void fail(StepFailure how, std::string words, std::filesystem::path file = {}) {
     failure = how;
     why = std::move(words);
@@ -69,11 +69,12 @@ struct StepResult {
   }
 };
 
-/// The enumerator as a word, for example "wrong_map", and back.
+/// Returns the name of the enumerator, for example "wrong_map".
 std::string_view name_of(StepFailure failure);
+/// Returns the failure with this name; std::nullopt if there is none.
 std::optional<StepFailure> step_failure_from_name(std::string_view name);
 
-/// "FILE: why", or, without a file, why.
+/// Returns "FILE: message", or the message alone without a file.
 std::string message_of(const StepResult& result);
 
 }  // namespace vlp

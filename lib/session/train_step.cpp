@@ -17,7 +17,7 @@
 namespace vlp {
 namespace {
 
-/// Whether there are enough lights of each lamp; otherwise the step fails.
+/// Returns true if each lamp has enough lights; otherwise fails the step.
 bool has_examples(std::span<const LabelledLight> lights, const LampMap& lamps,
                   TrainStepResult& result) {
   std::map<int, int> counts;
@@ -47,7 +47,7 @@ bool has_examples(std::span<const LabelledLight> lights, const LampMap& lamps,
   return result.ok();
 }
 
-/// Whether enough of them were kept; otherwise the step fails.
+/// Returns true if training kept enough lights of each lamp; otherwise fails the step.
 bool kept_enough(const LampClassifier& classifier, TrainStepResult& result) {
   std::string few;
   for (const auto& lamp : classifier.lamps) {

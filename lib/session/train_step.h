@@ -11,18 +11,22 @@
 
 namespace vlp {
 
+/// Result of train_lamps().
 struct TrainStepResult : StepResult {
   Labelled labelled;
   LampClassifier classifier;
-  /// What classifiers answer to the lights that were held out of their training.
+  /// Cross-validated confusion matrix: answers of classifiers to lights held out of their training.
   Confusion confusion;
 };
 
-/// The lamp classifier from lights whose lamps the labels of each folder name. Warns of lamps that
-/// look alike, and if lamps with known frequencies contradict the row time of the calibration
-/// (compare_row_times()). undetermined: one lamp, or too few lights of a lamp, or lights of a lamp
-/// that have too little in common. Throws InputError, of the first folder, when the labels name
-/// none of its images; std::invalid_argument when they name a lamp that is not in the map.
+/// Trains the lamp classifier with the lights that the labels of each folder identify. Warns of
+/// inseparable lamps, and if lamps with known frequencies contradict the row time of the calibration
+/// (compare_row_times()). Failure: undetermined, if there is one lamp only, or a lamp has too few
+/// lights or too dissimilar ones.
+///
+/// @param first_folder  folder named in the error about labels
+/// @throws InputError if the labels name no usable image of any folder
+/// @throws std::invalid_argument if the labels name a lamp that is not in the map
 TrainStepResult train_lamps(const SeenLights& seen, const std::vector<std::vector<Frame>>& labels,
                             const LampMap& lamps, const std::filesystem::path& first_folder);
 

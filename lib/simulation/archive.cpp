@@ -37,7 +37,8 @@ void write_table(const Scene& scene, std::size_t sessions, const fs::path& outpu
   table.save();
 }
 
-/// Renders a session out of sight, then moves it to its place. Nothing is done when it is there.
+/// Renders a session into a temporary folder, then moves it into place. Returns false if the
+/// session exists already.
 bool render(const ArchiveSession& session, const fs::path& output, const std::string& origin) {
   const fs::path place = output / session.camera / session.session;
   if (fs::exists(place)) return false;
@@ -73,7 +74,7 @@ SimulationSummary simulate_archive(const Scene& scene, std::size_t sessions, con
   } catch (const fs::filesystem_error& failure) {
     throw InputError(failure.path1(), "cannot be made: " + failure.code().message());
   }
-  fs::remove(output / ".unfinished");  // when it is empty
+  fs::remove(output / ".unfinished");  // empty, as all sessions have been moved
   return summary;
 }
 

@@ -11,53 +11,60 @@
 
 namespace vlp {
 
-/// What is wrong with a unit whose captures are whole.
+/// Fault of a simulated unit whose captures are complete.
 enum class ArchiveFault {
   none,
-  leaning,       // by 4 degrees more
-  out_of_focus,  // half as much blur again, 0.8 px at least
-  moved_lamp,    // the first lamp is 30 mm from where the map has it
-  cut_image      // one image of the last folder of lamps ends early
+  leaning,       // camera tilt larger by 4 degrees
+  out_of_focus,  // blur sigma times 1.5, at least 0.8 px
+  moved_lamp,    // 30 mm added to the map error of the first lamp, along x
+  cut_image      // the first image of the last lamp folder is truncated
 };
 
-/// What is wrong with the captures, so that they cannot give a calibration. The target is a folder
-/// or file of the session.
+/// Damage to the captures of a session that prevents a calibration. ArchiveSession::damaged names
+/// the affected folder or file.
 enum class ArchiveDamage {
   none,
-  cut_images,   // all images of a folder end early
-  missing,      // a file or folder
-  wrong_board,  // board.yaml tells of another family of tags
-  empty         // a folder
+  cut_images,   // all images of a folder are truncated
+  missing,      // a file or folder is missing
+  wrong_board,  // board.yaml names another tag family
+  empty         // a folder is empty
 };
 
-/// One session of a simulated archive: ARCHIVE/camera/session.
+/// Session of a simulated archive, in the folder ARCHIVE/camera/session.
 struct ArchiveSession {
   std::string camera, session;
-  /// The scene with the lens, the tilt, the lever arm, the lamp map and the fault of this session.
+  /// Scene with the lens, tilt, lever arm, map errors and fault of this session.
   Scene scene;
   ArchiveFault fault = ArchiveFault::none;
   ArchiveDamage damage = ArchiveDamage::none;
+  /// Damaged file or folder, relative to the session folder; empty without damage.
   std::string damaged;
 };
 
+/// Returns the names used in archive.csv; empty for `none`.
 std::string_view name_of(ArchiveFault fault);
 std::string_view name_of(ArchiveDamage damage);
 
-/// Session `index`, counted from 0; it depends on the scene and the index alone, so that an archive
-/// grows without a change to what is there. Of the first n sessions n damage_share are damaged and
-/// n fault_share have a fault, to less than one; damaged ones have no fault. Kinds take turns.
-/// Precondition: the scene has an `archive`.
+/// Returns session `index` of an archive, counted from 0. It depends on scene and index only, so
+/// that an archive can grow without changes to existing sessions.
+///
+/// Among the first n sessions, n damage_share are damaged and n fault_share are chosen for a fault,
+/// to within one. A session chosen for both is damaged only. Kinds of fault and of damage are used
+/// cyclically.
+/// @pre the scene has an `archive`
 ArchiveSession archive_session(const Scene& scene, std::size_t index);
 
-/// Damages a session's files. Done twice it is as done once.
+/// Applies the cut_image fault and the damage of a session to its files in `folder`. A second call
+/// has no further effect.
 void damage(const ArchiveSession& session, const std::filesystem::path& folder);
 
-/// Renders so many sessions into `output`:
+/// Renders the first `sessions` sessions of an archive into `output`:
 ///   scene.yaml, archive.csv (camera, session, fault, damage, damaged)
 ///   CAMERA/SESSION/ with the files of simulate(), then damaged
-/// A session appears whole; those that are there are kept (SimulationSummary counts sessions).
-/// Bytes depend on the scene alone. Throws as simulate() does, and std::invalid_argument: a scene
-/// without `archive`, lamps, or a board, or without the folders `boards` and `rotation`.
+/// Sessions are written atomically. Existing sessions are kept (SimulationSummary counts sessions).
+/// The bytes depend on the scene alone.
+/// @throws as simulate(); std::invalid_argument if the scene has no `archive`, no lamps, no board,
+/// or lacks one of the folders `boards` and `rotation`
 SimulationSummary simulate_archive(const Scene& scene, std::size_t sessions,
                                    const std::filesystem::path& output,
                                    const SimulationOptions& options,

@@ -20,7 +20,7 @@ std::vector<fs::path> images_in_order(const fs::path& folder) {
   return images;
 }
 
-/// Keeps the beginning of an image: its header and little more.
+/// Truncates an image to its header and a few hundred bytes.
 void cut(const fs::path& image) {
   constexpr std::uintmax_t kept_bytes = 600;
   if (fs::file_size(image) > kept_bytes) fs::resize_file(image, kept_bytes);

@@ -27,13 +27,14 @@ constexpr std::array kHarms = {
     Harm{ArchiveDamage::cut_images, "rotation"},    Harm{ArchiveDamage::missing, "board.yaml"},
     Harm{ArchiveDamage::empty, "boards"},           Harm{ArchiveDamage::missing, "rotation"}};
 
-/// How many of the first n sessions are chosen, when `share` of all are; a choice begins in the
-/// middle of its turn so that small archives have one, too.
+/// Returns how many of the first n sessions are chosen if the fraction `share` of all is chosen.
+/// Rounded to nearest, so that small archives have chosen sessions, too.
 std::size_t chosen_of(std::size_t n, double share) {
   return static_cast<std::size_t>(std::floor(static_cast<double>(n) * share + 0.5));
 }
 
-/// The number of the choice that falls on a session, or nothing.
+/// Returns the number of the choice (from 0) that falls on session `index`; std::nullopt if it is
+/// not chosen.
 std::optional<std::size_t> choice(std::size_t index, double share) {
   const std::size_t before = chosen_of(index, share);
   if (chosen_of(index + 1, share) == before) return std::nullopt;
@@ -45,7 +46,7 @@ std::string numbered(const std::string& name, std::size_t number, std::size_t di
   return name + std::string(digits - std::min(digits, text.size()), '0') + text;
 }
 
-/// The mount, leaning by so much more towards an azimuth of the image.
+/// Returns the mount tilted further by `tilt_rad` towards an azimuth of the image.
 Mount leaning(const Mount& mount, double tilt_rad, double azimuth_rad) {
   const Eigen::Vector3d zenith_in_camera = mount.level_from_camera.row(2);
   const Eigen::Vector3d axis(-std::sin(azimuth_rad), std::cos(azimuth_rad), 0);

@@ -8,18 +8,21 @@
 
 namespace vlp {
 
-/// A rectangle on a board, in the board frame (board_layout.h).
+/// Rectangle on a board, in the board frame (board_layout.h).
 struct PrintedRectangle {
   double left_m, top_m, right_m, bottom_m;
   bool white;
 };
 
-/// What is printed on white paper, in the order of printing: the last on a spot is seen. Throws
-/// std::invalid_argument when the family lacks an id, or when the gaps are too small for it.
+/// Returns the rectangles printed on white paper, in printing order: later rectangles cover earlier
+/// ones.
+/// @throws std::invalid_argument if the family lacks an id, or if the gaps are too small for the
+/// family
 std::vector<PrintedRectangle> board_pattern(const Board& board);
 
-/// From tag_field_m() to the outermost of what is printed: corner squares, or the outer squares of
-/// a board of squares.
+/// Returns the distance from the edge of the tag field (tag_field_m()) to the outermost printed
+/// edge, m. Corner squares and the outer squares of chessboards extend beyond the field; otherwise
+/// 0.
 double printed_border_m(const Board& board);
 
 }  // namespace vlp

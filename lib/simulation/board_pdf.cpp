@@ -16,13 +16,13 @@ namespace vlp {
 namespace {
 
 constexpr double kPointsPerMetre = 72 / 0.0254;
-/// Most printers leave out 5 mm; ruler and parameters stand below the board.
+/// Margins: most printers leave 5 mm blank. The footer below the board holds ruler and parameters.
 constexpr double kMargin_m = 0.008, kFooter_m = 0.022;
 
 using Context = std::unique_ptr<cairo_t, void (*)(cairo_t*)>;
 using Surface = std::unique_ptr<cairo_surface_t, void (*)(cairo_surface_t*)>;
 
-/// From the first tag or corner to the end of what is printed, or has to stay white.
+/// Returns the width of the border around the tag field that is printed or has to stay white.
 double border_m(const Board& board) {
   if (board.has_squares() || board.corner_squares) return printed_border_m(board);
   return std::min(board.tag_size_m * board.tag_spacing, board.tag_size_m) / 2;
@@ -38,7 +38,8 @@ bool fits(const Board& board, const Eigen::Vector2d& sheet_m) {
   return (print_m(board).array() <= room_m.array() + 1e-9).all();
 }
 
-/// The sheet, turned if the board fits only so; nothing when it does not fit.
+/// Returns the page size, in landscape only if the board fits only so; std::nullopt if it does not
+/// fit.
 std::optional<Eigen::Vector2d> sheet_for(const Board& board, const Paper& paper) {
   if (fits(board, paper.size_m)) return paper.size_m;
   const Eigen::Vector2d lying = paper.size_m.reverse();
@@ -46,7 +47,7 @@ std::optional<Eigen::Vector2d> sheet_for(const Board& board, const Paper& paper)
   return {};
 }
 
-/// Everything black, in one path: no seams between neighbouring bits.
+/// Draws all black areas as one path, which avoids seams between neighboring bits.
 void draw_board(cairo_t* context, const Board& board) {
   for (const PrintedRectangle& part : board_pattern(board)) {
     if (part.white) continue;
@@ -148,7 +149,7 @@ std::string board_pdf(const Board& board, const Paper& paper) {
         cairo_pdf_surface_create_for_stream(append, &bytes, sheet_m->x() * kPointsPerMetre,
                                             sheet_m->y() * kPointsPerMetre),
         cairo_surface_destroy);
-    // Else the time of day would be in it.
+    // Fixed date: the bytes must not depend on the time of day.
     cairo_pdf_surface_set_metadata(surface.get(), CAIRO_PDF_METADATA_CREATE_DATE,
                                    "2000-01-01T00:00:00Z");
     const Context context(cairo_create(surface.get()), cairo_destroy);

@@ -11,25 +11,30 @@
 
 namespace vlp {
 
+/// Page size of a printer.
 struct Paper {
   std::string name;
-  /// Upright: width, height.
+  /// Width and height in portrait orientation.
   Eigen::Vector2d size_m;
 };
 
-/// A0 to A4 and Letter.
+/// Returns A0 to A4 and Letter.
 const std::vector<Paper>& papers();
 
-/// The one of this name; throws std::invalid_argument, with the names, when there is none.
+/// Returns the page size of this name.
+/// @throws std::invalid_argument with the valid names, if there is none
 const Paper& paper_named(const std::string& name);
 
-/// How large a tag, or square, a sheet has room for, upright or lying, in whole millimetres;
-/// nothing when less than 5 mm. board: its tag_size_m, or square_size_m, is not looked at.
+/// Computes the largest tag size (or square size) for which the board fits on a page, portrait or
+/// landscape, in whole millimeters. Returns std::nullopt if it is below 5 mm. Ignores the
+/// tag_size_m or square_size_m of `board`.
 std::optional<double> largest_size_m(const Board& board, const Paper& paper);
 
-/// The board as a PDF at true scale in the middle of a sheet, upright or lying, with its parameters
-/// and a ruler of 100 mm to check the print with. The same board gives the same bytes. Throws
-/// std::invalid_argument when it does not fit on the sheet, or when the family lacks an id.
+/// Renders the board as a PDF at true scale, centered on a page in portrait or landscape
+/// orientation. The page shows the parameters of the board and a ruler of 100 mm for checking the
+/// print. The same board yields the same bytes.
+/// @throws std::invalid_argument if the board does not fit on the page, or if the family lacks an
+/// id
 std::string board_pdf(const Board& board, const Paper& paper);
 
 }  // namespace vlp

@@ -11,7 +11,8 @@
 namespace vlp {
 namespace {
 
-/// What is printed, in the order of printing; the last on a spot is seen.
+/// Returns the printed rectangles with the paper below them, in printing order: later ones cover
+/// earlier ones.
 std::vector<Rectangle> rectangles_of(const SceneBoard& board) {
   const double white = board.white_e_per_s - board.surround_e_per_s;
   const double black = board.black_e_per_s - board.surround_e_per_s;
@@ -31,7 +32,7 @@ BoardBend::BoardBend(const SceneBoard& board)
     : field_m_(tag_field_m(board.print)), warp_m_(board.warp_m) {}
 
 BoardBend::Depth BoardBend::depth(const Eigen::Vector2d& at_m) const {
-  constexpr double most = 1.5;  // beyond it there is no paper, and a parabola would turn back
+  constexpr double most = 1.5;  // outside the paper, where the parabola would bend back
   Depth bend{0, {0, 0}};
   for (Eigen::Index axis = 0; axis < 2; ++axis) {
     const double share = 2 * at_m[axis] / field_m_[axis] - 1;
@@ -48,7 +49,7 @@ Eigen::Vector2d BoardPrint::hit(const Eigen::Vector3d& origin,
                                 const Eigen::Vector3d& direction) const {
   Eigen::Vector2d at_m = plane_hit(origin, direction);
   if (bend_.flat()) return at_m;
-  // Newton's method along the ray; two or three steps.
+  // Newton's method along the ray; converges in two or three steps.
   constexpr double exact_m = 1e-9;
   double distance = -origin.z() / direction.z();
   for (int step = 0; step < 8; ++step) {

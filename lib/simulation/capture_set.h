@@ -10,54 +10,57 @@
 
 namespace vlp {
 
-/// A straight way at constant speed.
+/// Straight drive at constant speed.
 struct StraightDrive {
   Eigen::Vector2d from_m, to_m;
   double speed_m_per_s;
 };
 
+/// Sinusoidal vibration of roll and pitch.
 struct Vibration {
   double amplitude_rad, frequency_hz;
 };
 
-/// Captures of the lamps. On spots: at each height, at each spot, at each yaw, so many times; the
-/// last changes fastest. On a drive: at each height, at each yaw, so many passes along it, with a
-/// capture every interval.
+/// Captures of the lamps, on spots or on a drive; the last-named index changes fastest.
+///   On spots: at each height, at each spot, at each yaw, `repeat` captures.
+///   On a drive: at each height, at each yaw, `repeat` passes, with a capture every interval_s.
 struct LampShots {
   std::vector<double> heights_m;
-  /// Where the axis stands, or comes by on its drive.
+  /// Position of the rotation axis in the world; on a drive, at each capture of a pass.
   std::vector<Eigen::Vector2d> spots_m;
   std::optional<StraightDrive> drive;
   std::vector<double> yaws_rad;
-  /// Each yaw is off by up to so much, at random.
+  /// Amplitude of the uniform random error of each yaw.
   double yaw_jitter_rad;
-  /// During each capture; on a drive also from one to the next.
+  /// Yaw rate during each capture; on a drive also between captures.
   double turn_rate_rad_per_s;
   int repeat;
-  /// From one capture to the next.
+  /// Time from one capture to the next.
   double interval_s;
-  /// Whether captures.csv tells where the camera is: exactly, as a fixture that holds the camera
-  /// itself would know it.
+  /// True if captures.csv contains the exact camera position, as from a fixture that holds the
+  /// camera itself.
   bool known;
-  /// How the carrier leans, from the first capture evenly to the last, and how that vibrates.
+  /// Roll and pitch of the base at the first and at the last capture, linear in between, and their
+  /// vibration.
   std::pair<double, double> roll_rad{0, 0}, pitch_rad{0, 0};
   Vibration vibration{0, 0};
 };
 
-/// Views of the board from all sides, chosen at random.
+/// Random views of the board from all sides.
 struct BoardViews {
   int count;
-  /// From the camera to the board's middle, least and most.
+  /// Minimum and maximum distance from the camera to the board's center.
   std::pair<double, double> distance_m;
-  /// Largest angle between the board's normal and the line of sight, and of turns about it.
+  /// Largest angle between the board's normal and the line of sight, and largest rotation about the
+  /// normal.
   double tilt_rad, roll_rad;
-  /// How far out the board's middle goes: 0 the image's middle, 1 its edges.
+  /// Range of the board's center over the image: 0 for the image center, 1 up to the image edges.
   double spread;
-  /// Of the board against the camera.
+  /// Velocity of the board relative to the camera, in the camera frame.
   Eigen::Vector3d velocity_m_per_s;
 };
 
-/// The captures of one folder: of the lamps or of the board.
+/// Captures of one folder, either of the lamps or of the board.
 struct CaptureSet {
   std::string folder;
   double exposure_s;

@@ -8,7 +8,7 @@
 namespace vlp {
 namespace {
 
-/// Refuses a height at which a light would not be above the camera.
+/// Rejects a height at which a light would not be above the camera.
 void check_height(const YamlValue& item, double height_m, const Scene& scene) {
   const auto check = [&](const Glow& glow, const std::string& name) {
     if (glow.position_m.z() <= height_m + 1e-3) throw item.error(name + " is not above the camera");

@@ -46,7 +46,7 @@ Panel read_place(YamlMap& map) {
   return panel;
 }
 
-/// Reads a panel with its radiance, and leaves the map open for more keys.
+/// Reads a panel with its radiance; further keys of the map may follow.
 Panel read_lit_panel(YamlMap& map) {
   Panel panel = read_place(map);
   panel.radiance_e_per_s = read_radiance(map, "radiance_e_per_s");
@@ -113,7 +113,7 @@ Sign read_sign(YamlMap map) {
   return sign;
 }
 
-/// Height of the lowest light but mirror images, in m.
+/// Returns the height of the lowest light, m. Mirror images do not count.
 double lowest_light_m(const std::vector<SceneLamp>& lamps, const Clutter& clutter) {
   double lowest_m = std::numeric_limits<double>::infinity();
   const auto see = [&](double height_m) { lowest_m = std::min(lowest_m, height_m); };
@@ -130,7 +130,7 @@ double lowest_light_m(const std::vector<SceneLamp>& lamps, const Clutter& clutte
   return lowest_m;
 }
 
-/// What is drawn as hiding every light has to be below every light.
+/// Rejects an occluder that is not below every light, since it is rendered as hiding all lights.
 void check_occluder(const YamlValue& item, const Panel& occluder, double lowest_light_m) {
   const double highest_m = occluder.corner_m.z() + std::max(0.0, occluder.edge_a_m.z()) +
                            std::max(0.0, occluder.edge_b_m.z());

@@ -13,10 +13,10 @@
 
 namespace vlp {
 
-/// Where the camera is, as seen by what is drawn, while a line is exposed.
+/// Pose of the camera in the frame of a rendered target while a line is exposed.
 using TargetFromCamera = std::function<Eigen::Isometry3d(int line)>;
 
-/// Where a ray meets the plane z = 0 of the target; NaN when it does not.
+/// Returns the intersection of a ray with the plane z = 0 of the target; NaN if there is none.
 inline Eigen::Vector2d plane_hit(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) {
   const double distance = -origin.z() / direction.z();
   if (!(distance > 0)) return Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
@@ -27,19 +27,22 @@ inline double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   return a.x() * b.y() - a.y() * b.x();
 }
 
-/// Returns a bit for each side of the bounds on whose outer side the point lies; 0 for NaN.
+/// Returns a bit mask of the sides of the bounds on whose outer side the point lies; 0 for NaN.
 inline unsigned sides_beyond(const Eigen::AlignedBox2d& bounds, const Eigen::Vector2d& point) {
   return unsigned(point.x() < bounds.min().x()) | unsigned(point.x() > bounds.max().x()) << 1 |
          unsigned(point.y() < bounds.min().y()) << 2 | unsigned(point.y() > bounds.max().y()) << 3;
 }
 
-/// Adds to each pixel of the window, which is all of `image`, weight times the mean of a flat
-/// pattern g over the pixel. The mean is exact for the pixel's image on the pattern, a
-/// quadrilateral Q: by Green's theorem the integral of g over Q is the sum over its edges of
-/// shape.edge_integral(p, q), which is the integral of G(x, y) along the edge for any G that
-/// Green's theorem turns into g. A shape has hit(origin, direction), in its frame,
-/// edge_integral(p, q) and bounds(): a quadrilateral whose corners all lie on the outer side of one
-/// side of these bounds is left out, as g is 0 there.
+/// Adds to each pixel of the window, which is all of `image`, `weight` times the mean of a flat
+/// pattern g over the pixel.
+///
+/// The mean is exact for the pixel's image on the pattern, a quadrilateral Q. By Green's theorem
+/// the integral of g over Q is the sum of shape.edge_integral(p, q) over its edges. An edge
+/// integral is the integral along the edge of any G(x, y) that Green's theorem turns into g.
+///
+/// A shape has hit(origin, direction) in its frame, edge_integral(p, q) and bounds().
+/// Quadrilaterals whose corners all lie on the outer side of one side of these bounds are skipped,
+/// as g is 0 there.
 template <typename Shape>
 void add_shape(const PixelRays& rays, const PixelWindow& window,
                const TargetFromCamera& target_from_camera, const Shape& shape, double weight,
@@ -53,7 +56,7 @@ void add_shape(const PixelRays& rays, const PixelWindow& window,
   const auto corners = static_cast<std::size_t>(window.place_end - window.place_begin) + 1;
   const Eigen::AlignedBox2d bounds = shape.bounds();
   std::vector<Eigen::Vector2d> above(corners), below(corners);
-  /// Sides of the bounds beyond which both corners lie, above and below.
+  /// Sides of the bounds beyond which both corners lie, the one above and the one below.
   std::vector<unsigned> sides(corners);
   for (int line = window.line_begin; line < window.line_end; ++line) {
     const Eigen::Isometry3d pose = target_from_camera(line);
@@ -85,7 +88,7 @@ void add_shape(const PixelRays& rays, const PixelWindow& window,
   }
 }
 
-/// The mean of a shape's pattern over a quadrilateral, its corners in turn.
+/// Returns the mean of a shape's pattern over a quadrilateral with its corners in order.
 template <typename Shape>
 double mean_over(const std::array<Eigen::Vector2d, 4>& corners, const Shape& shape) {
   double integral = 0, area = 0;
@@ -97,11 +100,13 @@ double mean_over(const std::array<Eigen::Vector2d, 4>& corners, const Shape& sha
   return integral / area;
 }
 
-/// The same as add_shape() of every half of a pixel along lines and places, in an image of twice as
-/// many of both: what a lens blurs is light that no pixel has gathered yet, and pixels' means that
-/// are blurred move an edge by 0.01 px. The rays within a pixel lie evenly between those of its
-/// corners. The shape has even_value(corners), too: its pattern's, where all of a quadrilateral has
-/// the same.
+/// Does the same as add_shape() for each quarter of a pixel, in an image with twice the lines and
+/// twice the places.
+///
+/// Reason: a lens blurs the light before pixels integrate it. Blurring pixel means instead would
+/// displace an edge by 0.01 px. Rays within a pixel are interpolated linearly between those of its
+/// corners. The shape also has even_value(corners): the value of its pattern where it is constant
+/// over a whole quadrilateral.
 template <typename Shape>
 void add_shape_in_halves(const PixelRays& rays, const PixelWindow& window,
                          const TargetFromCamera& target_from_camera, const Shape& shape,

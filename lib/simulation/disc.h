@@ -8,8 +8,8 @@
 
 namespace vlp {
 
-/// A disc around the origin with the radiance 1 - (1 - edge_share) (r / radius)^2, or an ellipse
-/// with its axes along x and y, which is a disc in units of the half axes.
+/// Disc around the origin with the radiance 1 - (1 - edge_share) (r / radius)^2. An ellipse with
+/// axes along x and y is a disc in units of its half axes.
 class Disc {
  public:
   Disc(const Eigen::Vector2d& half_axes_m, double edge_share)
@@ -23,9 +23,10 @@ class Disc {
     return {Eigen::Vector2d::Constant(-1), Eigen::Vector2d::Constant(1)};
   }
 
-  /// The integral over the part of the triangle (0, p, q) in the disc, in units of the radius
-  /// (add_shape needs no others). A triangle inside: the area (p x q) / 2, and of r^2
-  /// (p x q) (p p + p q + q q) / 12. A sector of angle a: a / 2 and a / 4.
+  /// Returns the integral over the part of the triangle (0, p, q) inside the disc, in units of the
+  /// radius. add_shape() needs no other triangles.
+  ///   Triangle inside: the area (p x q) / 2; of r^2, (p x q) (p p + p q + q q) / 12.
+  ///   Sector of angle a: the area a / 2; of r^2, a / 4.
   double edge_integral(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const;
 
  private:

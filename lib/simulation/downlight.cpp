@@ -10,7 +10,7 @@
 namespace vlp {
 namespace {
 
-/// Where the halo ends: at 3e-4 of what it is at the rim.
+/// End of the halo, in lengths from the rim: 3e-4 of the value at the rim is left there.
 constexpr double kHaloLengths = 8;
 
 double wall_share(const Recess& recess, double radius_m, const Eigen::Vector2d& at_m) {
@@ -21,7 +21,8 @@ double wall_share(const Recess& recess, double radius_m, const Eigen::Vector2d& 
   return recess.reflector_share + way * (dark.reflector_share - recess.reflector_share);
 }
 
-/// Of the chips around a place on the disc; those further away add less than 1e-3.
+/// Returns the added fraction from the chips around a point of the disc. Chips further away add
+/// less than 1e-3.
 double share_of_chips(const Chips& chips, double radius_m, const Eigen::Vector2d& at_m) {
   constexpr double widths = 1.6;
   const Eigen::Array2d first = ((at_m.array() - widths * chips.width_m) / chips.pitch_m).ceil();

@@ -7,18 +7,22 @@
 
 namespace vlp {
 
-/// How far from its centre a glow gives light, its halo included.
+/// Returns the radius up to which a glow emits light, its halo included, m.
 double reach_m(const Glow& glow);
 
-/// Returns the share of the source's radiance on a ray from the eye that crosses the rim's plane at
-/// a place inside the rim (both from the rim's centre, in metres); see Recess. 0 for an eye above
-/// that plane.
+/// Returns the radiance on a ray inside the rim, as a fraction of the source's radiance; see
+/// Recess. 0 for an eye above the rim's plane.
+///
+/// @param eye_m  start of the ray, from the rim's center, m
+/// @param at_m  intersection of the ray with the rim's plane, from the rim's center, m
 double share_inside(const Recess& recess, double radius_m, const Eigen::Vector3d& eye_m,
                     const Eigen::Vector2d& at_m);
 
 /// Adds to each pixel of the window, which is all of `image`, the radiance of a glow with a recess,
-/// chips, hot spots or a halo. How much of a pixel is inside the rim is exact (add_shape); what
-/// they give there is taken at the pixel's middle, so they should vary little within a pixel.
+/// chips, hot spots or a halo.
+///
+/// The fraction of a pixel inside the rim is exact (add_shape()). Radiances are evaluated at the
+/// pixel's center, so they should vary little within a pixel.
 void add_downlight(const PixelRays& rays, const PixelWindow& window,
                    const TargetFromCamera& glow_from_camera, const Glow& glow, cv::Mat1f& image);
 

@@ -11,10 +11,12 @@
 namespace vlp {
 namespace {
 
-/// A Poisson number. Small means by adding up probabilities until they pass a random one; from 16
-/// on by the quantile of a normal number with its correction for the skew (Cornish and Fisher,
-/// 1938), rounded; the correction and the rounding add 1/18 + 1/12 to the variance, which is taken
-/// off before. Mean and variance are right, the distribution nearly so.
+/// Returns a Poisson random number. Means below 16: adds up probabilities until the sum passes a
+/// uniform random number.
+///
+/// Means from 16 on: quantile of a normal random number with the skewness correction of Cornish and
+/// Fisher (1938), rounded. Correction and rounding add 1/18 + 1/12 to the variance, which is
+/// subtracted beforehand. Mean and variance are exact, the distribution nearly.
 float poisson(float mean, cv::RNG& random) {
   constexpr float small = 16;
   if (mean <= 0) return 0;
@@ -77,7 +79,7 @@ cv::Mat expose(const Sensor& sensor, const cv::Mat1f& mean_electrons, std::uint6
     levels.convertTo(image, type);
     return image;
   }
-  // The converter rounds before anybody fills in colours.
+  // The analog-to-digital converter rounds before demosaicing.
   for (float& level : levels) level = std::clamp(std::round(level), 0.F, float(white_dn(sensor)));
   auto colours = colours_of(*picture->bayer, sensor, levels);
   for (cv::Mat1f& colour : colours) develop(*picture, sensor, colour);

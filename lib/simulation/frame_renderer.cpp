@@ -30,7 +30,8 @@ cv::Mat1f vignetting_of(const PixelRays& rays, double power) {
           rays.corner(line, place).normalized() + rays.corner(line, place + 1).normalized() +
           rays.corner(line + 1, place).normalized() + rays.corner(line + 1, place + 1).normalized();
       const double cosine = ray.normalized().z();
-      // Beyond 90 degrees off the axis only a lens without vignetting sees; NaN: no ray.
+      // Rays beyond 90 degrees off the axis arrive only without vignetting. NaN: the pixel has no
+      // ray.
       const double share = cosine > 0 ? std::pow(cosine, power) : power == 0 && cosine <= 0 ? 1 : 0;
       image(line, place) = static_cast<float>(share);
     }
@@ -73,7 +74,7 @@ std::vector<Eigen::AlignedBox2d> bars_of(const Blind& blind) {
   return bars;
 }
 
-/// A mosaic of 1 in boxes of a panel, which are given in fractions of its edges.
+/// Returns a mosaic with the value 1 in boxes of a panel, given as fractions of its edges.
 Mosaic mosaic_on(const Panel& panel, const std::vector<Eigen::AlignedBox2d>& boxes) {
   const Eigen::Vector2d size_m(panel.edge_a_m.norm(), panel.edge_b_m.norm());
   std::vector<Rectangle> rectangles;
@@ -89,8 +90,8 @@ Mosaic mosaic_of(const Panel& panel) {
   return Mosaic({{0, 0, panel.edge_a_m.norm(), panel.edge_b_m.norm(), 1}});
 }
 
-/// What the camera sees in one part of an exposure, in electrons per second, without vignetting:
-/// directly, or by a mirror.
+/// Light on the sensor during one part of an exposure, in electrons per second, without vignetting.
+/// Direct light, or the light reflected by a mirror.
 class LampFrame {
  public:
   LampFrame(const Scene& scene, const PixelRays& rays, const PointSpread& optics,
@@ -112,7 +113,7 @@ class LampFrame {
     reflection_ = reflection_about(mirror->pane);
   }
 
-  /// What is always on.
+  /// Returns the light of all sources that are always on.
   cv::Mat1f steady() const {
     const Clutter& clutter = scene_.clutter;
     cv::Mat1f image = ceiling();
@@ -142,7 +143,7 @@ class LampFrame {
     return image;
   }
 
-  /// Adds a light that is switched; in a mirror, only one that is on the camera's side.
+  /// Adds a switched light. In a mirror: only lights on the camera's side of its plane.
   template <typename Wave>
   void add(const Glow& glow, const Wave& wave, cv::Mat1f& image) const {
     const Eigen::Vector3d eye_m = motion_.world_from_camera(0).translation();
@@ -187,7 +188,7 @@ class LampFrame {
     }
     return image;
   }
-  /// Puts the radiance of a panel in place of the ceiling's where the pattern is 1.
+  /// Replaces the radiance of the ceiling by that of a panel where the pattern is 1.
   void replace_ceiling(const Panel& panel, const Mosaic& pattern, cv::Mat1f& image) const {
     const PixelWindow window = window_of(outline_of(panel), motion_, part_, rays_);
     if (window.empty()) return;
@@ -199,7 +200,7 @@ class LampFrame {
       target.row(row) += (panel.radiance_e_per_s - ceiling_of(line)) * cover.row(row);
     }
   }
-  /// The share of each pixel that a panel covers.
+  /// Returns the fraction of each pixel that a panel covers.
   cv::Mat1f covered_by(const Panel& panel) const {
     cv::Mat1f covered = rays_.image(0);
     const PixelWindow window = window_of(outline_of(panel), motion_, part_, rays_);
@@ -212,13 +213,13 @@ class LampFrame {
     for (Eigen::Vector3d& point_m : outline_m) point_m = reflection_ * point_m;
     return intersection(window_of(outline_m, motion_, part_, rays_), pane_);
   }
-  /// In a mirror, rays are those that are reflected.
+  /// Returns the pose of the camera in a target's frame; for a mirror, of the reflected camera.
   TargetFromCamera target_from_camera(const Eigen::Isometry3d& target_from_world) const {
     return [this, target_from_rays = target_from_world * reflection_](int line) {
       return target_from_rays * motion_.world_from_camera(part_.middle_s(line));
     };
   }
-  /// `target` is the window's part of an image.
+  /// Draws a glow. `target` is the window's part of an image.
   void draw(const Glow& glow, const PixelWindow& window, cv::Mat1f target) const {
     if (!traits_of(glow.shape.kind).is_round) {
       const Panel panel = panel_of(glow);
@@ -240,7 +241,7 @@ class LampFrame {
     add_shape(rays_, window, glow_from_camera, Disc(*glow.shape.size_m / 2, glow.edge_share),
               glow.radiance_e_per_s, target);
   }
-  /// See Glow; what is left is taken at each pixel's middle.
+  /// Applies the falloff of Glow towards the edges of a panel, evaluated at each pixel's center.
   void fade(const Panel& panel, double edge_share, const PixelWindow& window,
             cv::Mat1f& own) const {
     const TargetFromCamera panel_from_camera = target_from_camera(panel_from_world(panel));
@@ -259,7 +260,7 @@ class LampFrame {
       }
     }
   }
-  /// `target` is the window's part of an image.
+  /// Draws a panel. `target` is the window's part of an image.
   void draw(const Panel& panel, double value, const PixelWindow& window, cv::Mat1f target) const {
     add_shape(rays_, window, target_from_camera(panel_from_world(panel)), mosaic_of(panel), value,
               target);
@@ -271,8 +272,8 @@ class LampFrame {
   const LampShot& shot_;
   const CarrierMotion& motion_;
   const Shutter& part_;
-  /// Share of each pixel's light that arrives: of what no occluder hides all, by a mirror what the
-  /// pane reflects. Empty when all of it does.
+  /// Fraction of each pixel's light that is not hidden by an occluder, times the reflectance of the
+  /// pane for a mirror. Empty if all light arrives.
   cv::Mat1f open_;
   const Mirror* mirror_ = nullptr;
   PixelWindow pane_{};
@@ -298,7 +299,7 @@ void add_mirror_images(const Scene& scene, const LampShot& shot, const LampFrame
   }
 }
 
-/// Points all over what is in view, for the smear.
+/// Returns points on the outlines of everything in view, for moved_px().
 std::vector<Eigen::Vector3d> outlines_of(const Scene& scene) {
   std::vector<Eigen::Vector3d> points_m;
   const auto add = [&](const auto& thing) {
@@ -350,7 +351,7 @@ cv::Mat1f FrameRenderer::lamp_electrons(const LampShot& shot) const {
 
 namespace {
 
-/// Points all over the board, for the smear.
+/// Returns points all over the board, for moved_px().
 std::vector<Eigen::Vector3d> points_on(const Board& board) {
   std::vector<Eigen::Vector3d> points_m;
   if (board.has_squares()) {

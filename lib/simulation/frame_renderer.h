@@ -13,21 +13,22 @@
 
 namespace vlp {
 
-/// The light that a scene's camera collects: the mean number of electrons of each pixel.
-///   - Each pixel integrates over its area (add_shape) and over its time: line i is exposed around
-///     Shutter::center_s(i), from where the camera is then. An exposure during which something in
-///     view moves by more than 0.1 px is the sum of several shorter ones.
-///   - A board is blurred in halves of pixels, before those gather the light (add_shape_in_halves).
-///   - Mirrors (Clutter::mirrors) show lights by rays that are reflected in the pane's plane.
-///   - A lamp's light is blurred by the lens first and switched by each line's own time after, as a
-///     rolling shutter sees it.
-/// Const and safe to share between threads.
+/// Renders the light that a scene's camera collects: the mean number of electrons of each pixel.
+///   - A pixel integrates over its area (add_shape()) and over its exposure. Line i is exposed
+///     around Shutter::center_s(i), from the pose of the camera at that time. Exposures during
+///     which something in view moves by more than 0.1 px are sums of several shorter ones.
+///   - A board is blurred at twice the resolution, before pixels integrate (add_shape_in_halves()).
+///   - Mirrors (Clutter::mirrors) show lights by rays that are reflected at the plane of the pane.
+///   - The light of a lamp is first blurred by the lens, then switched at each line's exposure
+///     time, as with a rolling shutter.
+/// Const; may be shared between threads.
 class FrameRenderer {
  public:
-  /// The scene outlives it. Throws std::invalid_argument for a board that cannot be printed.
+  /// The scene must outlive the renderer.
+  /// @throws std::invalid_argument if the board cannot be printed
   explicit FrameRenderer(const Scene& scene);
 
-  /// Lines x places (PixelRays).
+  /// Returns electrons per pixel, as lines x places (PixelRays).
   cv::Mat1f lamp_electrons(const LampShot& shot) const;
   cv::Mat1f board_electrons(const BoardShot& shot) const;
 
@@ -42,7 +43,7 @@ class FrameRenderer {
   const Scene& scene_;
   PixelRays rays_;
   PointSpread optics_;
-  /// Vignetting, and the dust on the lens.
+  /// Vignetting and dust on the lens, 0 to 1.
   cv::Mat1f transmission_;
   std::optional<BoardPrint> print_;
 };

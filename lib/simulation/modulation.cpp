@@ -19,7 +19,7 @@ double SquareWave::lit_share(double begin_s, double end_s) const {
 }
 
 double RectifiedSine::lit_share(double begin_s, double end_s) const {
-  // The integral of |sin(pi x)| from 0 to x is 2 / pi for each whole period.
+  // The integral of |sin(pi x)| from 0 to x grows by 2 / pi for each whole period.
   const auto integral_until = [&](double t_s) {
     const double periods = frequency_hz * t_s + phase;
     const double whole = std::floor(periods);

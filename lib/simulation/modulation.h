@@ -6,19 +6,19 @@
 
 namespace vlp {
 
-/// A lamp switched by a square wave: lit while frac(frequency t + phase) < duty.
+/// Square wave that switches a lamp: lit while frac(frequency t + phase) < duty.
 struct SquareWave {
   double frequency_hz;
   double duty;
   double phase;  // in periods
 
-  /// The lit share of the time from begin_s to end_s > begin_s, in closed form.
+  /// Returns the lit fraction of the time from begin_s to end_s > begin_s, in closed form.
   double lit_share(double begin_s, double end_s) const;
 };
 
-/// A light on the mains: of its greatest brightness it gives
-///   1 - depth + depth |sin(pi (frequency t + phase))|.
-/// The frequency is that of the light, twice that of the mains.
+/// Wave of a light on the mains, as a fraction of its greatest brightness:
+///   1 - depth + depth |sin(pi (frequency t + phase))|
+/// The frequency is that of the light, twice the mains frequency.
 struct RectifiedSine {
   double frequency_hz;
   double depth;

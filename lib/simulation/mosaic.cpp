@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// Ascending, with those that are the same but for rounding once.
+/// Returns the coordinates in ascending order, with those that differ by rounding only merged.
 std::vector<double> distinct(std::vector<double> lines) {
   constexpr double same_m = 1e-9;
   std::sort(lines.begin(), lines.end());
@@ -20,22 +20,23 @@ std::vector<double> distinct(std::vector<double> lines) {
   return lines;
 }
 
-/// How many lines are at or below a coordinate: 0 before the first.
+/// Returns the number of lines at or below a coordinate: 0 before the first.
 int cell_of(const std::vector<double>& lines, double at) {
   return static_cast<int>(std::upper_bound(lines.begin(), lines.end(), at) - lines.begin());
 }
 
-/// The line that is closest.
+/// Returns the index of the closest line.
 int line_at(const std::vector<double>& lines, double at) {
   const auto closer = [&](double a, double b) { return std::abs(a - at) < std::abs(b - at); };
   return static_cast<int>(std::min_element(lines.begin(), lines.end(), closer) - lines.begin());
 }
 
-/// A walk over the lines of one axis: the cell, and the share of the way where it ends.
+/// Traversal of the cells along one axis: the current cell, and the fraction of the path at which
+/// it ends.
 struct Walk {
   Walk(const std::vector<double>& all, double from, double way)
       : lines(all), start(from), length(way), cell(cell_of(all, from)) {
-    if (way < 0 && cell > 0 && all[std::size_t(cell) - 1] == from) --cell;  // it leaves downwards
+    if (way < 0 && cell > 0 && all[std::size_t(cell) - 1] == from) --cell;  // downwards
   }
   double end() const {
     const int line = length > 0 ? cell : cell - 1;
@@ -83,7 +84,7 @@ void Mosaic::sum_up() {
   }
 }
 
-/// The integral of the pattern along a row up to x in a column.
+/// Returns the integral of the pattern along a row up to x, which lies in the given column.
 double Mosaic::value_sum(int column, int row, double x) const {
   if (column == 0) return 0;
   const std::size_t i = index(column, row);

@@ -27,7 +27,7 @@ double passed_share(const Bayer& bayer, int line, int place) {
 
 std::vector<cv::Mat1f> colours_of(const Bayer& bayer, const Sensor& sensor,
                                   const cv::Mat1f& levels) {
-  // Each colour's weights over the 3 x 3 pixels around one add up to 1 of those that have it.
+  // The weights over the 3 x 3 neighborhood add up to 1 over the pixels that have the color.
   const cv::Matx33f corners(.25F, .5F, .25F, .5F, 1, .5F, .25F, .5F, .25F);
   const cv::Matx33f sides(0, .25F, 0, .25F, 1, .25F, 0, .25F, 0);
   const auto black = static_cast<float>(sensor.black_level_dn);
@@ -41,7 +41,7 @@ std::vector<cv::Mat1f> colours_of(const Bayer& bayer, const Sensor& sensor,
       }
     }
     cv::Mat1f& filled = colours[static_cast<std::size_t>(colour)];
-    // Mirrored at the border pixels, so that the mosaic goes on.
+    // Mirrored at the border pixels, which continues the mosaic.
     cv::filter2D(own, filled, CV_32F, colour == 1 ? sides : corners, {-1, -1}, 0,
                  cv::BORDER_REFLECT_101);
     filled = filled / shares[static_cast<std::size_t>(colour)] + black;

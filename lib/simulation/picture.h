@@ -11,30 +11,30 @@
 
 namespace vlp {
 
-/// 255 or 65535.
+/// Returns the white level of the sensor, 255 or 65535.
 double white_dn(const Sensor& sensor);
 
-/// Which of the filters of Bayer is before a pixel: 0 blue, 1 green, 2 red, as in colour images.
+/// Returns the Bayer filter of a pixel: 0 blue, 1 green, 2 red, as in color images.
 int filter_at(int line, int place);
 
-/// The share of a pixel's light that its filter passes.
+/// Returns the fraction of a pixel's light that its filter passes, relative to green.
 double passed_share(const Bayer& bayer, int line, int place);
 
-/// The three colours of levels behind a mosaic of filters, balanced.
+/// Demosaics the gray levels behind a mosaic of filters and balances the three colors.
 std::vector<cv::Mat1f> colours_of(const Bayer& bayer, const Sensor& sensor,
                                   const cv::Mat1f& levels);
 
-/// The tone curve of Picture.
+/// Applies the tone curve of Picture to one gray level, DN.
 double coded_level(const Picture& picture, const Sensor& sensor, double level_dn);
 
-/// Tone curve and sharpening of Picture, on levels before they are rounded. Where the image ends it
-/// is continued.
+/// Applies tone curve and sharpening of Picture to gray levels before rounding. Border pixels are
+/// replicated.
 void develop(const Picture& picture, const Sensor& sensor, cv::Mat1f& levels);
 
-/// How the names of the images end.
+/// Returns the file name extension of the images: ".jpg" or ".png".
 std::string image_ending(const std::optional<Picture>& picture);
 
-/// The image as a file: JPEG, or PNG, of which every level comes back.
+/// Encodes the image as JPEG, or losslessly as PNG.
 std::vector<unsigned char> encoded(const cv::Mat& image, const std::optional<Picture>& picture);
 
 }  // namespace vlp

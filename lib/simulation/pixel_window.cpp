@@ -19,7 +19,7 @@ PixelWindow window_of(const std::vector<Eigen::Vector3d>& outline_m, const Carri
                       const Shutter& shutter, const PixelRays& rays) {
   const double begin_s = shutter.begin_s(-rays.margin_px());
   const double end_s = shutter.end_s(rays.lines() + rays.margin_px());
-  // Between two samples an arc of 450 px bulges by less than 0.1 px.
+  // Between two samples an arc of 450 px deviates from its chord by less than 0.1 px.
   const double step_rad = rad_from_deg(2);
   constexpr double a_period = 16;
   const double of_vibration =
@@ -40,7 +40,7 @@ PixelWindow window_of(const std::vector<Eigen::Vector3d>& outline_m, const Carri
       most = most.max(at);
     }
   }
-  constexpr int between_points_px = 2;  // the outline may bulge there
+  constexpr int between_points_px = 2;  // bulge of the outline between two points
   const int spare = rays.margin_px() + between_points_px;
   const PixelWindow all = whole_window(rays);
   return {std::max(all.line_begin, int(std::floor(least[0])) - spare),

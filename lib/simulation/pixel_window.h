@@ -11,7 +11,7 @@
 
 namespace vlp {
 
-/// Lines and places from begin to before end; they may lie in the margin.
+/// Window of lines and places, each from begin to before end. It may extend into the margin.
 struct PixelWindow {
   int line_begin, line_end, place_begin, place_end;
 
@@ -19,30 +19,32 @@ struct PixelWindow {
   cv::Mat1f image(float value) const {
     return cv::Mat1f(line_end - line_begin, place_end - place_begin, value);
   }
-  /// The window's part of an image with margin (PixelRays::image).
+  /// Returns the window's part of an image with margin (PixelRays::image()).
   cv::Mat1f of(const cv::Mat1f& image, int margin_px) const {
     return image(cv::Rect(place_begin + margin_px, line_begin + margin_px, place_end - place_begin,
                           line_end - line_begin));
   }
 };
 
-/// The image and its margin.
+/// Returns the window of the image and its margin.
 PixelWindow whole_window(const PixelRays& rays);
 
-/// Where something with that outline (points in world, close together) is seen during that part of
-/// the exposure while the camera moves, blur included. The whole where the lens does not describe
-/// all of the outline.
+/// Returns the window in which an object appears during the given part of the exposure while the
+/// camera moves, blur included. Returns the whole window if the lens does not describe the whole
+/// outline.
+///
+/// @param outline_m  neighboring points on the outline, in the world, m
 PixelWindow window_of(const std::vector<Eigen::Vector3d>& outline_m, const CarrierMotion& motion,
                       const Shutter& shutter, const PixelRays& rays);
 
-/// Returns the pixels that are in both.
+/// Returns the pixels that are in both windows.
 PixelWindow intersection(const PixelWindow& a, const PixelWindow& b);
 
 /// Returns the box around a glow.
 Panel panel_of(const Glow& glow);
 
-/// Points around the light of a glow (its rim, or where its halo ends), or along the edges of a
-/// panel.
+/// Returns points around the light of a glow (its rim, or the end of its halo), or along the edges
+/// of a panel.
 std::vector<Eigen::Vector3d> outline_of(const Glow& glow);
 std::vector<Eigen::Vector3d> outline_of(const Panel& panel);
 

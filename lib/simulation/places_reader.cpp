@@ -9,7 +9,7 @@
 namespace vlp {
 namespace {
 
-/// Refuses a spot on the floor without space for the camera to turn about it.
+/// Rejects a spot that does not leave space in the room for a rotation of the camera about it.
 void check_spot(const Eigen::Vector2d& spot_m, const Room& room, double lever_arm_m,
                 const YamlValue& value) {
   const Eigen::Array2d spot = spot_m.array();

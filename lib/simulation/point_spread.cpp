@@ -10,7 +10,7 @@
 namespace vlp {
 namespace {
 
-/// Reach of a Gaussian in standard deviations; less than 1e-4 of it is beyond.
+/// Radius of a Gaussian in standard deviations; less than 1e-4 of it lies outside along one axis.
 constexpr double kGaussianReach = 4;
 constexpr double kDiscStep_px = 0.5;
 
@@ -24,7 +24,7 @@ void blur(cv::Mat1f& image, double sigma_px) {
   cv::GaussianBlur(image, image, {size, size}, sigma_px, sigma_px, cv::BORDER_REPLICATE);
 }
 
-/// Returns the area of an even disc in each element, with the sum 1.
+/// Returns the area of a uniform disc in each element, with the sum 1.
 cv::Mat1f make_disc_kernel(double radius) {
   constexpr int samples = 16;  // along an edge of an element
   const int reach = static_cast<int>(std::ceil(radius + 0.5));
@@ -45,7 +45,7 @@ cv::Mat1f blur_by_disc(const cv::Mat1f& image, double radius) {
   return blurred;
 }
 
-/// Returns a figure of each element of a part, a function of line and place in pixels.
+/// Evaluates a function of (line, place), in pixels, at each element of a part.
 template <typename Figure>
 cv::Mat1f map_over(const cv::Mat1f& part, const SpreadWindow& window, const Figure& figure) {
   cv::Mat1f map(part.size());
@@ -59,8 +59,8 @@ cv::Mat1f map_over(const cv::Mat1f& part, const SpreadWindow& window, const Figu
   return map;
 }
 
-/// Returns a soft spot: 1 in the middle, 0 from 1 on, cos^2 in between. `distance` is over its
-/// radius.
+/// Returns the profile of a soft spot, cos^2: 1 in the middle, 0 from 1 on. `distance` is in units
+/// of its radius.
 double soft_spot(double distance) {
   const double cosine = distance < 1 ? std::cos(distance * std::numbers::pi / 2) : 0;
   return cosine * cosine;
@@ -98,7 +98,8 @@ void PointSpread::defocus(cv::Mat1f& part, const SpreadWindow& window) const {
     const cv::Mat1f blurred = blur_by_disc(part, step * kDiscStep_px * window.per_px);
     for (int row = 0; row < part.rows; ++row) {
       for (int col = 0; col < part.cols; ++col) {
-        // Weights that give the variance of the disc, which goes as the radius squared.
+        // Weights that preserve the variance of the disc, which is proportional to the radius
+        // squared.
         const double steps = double(radii(row, col)) / kDiscStep_px, low = std::floor(steps);
         const double upper = (steps * steps - low * low) / (2 * low + 1);
         const double weight = step == low ? 1 - upper : step == low + 1 ? upper : 0;

@@ -9,15 +9,15 @@
 
 namespace vlp {
 
-/// Returns how far the point spread of the optics reaches, in px; less than 1e-3 of the light is
-/// beyond. The veil reaches everywhere.
+/// Returns the radius of the point spread of the optics, px: less than 1e-3 of the light falls
+/// outside. The veil is not included, as it extends over the whole image.
 int reach_px(const Optics& optics);
 
-/// Part of an image, lines x places, as a lens spreads it.
+/// Position and resolution of a part of an image, lines x places, to be blurred.
 struct SpreadWindow {
   /// Line and place of its first pixel.
   int line_begin, place_begin;
-  /// Elements of the part per pixel along each axis.
+  /// Number of elements of the part per pixel along each axis.
   int per_px = 1;
 };
 
@@ -25,21 +25,21 @@ struct SpreadWindow {
 ///   - a Gaussian (Optics::blur_px), and a disc of defocus (Defocus), whose radius is interpolated
 ///     between discs of whole multiples of 0.5 px;
 ///   - a halo, a Gaussian into which a smear (LensSmear) scatters a fraction of the light;
-///   - a veil (Optics::veil): a fraction of the light of all the scene spreads evenly.
-/// Outside the image, edges are continued.
+///   - a veil (Optics::veil): a fraction of the light of the whole scene, spread evenly.
+/// Edges are replicated outside the image.
 class PointSpread {
  public:
   /// `optics` and `rays` outlive the object.
   PointSpread(const Optics& optics, const PixelRays& rays) : optics_(optics), rays_(rays) {}
 
-  /// Applies all but the veil.
+  /// Applies everything except the veil.
   void spread(cv::Mat1f& part, const SpreadWindow& window) const;
 
-  /// Applies the veil to an image that holds all of the scene.
+  /// Applies the veil to an image of the whole scene.
   void add_veil(cv::Mat1f& image) const;
 
-  /// Removes the scattered fraction from a part of the scene; returns what each pixel of the image
-  /// receives of it.
+  /// Removes the fraction scattered by the veil from the light of a part of the scene. Returns the
+  /// amount that each pixel of the image receives of it.
   float scatter(cv::Mat1f& part) const;
 
  private:
@@ -50,7 +50,7 @@ class PointSpread {
   const PixelRays& rays_;
 };
 
-/// Returns the fraction of the light that passes the dust on the lens (Dust), lines x places.
+/// Returns the fraction of the light that passes the dust on the lens (Dust), as lines x places.
 cv::Mat1f transmission_of(const std::vector<Dust>& dust, const PixelRays& rays);
 
 }  // namespace vlp

@@ -26,8 +26,8 @@ void draw_hot_spots(cv::RNG random, Glow& glow) {
   }
 }
 
-/// The strokes of a digit on a calculator, from the left, the bottom to the right, the top, as
-/// fractions of a letter's cell.
+/// Returns the strokes of a seven-segment digit as fractions of a letter's cell. x runs from left
+/// to right, y from bottom to top.
 const std::array<Eigen::AlignedBox2d, 7>& strokes_of_digit() {
   constexpr double left = 0.15, right = 0.75, bottom = 0.15, top = 0.85, stroke = 0.14;
   constexpr double middle = (bottom + top) / 2, half = stroke / 2;

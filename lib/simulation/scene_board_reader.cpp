@@ -20,7 +20,7 @@ SceneBoard read_scene_board(YamlMap map) {
   board.margin_m = map.required("margin_m").number_within(0, 2, "m");
   const YamlValue warp = map.required("warp_m");
   board.warp_m = Eigen::Vector2d(warp.numbers(2).data());
-  constexpr double micrometres = 1e6;  // in which the bound is told
+  constexpr double micrometres = 1e6;  // unit of the bound in messages
   const double tenth_m =
       0.1 * tag_pitch_m(board.print) * std::min(board.print.cols, board.print.rows);
   const double most = std::round(micrometres * tenth_m) / micrometres;

@@ -10,42 +10,44 @@
 #include "rig/yaml_reader.h"
 #include "simulation/scene.h"
 
-/// The parts of a scene file. Each throws InputError.
+/// Readers of the parts of a scene file. Each throws InputError.
 namespace vlp {
 
+/// Bounds of the room in the world.
 struct Room {
   Eigen::Vector3d min_m, max_m;
 };
 
-/// Of one folder.
+/// Largest number of captures of one folder.
 inline constexpr int kMostCaptures = 1'000'000;
 
 Eigen::Vector3d read_point(const YamlValue& value);
 double read_radiance(YamlMap& map, const std::string& key);
-/// Two numbers [least, most] within min and max.
+/// Reads two ascending numbers [least, most] within min and max.
 std::pair<double, double> read_range(const YamlValue& value, double min, double max,
                                      std::string_view unit);
-/// Refuses more than kMostCaptures; `where` has error().
+/// Rejects more than kMostCaptures captures. `where` provides error() for the message.
 template <typename Place>
 void check_count(double captures, const Place& where) {
   if (captures <= kMostCaptures) return;
   throw where.error("makes more than " + std::to_string(kMostCaptures) + " captures");
 }
 
-/// Lights are checked against the room.
+/// Read lamps, or other objects; lights are checked to be inside the room.
 std::vector<SceneLamp> read_scene_lamps(const YamlValue& list, const Room& room);
 Clutter read_clutter(YamlMap map, const std::vector<SceneLamp>& lamps, const Room& room);
-/// Reads a glow's keys but those of read_profile().
+/// Reads the keys of a glow except those of read_profile().
 Glow read_glow(YamlMap& map, const Room& room);
-/// Reads how the brightness of a disc is spread: recess or edge_share, and halo. Other shapes are
-/// evenly bright.
+/// Reads the brightness profile of a disc: recess or edge_share, and halo. Other shapes are evenly
+/// bright.
 void read_profile(YamlMap& map, Glow& glow);
 Picture read_picture(YamlMap map, const Sensor& sensor);
 SceneBoard read_scene_board(YamlMap map);
 ArchiveSpreads read_archive_spreads(YamlMap map);
-/// Where the axis stands at each capture: spots, a grid or a drive, all in the room.
+/// Reads the position of the rotation axis at each capture: spots, a grid or a drive, all inside
+/// the room.
 void read_places(YamlMap& map, const Scene& scene, const Room& room, LampShots& captures);
-/// Heights are checked against the lamps, too.
+/// Reads a capture set. Camera heights are checked to be below the lamps and inside the room.
 CaptureSet read_capture_set(YamlMap map, const Scene& scene, const Room& room);
 
 }  // namespace vlp

@@ -10,7 +10,8 @@
 namespace vlp {
 namespace {
 
-/// Grey level of a source that fills a pixel on the axis; without a picture it may pass white.
+/// Returns the gray level of a source that fills a pixel on the axis. Without a picture it may
+/// exceed white.
 double level_of(const Scene& scene, const CaptureSet& set, double radiance_e_per_s) {
   const Sensor& sensor = scene.sensor;
   const double level =

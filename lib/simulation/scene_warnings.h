@@ -9,9 +9,11 @@
 
 namespace vlp {
 
-/// What makes the captures of a set useless though the scene is valid, each in one line that begins
-/// with the folder: images nearly black or white, an exposure that blurs the stripes, stripes too
-/// fine to see.
+/// Returns warnings about conditions that make the captures of a set useless though the scene is
+/// valid. Each is one line that begins with the folder.
+///
+/// Covers images that are nearly black or white, exposures that blur the stripes, and stripes that
+/// are too fine.
 std::vector<std::string> warnings_about(const Scene& scene, const CaptureSet& set);
 
 }  // namespace vlp

@@ -9,9 +9,11 @@
 
 namespace vlp {
 
-/// Random numbers that depend on a seed, a name and an index alone; the same on every machine.
+/// Returns a random generator seeded by a seed, a name and an index alone; the same on every
+/// machine.
 cv::RNG random_of(std::uint64_t seed, std::string_view name, std::size_t index);
 
+/// Draws a seed of 64 bits.
 std::uint64_t next_seed(cv::RNG& random);
 
 }  // namespace vlp

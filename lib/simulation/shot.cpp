@@ -26,7 +26,7 @@ Eigen::Matrix3d rotation(double angle_rad, const Eigen::Vector3d& axis) {
   return Eigen::AngleAxisd(angle_rad, axis.normalized()).toRotationMatrix();
 }
 
-/// Which of a set's heights, spots and yaws a capture has, and how long its pass lasts already.
+/// Indices of a capture's height, spot and yaw, and the time since the start of its pass.
 struct Step {
   std::size_t height, spot, yaw;
   double driven_s;
@@ -44,7 +44,8 @@ Step step_of(const LampShots& captures, std::size_t index) {
   return {turned / yaws / spots, turned / yaws % spots, turned % yaws, 0};
 }
 
-/// The ray of the pixel `off` the middle, or of the last one before it that has a ray.
+/// Returns the ray of the pixel at the offset `off` from `middle`. If that pixel has no ray,
+/// returns the ray of the last pixel on the way there that has one.
 std::optional<Lens::Ray> last_ray(const Lens& lens, const Eigen::Vector2d& middle,
                                   const Eigen::Vector2d& off) {
   constexpr int halvings = 30;
@@ -137,7 +138,7 @@ LampShot lamp_shot(const Scene& scene, const CaptureSet& set, std::size_t index)
     shot.waves.push_back({lamp.frequency_hz, lamp.duty, periods - std::floor(periods)});
   }
   shot.noise_seed = next_seed(random);
-  // Drawn last, so that the other draws are those of a scene without such lights.
+  // Drawn last, so that the other random values equal those of a scene without such lights.
   for (const ForeignLight& light : scene.clutter.foreign_lights) {
     const double free_phase = random.uniform(0.0, 1.0);
     const double frequency_hz =
@@ -155,8 +156,8 @@ BoardShot board_shot(const Scene& scene, const CaptureSet& set, std::size_t inde
   cv::RNG random = random_of(scene.seed, set.folder, index);
   const auto share = [&] { return random.uniform(-1.0, 1.0); };
 
-  // The board's middle, and the board facing the camera; then turned in place. Where the lens has
-  // no ray, at its last one on the way there.
+  // The board's center is placed on a random ray and the board faces the camera; then it is rotated
+  // in place. Where the lens has no ray, the last ray on the way there is used.
   const Eigen::Vector2d half((scene.camera.imager_px[0] - 1) / 2.0,
                              (scene.camera.imager_px[1] - 1) / 2.0);
   const Eigen::Vector2d off = views.spread * Eigen::Vector2d{share(), share()}.cwiseProduct(half);

@@ -12,20 +12,20 @@
 
 namespace vlp {
 
-/// The camera on its carrier while it takes a picture. Times count from the middle of the exposure
-/// of the image's middle row (or column), which is when the capture is said to be taken.
+/// Motion of the camera on its base during a capture. Time 0 is the middle of the exposure of the
+/// image's middle row (or column), which is the time stamp of the capture.
 struct CarrierMotion {
-  /// The vertical axis at time 0, at the height of the camera.
+  /// Position of the vertical axis at time 0, at the height of the camera, in the world.
   Eigen::Vector3d axis_m;
   Eigen::Vector2d velocity_m_per_s;
   double yaw_rad;
   double turn_rate_rad_per_s;
   Mount mount;
-  /// How the carrier leans about the camera, over the tilt of the mount, at time 0 but for the
-  /// vibration, which roll and pitch have a quarter of a period apart.
+  /// Roll and pitch of the base about the camera, in addition to the tilt of the mount, at time 0
+  /// and without the vibration. The vibrations of roll and pitch are a quarter of a period apart.
   Inclination lean{0, 0};
   Vibration vibration{0, 0};
-  /// Of the vibration at time 0.
+  /// Phase of the vibration at time 0.
   double phase_rad = 0;
 
   bool at_rest() const {
@@ -35,19 +35,19 @@ struct CarrierMotion {
     return lean.roll_rad == 0 && lean.pitch_rad == 0 && vibration.amplitude_rad == 0;
   }
   Inclination inclination(double time_s) const;
-  /// Of the camera, on its arm, in the world at time 0.
+  /// Returns the velocity of the camera, on its lever arm, in the world at time 0.
   Eigen::Vector2d camera_velocity_m_per_s() const;
   Pose pose(double time_s) const;
   Eigen::Isometry3d world_from_camera(double time_s) const;
 };
 
-/// A capture of the lamps, with everything that chance decides.
+/// Capture of the lamps, with all random values.
 struct LampShot {
   std::string image;
   double time_s;
   double exposure_s;
   CarrierMotion motion;
-  /// Of each lamp of the scene; time 0 is time_s.
+  /// Waves of Scene::lamps, in their order; time 0 is time_s.
   std::vector<SquareWave> waves;
   std::uint64_t noise_seed;
   /// Waves of Clutter::foreign_lights, in their order; time 0 is time_s.
@@ -56,7 +56,7 @@ struct LampShot {
   double ambient_phase = 0;
 };
 
-/// A capture of the board.
+/// Capture of the board.
 struct BoardShot {
   std::string image;
   double exposure_s;
@@ -67,10 +67,11 @@ struct BoardShot {
   Eigen::Isometry3d camera_from_board(double time_s) const;
 };
 
-/// How many captures a set has.
+/// Returns the number of captures of a set.
 std::size_t shots_in(const CaptureSet& set);
 
-/// The capture of that index; it depends on the scene's seed, the set's folder and the index alone.
+/// Returns capture `index` of a set. It depends on the scene, its seed, the set's folder and the
+/// index alone.
 LampShot lamp_shot(const Scene& scene, const CaptureSet& set, std::size_t index);
 BoardShot board_shot(const Scene& scene, const CaptureSet& set, std::size_t index);
 

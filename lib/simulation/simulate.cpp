@@ -62,7 +62,7 @@ void write_image(const fs::path& file, const cv::Mat& lines, const Scene& scene)
   write_file(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 
-/// Renders a capture unless it is there.
+/// Renders a capture. Returns false if the image exists already.
 bool render(const Scene& scene, const FrameRenderer& renderer, const CaptureSet& set,
             std::size_t index, const fs::path& folder) {
   const auto write = [&](const std::string& image, const auto& electrons, std::uint64_t seed) {
@@ -109,7 +109,7 @@ void claim_for_simulation(const fs::path& output, const std::string& origin) {
                      "remove it");
   }
   make_folder(output);
-  // A run that was killed here may have left its unfinished scene.yaml.
+  // An execution killed here may have left its temporary scene.yaml.
   const auto foreign = [](const fs::directory_entry& entry) {
     return !entry.path().filename().string().starts_with(".scene.yaml.tmp-");
   };

@@ -10,17 +10,19 @@
 
 namespace vlp {
 
-/// Where what is drawn is, as seen by the camera, at a time around that of the capture.
+/// Pose of a rendered target in the camera frame at a time relative to that of the capture.
 using CameraFromTarget = std::function<Eigen::Isometry3d(double time_s)>;
 
-/// The longest way that one of the points (in the target's frame) goes in the image during an
-/// exposure, in pixels, along a path of 16 pieces. Ways outside the image do not count.
+/// Returns the longest path of one of the points in the image during an exposure, px, approximated
+/// by 16 segments. Segments away from the image do not count.
+///
+/// @param points_m  points in the target's frame
 double moved_px(const std::vector<Eigen::Vector3d>& points_m,
                 const CameraFromTarget& camera_from_target, double exposure_s,
                 const PixelRays& rays);
 
-/// Into how many parts an exposure is split in which something moves by so much: 0.1 px or less
-/// each, but 1000 parts at most.
+/// Returns the number of parts into which an exposure is divided so that the image moves by at most
+/// 0.1 px in each; at most 1000.
 int parts_of_exposure(double moved_px);
 
 }  // namespace vlp

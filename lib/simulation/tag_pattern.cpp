@@ -38,7 +38,7 @@ const std::map<std::string, Family>& families() {
   return all;
 }
 
-/// The id is an int to libapriltag, since version 3.4 an unsigned one.
+/// Converts the id to the type of libapriltag: int, since version 3.4 unsigned.
 template <typename Id>
 image_u8_t* drawn_by(image_u8_t* (*draw)(apriltag_family_t*, Id), apriltag_family_t* family,
                      int id) {
@@ -59,7 +59,7 @@ TagPattern tag_pattern(const std::string& name, int id, int border_bits) {
   if (border_bits == 2 && !plain) {
     throw std::invalid_argument("tags of " + name + " have no border of two black bits");
   }
-  // Of a plain tag libapriltag draws the white around it, too, which is the paper here.
+  // For plain tags libapriltag also renders the white surroundings, which are paper here.
   const int extra = border_bits - 1;
   const int trimmed = plain ? 1 : 0;
   TagPattern pattern;

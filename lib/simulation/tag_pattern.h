@@ -8,13 +8,13 @@
 
 namespace vlp {
 
-/// The printed bits of one AprilTag, upright as libapriltag draws it.
+/// Printed bits of one AprilTag, in the orientation in which libapriltag renders it.
 struct TagPattern {
-  /// Bits along an edge of the black border's square, which is tag_size_m wide.
+  /// Number of bits along an edge of the black border's square, which is tag_size_m wide.
   int border_width;
-  /// Bits that stand out of that square on each side (families whose border is white inside).
+  /// Number of bits outside that square on each side (families whose border is white inside).
   int outside;
-  /// Row by row from the top left, border_width + 2 outside along an edge; true is white.
+  /// Bits row by row from the top left, width() along an edge; true is white.
   std::vector<bool> white;
 
   int width() const { return border_width + 2 * outside; }
@@ -24,8 +24,9 @@ struct TagPattern {
   }
 };
 
-/// Throws std::invalid_argument when the family has no such id, or when border_bits is 2 for a
-/// family that has no plain black border.
+/// Returns the pattern of a tag.
+/// @throws std::invalid_argument if the family has no such id, or if border_bits is 2 for a family
+/// without a plain black border
 TagPattern tag_pattern(const std::string& family, int id, int border_bits);
 
 }  // namespace vlp

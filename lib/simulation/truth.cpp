@@ -21,16 +21,18 @@ struct Seen {
   double time_s;
 };
 
-/// Where a moving point is seen, and when: at the time at which its line is exposed. Nothing when
-/// the lens does not describe it, or when it moves along with the lines, so fast that there is no
-/// such time. `camera_from_target` is a function of the time.
+/// Returns pixel and time of a moving point: the time at which the pixel's line is exposed.
+/// `camera_from_target` is a function of the time.
+///
+/// Returns std::nullopt if the lens does not describe the point. The same if it moves along with
+/// the readout, so fast that there is no such time.
 template <typename Motion>
 std::optional<Seen> seen(const FrameRenderer& renderer, const Shutter& shutter,
                          const Motion& camera_from_target, const Eigen::Vector3d& point_m) {
   constexpr double exact_px = 1e-7;
   std::optional<Eigen::Vector2d> before;
   double time_s = 0;
-  // Each round leaves (lines that it moves in a line's time) of the error.
+  // Each iteration multiplies the error by the lines that the point moves in a row time.
   for (int round = 0; round < 200; ++round) {
     const auto pixel = renderer.rays().lens().project(camera_from_target(time_s) * point_m);
     if (!pixel) return std::nullopt;
@@ -84,8 +86,7 @@ GlowPoints points_of(const Glow& glow) {
   return points;
 }
 
-/// Where the centre of a glow is seen and how much of it, directly or by a mirror. Nothing if the
-/// lens does not describe its centre or nothing of it is in view.
+/// Image of a glow's center and the visible fraction of the glow, directly or by a mirror.
 struct SeenGlow {
   Eigen::Vector2d pixel;
   double in_view;
@@ -110,10 +111,12 @@ double share_in_view(const Scene& scene, const FrameRenderer& renderer, const Sh
   const auto count = std::count_if(face_m.begin(), face_m.end(), visible);
   const auto points = static_cast<double>(face_m.size());
   if (count < std::ptrdiff_t(face_m.size())) return double(count) / points;
-  // Wholly in view is said only of a lamp whose rim is.
+  // A lamp counts as wholly in view only if its rim is, too.
   return std::all_of(rim_m.begin(), rim_m.end(), visible) ? 1 : (points - 0.5) / points;
 }
 
+/// Returns std::nullopt if the lens does not describe the glow's center, or if no part of it is in
+/// view.
 std::optional<SeenGlow> seen_glow(const Scene& scene, const FrameRenderer& renderer,
                                   const LampShot& shot, const Glow& glow,
                                   const Mirror* mirror = nullptr) {

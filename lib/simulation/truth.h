@@ -13,22 +13,23 @@
 
 namespace vlp {
 
-/// A lamp as a capture shows it.
+/// Lamp as it appears in a capture.
 struct TrueLamp {
   int id;
-  /// Where the centre of the disc or rectangle is seen, each line of the image at its own time.
+  /// Image of the center of the disc or rectangle, each line of the image at its own time.
   Eigen::Vector2d pixel;
-  /// The share of it that is in the image and not hidden, of some 200 points spread over it.
+  /// Fraction of the lamp that is inside the image and not hidden, from some 200 points spread over
+  /// it.
   double in_view;
 };
 
-/// The lamps that are at least partly in view and whose centre the lens describes, though it may
-/// lie outside the image.
+/// Returns the lamps that are at least partly in view and whose center the lens describes. The
+/// center may lie outside the image.
 std::vector<TrueLamp> true_lamps(const Scene& scene, const FrameRenderer& renderer,
                                  const LampShot& shot);
 
 enum class OtherLightKind {
-  mirror_image,  ///< a lamp of the map, shown by a mirror
+  mirror_image,  ///< a lamp of the map, reflected by a mirror
   pwm,           ///< a foreign light that a square wave dims
   mains          ///< a foreign light on the mains
 };
@@ -36,44 +37,48 @@ enum class OtherLightKind {
 /// Returns the kind as in true_other_lights.csv: "mirror_image", "pwm", "mains".
 std::string_view name_of(OtherLightKind kind);
 
-/// A light that flickers and is none of the lamps, as a capture shows it.
+/// Flickering light that is not one of the lamps, as it appears in a capture.
 struct TrueOtherLight {
   OtherLightKind kind;
-  /// The lamp of a mirror image.
+  /// Lamp id of a mirror image.
   std::optional<int> lamp;
-  /// Image of its centre; see TrueLamp.
+  /// Image of its center; see TrueLamp.
   Eigen::Vector2d pixel;
-  /// Share of it that is in the image, not hidden and, of a mirror image, within the pane.
+  /// Fraction of the light that is inside the image, not hidden and, for a mirror image, within the
+  /// pane.
   double in_view;
 };
 
-/// Mirror images and foreign lights that are at least partly in view and whose centre the lens
-/// describes.
+/// Returns the mirror images and foreign lights that are at least partly in view and whose center
+/// the lens describes.
 std::vector<TrueOtherLight> true_other_lights(const Scene& scene, const FrameRenderer& renderer,
                                               const LampShot& shot);
 
-/// A corner of a tag's black border as a capture shows it, see BoardTag for the order; of a board
-/// of squares, without a tag, one in which they touch, counted as square_corners_m() does.
+/// Corner of a tag's black border as it appears in a capture, in the order of BoardTag. For a board
+/// of squares without tags: an inner corner, numbered as in square_corners_m().
 struct TrueCorner {
   std::optional<int> tag;
   int corner;
   Eigen::Vector2d pixel;
 };
 
-/// The corners in the image.
+/// Returns the corners inside the image.
 std::vector<TrueCorner> true_corners(const Scene& scene, const FrameRenderer& renderer,
                                      const BoardShot& shot);
 
-/// The scene's camera, with its tilt as the rotation centre.
+/// Returns the scene's camera, with its tilt as the rotation center.
 Calibration true_calibration(const Scene& scene);
 
-/// The lamps as the lamp map has them, or (`surveyed` false) as they are.
+/// Returns the lamp map with map errors (`surveyed` true), or with the true positions.
 LampMap lamp_map_of(const Scene& scene, bool surveyed);
 
-/// Writes into `folder`: of lamps truth.csv, true_detections.csv (with the share in view),
-/// captures.csv and, of a scene with mirrors or foreign lights, true_other_lights.csv; of boards
-/// true_boards.csv (camera_from_board as a place in metres and a rotation vector in radians) and
-/// true_corners.csv. Returns how many captures show no lamp, or no corner. Throws InputError.
+/// Writes the ground truth of a set into `folder`.
+///   Lamps: truth.csv, true_detections.csv (with the fraction in view), captures.csv and, for a
+///   scene with mirrors or foreign lights, true_other_lights.csv.
+///   Boards: true_corners.csv and true_boards.csv (camera_from_board as a position in meters and a
+///   rotation vector in radians).
+/// Returns the number of captures without a lamp, or without a corner, in view.
+/// @throws InputError if a file cannot be written
 std::size_t write_truth(const Scene& scene, const FrameRenderer& renderer, const CaptureSet& set,
                         const std::filesystem::path& folder);
 

@@ -17,7 +17,7 @@ std::string pixel(double value_px) { return fixed(value_px, 6); }
 
 std::size_t write_lamp_truth(const Scene& scene, const FrameRenderer& renderer,
                              const CaptureSet& set, const std::filesystem::path& folder) {
-  // What all captures of the set lack is left out.
+  // Columns that no capture of the set needs are omitted.
   bool moves = false, leans = false;
   for (std::size_t i = 0; i < shots_in(set); ++i) {
     const CarrierMotion motion = lamp_shot(scene, set, i).motion;

@@ -23,7 +23,7 @@ constexpr int kPatience_s = 10, kPatienceWithFile_s = 5;
 
 using Parts = std::map<std::string, std::string>;
 
-/// Those that have a value. It frees the options.
+/// Returns the options that have a value, and frees `option`.
 Parts parts_of(PQconninfoOption* options) {
   const std::unique_ptr<PQconninfoOption, decltype(&PQconninfoFree)> owned(options, PQconninfoFree);
   Parts parts;
@@ -33,12 +33,12 @@ Parts parts_of(PQconninfoOption* options) {
   return parts;
 }
 
-/// What libpq makes of a connection string; empty when it cannot.
+/// Parses a connection string by libpq; empty if it is invalid.
 Parts parts_of(const std::string& where) {
   return parts_of(PQconninfoParse(where.c_str(), nullptr));
 }
 
-/// Whether a part of the password may stand where the host or the database is looked for.
+/// Returns true if a part of the password could be interpreted as host or database.
 bool may_be_misread(const std::string& where, const Parts& parts) {
   const std::string said = where.substr(0, where.find('?'));
   const auto begin = said.find(kScheme) + std::string(kScheme).size();
@@ -47,18 +47,18 @@ bool may_be_misread(const std::string& where, const Parts& parts) {
   if (at != std::string::npos && (at > slash || said.find('@', at + 1) != std::string::npos)) {
     return true;
   }
-  // postgresql://USER:PASSWORD/NAME, where the host was forgotten.
+  // postgresql://USER:PASSWORD/NAME, without the host.
   const auto port = parts.find("port");
   return port != parts.end() && port->second.find_first_not_of("0123456789,") != std::string::npos;
 }
 
-/// A connection string as libpq's own tools know it, of keywords.
+/// Returns true for a connection string of keywords, as of libpq's own tools.
 bool is_of_keywords(const std::string& where) {
   return where.find("password=") != std::string::npos || where.find("host=") != std::string::npos ||
          where.find("dbname=") != std::string::npos;
 }
 
-/// Whether libpq reaches a host through a socket or a loop, without a network.
+/// Returns true if libpq reaches a host through a socket or the loopback interface.
 bool is_here(const std::string& host) {
   return host.empty() || host.front() == '/' || host.front() == '@' || host == "localhost" ||
          host == "::1" || host.starts_with("127.");
@@ -100,7 +100,7 @@ std::string identity_of_database(const std::string& where) {
     return name_of_machine() + ":" + std::filesystem::absolute(name).lexically_normal().string();
   }
   Parts parts = parts_of(where);
-  parts.merge(parts_of(PQconndefaults()));  // what is said stays
+  parts.merge(parts_of(PQconndefaults()));  // given options take precedence
   const auto stated = [&](const char* key, const char* before) {
     return parts[key].empty() ? "" : before + parts[key];
   };
@@ -142,7 +142,7 @@ int patience_s(const std::string& where) {
   const auto parts = parts_of(where);
   const auto said = parts.find(kPatience);
   if (said == parts.end()) return kPatience_s;
-  // What is no number libpq refuses.
+  // libpq rejects other texts than numbers.
   constexpr long a_day_s = 86'400;
   constexpr int decimal = 10;
   return static_cast<int>(

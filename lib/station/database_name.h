@@ -6,40 +6,48 @@
 
 namespace vlp {
 
-/// Whether records are on a server, postgresql://... or postgres://...; otherwise in a file.
+/// Returns true if the records are on a server (postgresql://... or postgres://...), false for a
+/// file.
 bool is_server(const std::string& where);
 
-/// Returns true if a connection string states a password.
+/// Returns true if a connection string contains a password.
 bool states_password(const std::string& where);
 
-/// The database for a message: a server without user and passwords, wherever they stand. Throws
-/// InputError, which has no part of it that may be a password, when it is no connection string, or
-/// could be misread as another: a '@', ':', '/' or '?' in user or password is %40, %3A, %2F or %3F.
+/// Returns the name of a database for messages. A server is named without user and passwords,
+/// wherever they are in the connection string.
+///
+/// Throws InputError if `where` is no connection string or is ambiguous. In user and password '@',
+/// ':', '/' and '?' are written %40, %3A, %2F and %3F. The error quotes no part that could be a
+/// password.
 std::string name_of_database(const std::string& where);
 
-/// This machine's; empty when it has none.
+/// Returns the host name of this machine; empty if it has none.
 std::string name_of_machine();
 
-/// What tells databases apart, also for programs on other machines that share a folder: a file by
-/// its machine and its whole path, MACHINE:/var/lib/vlp/records.db; a server by host, address
-/// (hostaddr), port and database, or service, as libpq takes them, the environment's and its own
-/// defaults included, and by its machine, too, when it is reached without a network. It has no
-/// password, and the user's name only where that is the database's for want of another. Throws as
-/// name_of_database().
+/// Returns an identity of a database that is unique also among machines that share a folder. It
+/// contains no password.
+///
+///   file     MACHINE:/var/lib/vlp/records.db, the machine and the absolute path
+///   server   host, address (hostaddr), port and database, or service, as libpq resolves them,
+///            including its environment variables and its defaults
+///
+/// A server that is reached without a network has the machine, too. The user's name is included
+/// only if it is the name of the database because none is given. Throws as name_of_database().
 std::string identity_of_database(const std::string& where);
 
-/// What SOCI's PostgreSQL takes for a connection string. SOCI 4.0 reads one without a parameter as
-/// the name of a database, and takes blanks and quotes for its own. It says how long to wait for
-/// the server, patience_s(). Precondition: is_server().
+/// Returns a connection string for SOCI's PostgreSQL backend, with the connection timeout
+/// patience_s(). SOCI 4.0 reads a string without a parameter as a database name and interprets
+/// blanks and quotes itself. Precondition: is_server().
 std::string connection_of(const std::string& where);
 
-/// Whether a server answers at all, whoever asks for whatever: one that refuses a password, or has
-/// no TLS where it is asked for, does. Waits two seconds at most. Precondition: is_server().
+/// Returns true if a server answers, regardless of user and database. A server that refuses a
+/// password, or does not support the requested TLS, answers, too. Waits at most two seconds.
+/// Precondition: is_server().
 bool answers(const std::string& where);
 
-/// How long a database that does not answer is waited for, in seconds: a server as connect_timeout
-/// says, a day at most, 0 (also for less) for ever, ten without it; a file that another program
-/// writes, five.
+/// Returns the maximum time to wait for a database that does not answer, s. For a server
+/// connect_timeout applies, at most one day; 0 or less means no limit; the default is 10 s. For a
+/// file that another program writes it is 5 s.
 int patience_s(const std::string& where);
 
 }  // namespace vlp

@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 
 constexpr int kMany = 10'000;
 
-/// A file or folder that a value names.
+/// Returns the path in a value.
 fs::path path_of(const YamlValue& value, const fs::path& file) {
   const fs::path path = value.text();
   if (path.empty()) throw value.error("names nothing");
@@ -62,7 +62,7 @@ void read_refusal(YamlMap map, StationConfig& config) {
   map.finish();
 }
 
-/// Reads the files that a station names, and keeps their digests.
+/// Reads the files that a station names, and stores their digests.
 class Files {
  public:
   explicit Files(const fs::path& station) : station_(station) { add(station); }
@@ -86,7 +86,7 @@ class Files {
   std::vector<fs::path> names_;
 };
 
-/// A calibration whose camera tells lamps.
+/// Reads a calibration whose camera has row time and readout.
 Calibration read_shutter(const YamlValue& value, Files& files) {
   Calibration calibration = read_calibration(files(value));
   if (!calibration.camera.row_time_s || !calibration.camera.readout) {
@@ -95,7 +95,7 @@ Calibration read_shutter(const YamlValue& value, Files& files) {
   return calibration;
 }
 
-/// Puts guard bands on gates: {k: 1.645, standard_uncertainties: {METRIC: U}}.
+/// Adds guard bands to gates: {k: 1.645, standard_uncertainties: {METRIC: U}}.
 void read_guard_bands(YamlMap map, std::vector<Gate>& gates) {
   constexpr double most_k = 10, most_u = 1e6;
   const YamlValue factor = map.required("k");
@@ -116,7 +116,7 @@ void read_guard_bands(YamlMap map, std::vector<Gate>& gates) {
     if (accepted >= 0 && accepted <= kind.largest) continue;
     throw value->error("leaves nothing within the gate: k times this is more than there is");
   }
-  uncertainties.finish();  // what is no gate of the station
+  uncertainties.finish();  // uncertainties of metrics without a gate
   if (found == 0) throw stated.error("names no gate");
   map.finish();
 }
@@ -159,8 +159,8 @@ Retention read_retention(YamlMap map) {
 }
 
 /// Iterator over a text that counts its steps, shared by its copies, and throws std::length_error
-/// beyond a limit. std::regex tries nested repetitions in exponentially many ways and knows no
-/// limit of its own.
+/// beyond a limit. std::regex has no limit of its own, and tries nested repetitions in
+/// exponentially many combinations.
 class CountedIterator {
  public:
   using iterator_category = std::bidirectional_iterator_tag;
@@ -173,7 +173,7 @@ class CountedIterator {
   CountedIterator(const char* at, long* steps) : at_(at), steps_(steps) {}
 
   reference operator*() const {
-    constexpr long max_steps = 1'000'000;  // a serial of 64 characters takes some hundreds
+    constexpr long max_steps = 1'000'000;  // a serial of 64 characters requires hundreds
     if (++*steps_ > max_steps) throw std::length_error("steps");
     return *at_;
   }
@@ -196,7 +196,7 @@ class CountedIterator {
   long* steps_ = nullptr;
 };
 
-/// Returns why a serial is not of the form of a pattern; an empty string if it is.
+/// Returns the reason why a serial does not match a pattern; empty if it does.
 std::string pattern_problem(const std::string& serial, const std::string& pattern) {
   long steps = 0;
   const CountedIterator begin(serial.data(), &steps), end(serial.data() + serial.size(), &steps);
@@ -219,7 +219,8 @@ std::string read_pattern(const YamlValue& value) {
   return pattern;
 }
 
-/// A program of which a folder is named is beside the station, another where PATH says.
+/// Reads the command of a hook. A program with a folder in its name is relative to the station;
+/// others are found by PATH.
 Hook read_hook(YamlMap map, const fs::path& file) {
   Hook hook;
   const YamlValue command = map.required("command");
@@ -239,12 +240,12 @@ Hook read_hook(YamlMap map, const fs::path& file) {
   return hook;
 }
 
-/// A database: a file beside the station, or a server.
+/// Returns a database: a file relative to the station, or a server.
 std::string records_of(const YamlValue& value, const fs::path& file) {
   const std::string where = value.text();
   if (where.starts_with("postgresql://") || where.starts_with("postgres://")) return where;
   if (is_server(where)) throw value.error("should name a file, or be postgresql://...");
-  name_of_database(where);  // a file's
+  name_of_database(where);  // checks the name of a file
   return path_of(value, file).string();
 }
 

@@ -15,12 +15,13 @@
 
 namespace vlp {
 
-/// What counts as enough for each step.
+/// Completion criteria of the steps.
 struct StationEnough {
   int board_views = 36;
-  /// Share of 8 x 6 parts of the image in which the views have corners.
+  /// Fraction of the 8 x 6 cells of the image in which the views have corners.
   double board_coverage = 0.6;
-  /// Captures at each height of the turn, the heights, and the arc over which they go.
+  /// Number of captures at each height of the rotation, number of heights, and angular range
+  /// covered at each height.
   int turn_captures = 12;
   int turn_heights = 2;
   double turn_arc_rad = 5.2;
@@ -28,92 +29,100 @@ struct StationEnough {
   int check_captures = 36;
 };
 
-/// The reference camera of `verify`.
+/// Reference camera of `vlp-station verify`.
 struct GoldenUnit {
   std::string camera_id;
   Calibration calibration;
   std::vector<Gate> gates;
 };
 
-/// A command of the factory's own that is told of each verdict: labels, the factory's system,
-/// writing to the device.
+/// Command of the factory that runs after each verdict, for example to print labels, to update the
+/// factory's system, or to write to the device.
 struct Hook {
-  /// Program and arguments, as they are, without a shell.
+  /// Program and its arguments, passed without a shell.
   std::vector<std::string> command;
-  /// The folder in which it is run.
+  /// Working directory.
   std::filesystem::path folder;
-  /// Killed when it takes longer, with all processes of its group.
+  /// Time limit, s. The command and all processes of its group are killed when it is exceeded.
   double time_limit_s = 30;
 };
 
-/// When the golden unit is to be measured again, at the latest.
+/// Limits after which the golden unit has to be measured again.
 struct VerifyDue {
   std::optional<double> hours;
-  /// Units that were judged since.
+  /// Number of judged units since its last measurement.
   std::optional<int> units;
 };
 
-/// How long what of a run is kept beside its record, which stays; without a figure for ever.
+/// Retention times of the files of a run, in days; without a value they are kept forever. The
+/// record of a run is always kept.
 struct Retention {
   std::optional<int> images_days, results_days;
 };
 
-/// A station for one type of camera: `vlp-station/1`. Files that it names are beside it, unless
-/// their names begin with a slash.
+/// Configuration of a station for one type of camera, `vlp-station/1`. Relative file names in it
+/// refer to its folder.
 struct StationConfig {
   std::string station;
-  /// File of this configuration, as it was named.
+  /// File of this configuration, as given.
   std::filesystem::path file;
-  /// The camera's type: imager, lens model, row time, read-out, and as lens the nominal one.
+  /// Type of the cameras: imager, lens model, row time and readout, with the nominal lens as
+  /// intrinsics.
   Camera type;
   /// File name of `type`, for messages.
   std::string type_file;
   Board board;
   LampMap lamps;
-  /// Where the camera is in the step `dispersion` unless its captures.csv says it.
+  /// Position of the camera in the step `dispersion`, unless its captures.csv contains positions.
   std::optional<Eigen::Vector2d> dispersion_station_m;
   StationEnough enough;
-  /// Limits of the images.
+  /// Acceptance limits of images.
   FrontendOptions frontend;
-  /// Number of images rejected in a row after which a step is given up.
+  /// Number of consecutive rejected images after which a step is aborted.
   int max_rejected_in_a_row = 12;
-  /// With guard bands where `guard_bands` states standard uncertainties.
+  /// Gates, with guard bands if `guard_bands` contains standard uncertainties.
   std::vector<Gate> gates;
   std::optional<GoldenUnit> golden;
-  /// Only with a golden unit.
+  /// Requires a golden unit.
   std::optional<VerifyDue> verify_due;
-  /// A regular expression of ECMAScript that the ids of units match as a whole; empty: any do.
+  /// ECMAScript regular expression that the whole serial of a unit must match; empty if every
+  /// serial is valid.
   std::string serial_pattern;
-  /// Operators who may void runs of this station; empty: all may.
+  /// Operators who may void runs of this station; empty if all may.
   std::vector<std::string> void_operators = {};
-  /// Folders: where the images of a unit arrive, as CAPTURES/CAMERA/STEP/, and where results go.
+  /// Folder in which the images of a unit arrive, as CAPTURES/CAMERA/STEP/, and folder of the
+  /// results.
   std::filesystem::path captures, results;
-  /// A file of SQLite, or postgresql://...
+  /// SQLite file, or postgresql://...
   std::string records;
-  /// Files that are read: station.yaml, then those that it names.
+  /// Input files: station.yaml, then the files named in it.
   std::vector<std::filesystem::path> inputs = {};
   /// SHA-256 of the digests of `inputs`.
   std::string sha256;
-  /// The folder in which runs wait for the records, `spool` beside the station unless it says
-  /// another.
+  /// Folder of the runs that are not yet delivered to the records. Default: `spool` next to
+  /// station.yaml.
   std::filesystem::path spool;
   std::optional<Hook> hook;
   Retention keep;
 };
 
-/// Returns why a text cannot be a camera's id, which names folders; an empty string if it can.
+/// Returns the reason why a text is no valid camera id, which names folders; empty if it is valid.
 std::string camera_id_problem(const std::string& camera_id);
 
-/// Returns why a text cannot be the id of a unit of the station, which names folders, or that
-/// `serial_pattern` takes too long to be compared with it; an empty string if it can.
+/// Returns the reason why a text is no valid serial of a unit of the station; empty if it is valid.
+/// A serial names folders. Comparing it with `serial_pattern` must not take too long.
 std::string serial_problem(const StationConfig& config, const std::string& serial);
 
-/// The metrics of a unit, and those that its gates can be of.
+/// Returns the metrics of a unit, including all metrics that its gates can limit.
 std::vector<MetricKind> unit_metrics();
 
-/// Throws InputError with file, line and key: unknown or missing keys, figures that no station can
-/// mean, a gate of a figure that there is not, a guard band of what is no gate or that leaves
-/// nothing within it, a type or a golden unit without row time or read-out.
+/// Reads a station's configuration.
+///
+/// Throws InputError with file, line and key for
+/// - unknown or missing keys and implausible values,
+/// - a gate of an unknown metric,
+/// - a guard band of a metric without a gate, or one that leaves no acceptable value,
+/// - a camera type or a golden unit without row time or readout.
 StationConfig read_station(const std::filesystem::path& file);
 
 }  // namespace vlp

@@ -9,11 +9,11 @@
 
 namespace vlp {
 
-/// Makes a folder of a station unless it is there. Throws InputError.
+/// Creates a folder of a station if it does not exist. Throws InputError.
 void make_folder(const std::filesystem::path& folder);
 
-/// Checks before a unit is begun that a file can be written into a folder, and that there is room
-/// for so many bytes. Throws InputError.
+/// Checks that a folder is writable and has `bytes` of free space, before a unit is started. Throws
+/// InputError.
 void check_room(const SharedFolder& folder, std::uintmax_t bytes);
 
 }  // namespace vlp

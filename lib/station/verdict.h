@@ -9,31 +9,32 @@
 
 namespace vlp {
 
-/// How a run ends.
+/// Result of a run.
 enum class Verdict {
   pass,
-  /// The camera was measured, and is not good enough.
+  /// The camera was measured and does not meet the limits.
   fail,
-  /// The camera was not judged: the station, the operator or an end before the end stood in the
-  /// way. It counts in no yield and no trend; the run is to be done again.
+  /// The camera was not evaluated, because of the station, the operator or an aborted run. The run
+  /// counts neither for the yield nor for trends and has to be repeated.
   invalid
 };
 
-/// PASS, FAIL or INVALID.
+/// Returns PASS, FAIL or INVALID.
 constexpr const char* name_of(Verdict verdict) {
   constexpr std::array names{"PASS", "FAIL", "INVALID"};
   return names[static_cast<std::size_t>(verdict)];
 }
 
-/// Why a unit does not pass.
+/// Reason why a unit does not pass.
 struct Cause {
   std::string text;
-  /// Whether it is the camera's: a figure of it that misses its gate, or blur. All else is of what
-  /// it is measured with, or how.
+  /// True if the camera itself is the reason: a metric outside its gate, or blur. False for the
+  /// measuring equipment and its use.
   bool of_camera = false;
 };
 
-/// The first cause decides: what follows rests on it.
+/// Returns the verdict of the first cause, because later causes can follow from it; PASS without
+/// causes.
 inline Verdict verdict_of(const std::vector<Cause>& causes) {
   if (causes.empty()) return Verdict::pass;
   return causes.front().of_camera ? Verdict::fail : Verdict::invalid;

@@ -1,12 +1,15 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// against_mrcal: solve_intrinsics() and the whole process of mrcal-calibrate-cameras on the same
-/// corners of a plain board with 0.05 px of noise, 36 views through OPENCV8, and 40 of a lens of
-/// 190 degrees for a splined one: processor time of each, and how far the two lenses are apart
-/// where the corners tell them, of the splined ones in the same frame. Processor time, since it
-/// does not depend on what else the machine does. Exit code 1 when the lenses differ, when
-/// mrcal-calibrate-cameras fails, or of OPENCV8 is not several times as slow; 77 when it is not
-/// installed.
+/// against_mrcal: compares solve_intrinsics() with a complete run of mrcal-calibrate-cameras on the
+/// same corners.
+///
+/// The corners are those of a plain board with 0.05 px of noise: 36 views through OPENCV8, and 40
+/// views of a 190-degree lens for a splined model. Prints the processor time of both, and the
+/// difference of the lenses where the corners determine them, for splined lenses in the same frame.
+/// Processor time is independent of other load.
+///
+/// Exit code 1 if the lenses differ, if mrcal-calibrate-cameras fails, or if for OPENCV8 it is not
+/// several times as slow. Exit code 77 if it is not installed.
 #include <fmt/core.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -27,9 +30,9 @@
 namespace vlp {
 namespace {
 
-constexpr int kSkipped = 77;  // as CTest is told
+constexpr int kSkipped = 77;  // SKIP_RETURN_CODE of the test
 #ifdef __SANITIZE_ADDRESS__
-constexpr double kLeastRatio = 0;  // only the solve here is slowed down
+constexpr double kLeastRatio = 0;  // the sanitizer slows down only the solve of this project
 #else
 constexpr double kLeastRatio = 5;  // measured: 8.8 to 9.5
 #endif
@@ -42,7 +45,7 @@ double cpu_of_children_s() {
          micro * static_cast<double>(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
 }
 
-/// Of a .cameramodel.
+/// Reads the lens of a .cameramodel.
 Lens lens_of(const std::string& text, LensModel model) {
   const std::string key = "'intrinsics': [";
   const char* at = text.c_str() + text.find(key) + key.size();
@@ -55,8 +58,8 @@ Lens lens_of(const std::string& text, LensModel model) {
   return Lens(model, parameters);
 }
 
-/// The corners as write_corners() writes them, with the weights of the solve: over the noise for
-/// which it is regularized.
+/// Writes the corners as write_corners() does, with the weights of the solve: relative to the noise
+/// for which it is regularized.
 void write_weighted(const std::filesystem::path& file, const IntrinsicsSolution& solution,
                     std::span<const std::string> names) {
   write_corners(file, solution, names);
@@ -77,15 +80,15 @@ struct Case {
   const char* name;
   IntrinsicsInput input;
   int focal_px;
-  /// Of mrcal-calibrate-cameras.
+  /// Arguments of mrcal-calibrate-cameras.
   const char* options;
-  /// The lenses are compared where the corners tell them to so much.
+  /// Limit of the uncertainty of projections below which the lenses are compared.
   double known_px;
   double most_apart_px, least_ratio;
 };
 
-/// mrcal's solve once more, from where mrcal-calibrate-cameras ended, with the core of the solution
-/// and the rays that hold its frame, which a splined lens is free to turn.
+/// Repeats mrcal's solve from the result of mrcal-calibrate-cameras, with the core of the solution.
+/// The rays that fix its frame are included, because a splined lens can rotate freely.
 constexpr const char* kInTheFrame = R"(
 import sys, mrcal, numpy as np
 file, core, held = sys.argv[1], np.array(eval(sys.argv[2])), np.array(eval(sys.argv[3]))
@@ -189,7 +192,7 @@ int compare() {
   Case splined{"splined",
                wide_input(false, 40, random, 0.05, {0, 0}, boards),
                270,
-               "--skip-outlier-rejection",  // they are left out already
+               "--skip-outlier-rejection",  // outliers are already rejected
                0.05,
                0.001,
                0};

@@ -1,10 +1,11 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// board_trials [SCENE [SEEDS [VIEWS [PICTURE]]]]: lenses from rendered boards behind the pictures
-/// that cameras make of them (tone curves, sharpening, JPEG, white that runs over), against the
-/// truth. SCENE is a folder of datasets/ (paper-rig); its boards are drawn with so many seeds (3),
-/// the scene's own first, in so many views (0: the scene's). PICTURE: of those whose name contains
-/// it.
+/// board_trials [SCENE [SEEDS [VIEWS [PICTURE]]]]: compares lenses from rendered boards with the
+/// truth, after the processing of cameras: tone curves, sharpening, JPEG, saturated white.
+///
+/// SCENE is a folder of datasets/ (default paper-rig). SEEDS is the number of seeds (default 3),
+/// starting with the scene's. VIEWS is the number of views (0, the default: the scene's). PICTURE
+/// selects the kinds of processing whose name contains it.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -27,10 +28,10 @@
 namespace vlp {
 namespace {
 
-/// What a camera makes of the light of a board.
+/// In-camera processing of the light of a board.
 struct Development {
   std::string name;
-  /// White over what the sensor holds; 0: as the scene exposes it.
+  /// White level over the sensor's full scale; 0 for the scene's exposure.
   double white;
   std::optional<Picture> picture;
 };
@@ -67,7 +68,7 @@ std::vector<Development> developments() {
           {"1.5 times white, sharpened, gamma 2.2, JPEG 80", 1.5, curve(2.2, 80, sharp)}};
 }
 
-/// JPEG has 8 bits: of a sensor with more, white is where its wells are full.
+/// JPEG has 8 bits: for sensors with more bits, white is the full well.
 Sensor sensor_behind(const Sensor& sensor, const std::optional<Picture>& picture) {
   constexpr int bits = 8;
   constexpr double black_dn = 2, white_dn = 255;
@@ -86,7 +87,8 @@ cv::Mat developed(const Scene& scene, const cv::Mat1f& electrons, std::uint64_t 
   return cv::imdecode(encoded(image, picture), cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
 }
 
-/// Over the pixels of a region, once the lenses are turned to agree best over the image.
+/// Difference over the pixels of a region, after rotating the lenses to the best agreement over the
+/// image.
 double worst_within(const ImageRegion& region, const Lens& truth, const Lens& lens,
                     const std::array<int, 2>& imager_px) {
   const auto pixels = pixel_grid(imager_px);

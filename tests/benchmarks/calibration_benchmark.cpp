@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Boards found in an image, and lenses solved for.
+/// Measures board detection and lens calibration.
 #include <benchmark/benchmark.h>
 
 #include "calibration/intrinsics/calibration_report.h"
@@ -19,7 +19,7 @@ void detect(benchmark::State& state, const std::string& scene) {
 BENCHMARK_CAPTURE(detect, plain, "paper-rig")->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(detect, kalibr, "paper-rig-faulty")->Unit(benchmark::kMillisecond);
 
-/// OPENCV8 from as many views, 0.05 px of noise.
+/// OPENCV8 from this number of views with 0.05 px of noise.
 void solve_lens(benchmark::State& state, bool kalibr) {
   const SyntheticViews views{synthetic_board(kalibr), synthetic_lens()};
   Random random(1);

@@ -1,9 +1,8 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// How far from the truth methods put the centres of lamps, in a folder of rendered captures:
-///   center_methods FOLDER
-/// with true_detections.csv in it and lamps.yaml and true_calibration.yaml beside it. Lamps are
-/// those wholly in view that our detector finds with and without the lens.
+/// center_methods FOLDER: compares the errors of methods for lamp centers in a folder of rendered
+/// captures. The folder contains true_detections.csv; lamps.yaml and true_calibration.yaml are next
+/// to it. Lamps are those completely in view that our detector finds with and without the lens.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -35,7 +34,7 @@ struct Errors {
   }
 };
 
-/// Of the pixels above the background's threshold.
+/// Uses the pixels above the background's threshold.
 struct LitPixels {
   Vector2d box_center, centroid;
 };
@@ -78,7 +77,7 @@ std::map<int, Light> lamps_in(const LightDetector& detector, const cv::Mat& imag
   return lamps;
 }
 
-/// Of lamps wholly in view, by image.
+/// Lamps completely in view, by image.
 std::map<std::string, std::map<int, Vector2d>> truth_in(const std::filesystem::path& folder) {
   const CsvTable table(folder / "true_detections.csv");
   const auto image = table.required("image"), lamp = table.required("lamp");

@@ -3,18 +3,18 @@
 /// consistency_trials [DRAWS [METHOD]]: compares the standard deviations that each method reports
 /// with its errors, over synthetic captures with known truth. DRAWS per cell is 200; METHOD is one
 /// of `joint`, `circle`, `axis`, `lamps`, `dispersion-camera`, `dispersion-paper`, `adjust`,
-/// `locate`, or all of them if it is left out.
+/// `locate`, or all of them by default.
 ///
-/// A cell is a map error, a number of captures, the headings of the camera and the way in which
-/// detections state their noise. Each draw has a map, captures and noise of its own. Columns:
+/// A cell is a map error, a number of captures, the headings of the camera and the reported noise
+/// of the detections. Each draw has its own map, captures and noise. Columns:
 ///   results   draws with a result;
 ///   warned    of these, draws with a warning;
 ///   no sd     of these, draws without a standard deviation;
 ///   e/sd, in  per parameter, over the draws without a warning: root mean square of the error over
 ///             its standard deviation, and the percentage of errors within 1.96 of them.
-/// `*` marks a cell that is outside 0.85 to 1.2 or 93 to 97 %, `**` one that is outside by more
-/// than three standard errors of the draws. Cells are judged if at least a tenth of their draws
-/// have a standard deviation and no warning.
+/// `*` marks a cell outside 0.85 to 1.2 or 93 to 97 %, `**` one that is outside by more than three
+/// standard errors of the draws. Cells are evaluated if at least 10 % of their draws have a
+/// standard deviation and no warning.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -42,16 +42,16 @@ namespace vlp {
 namespace {
 
 constexpr double kNoise_px = 0.3;
-/// Factor by which stated noise is too small in the cells of Noise::too_small.
+/// Factor by which reported noise is too small in the cells of Noise::too_small.
 constexpr double kUnderstatement = 1.4;
 constexpr double kTilt_rad = 0.026;  // 1.5 degrees
 constexpr double kTiltAzimuth_rad = 0.7;
-/// Standard deviation of the places that an adjustment is given.
+/// Standard deviation of the known positions of an adjustment.
 constexpr double kPlaceSd_m = 1e-3;
 
 constexpr double kMinRatio = 0.85, kMaxRatio = 1.2;
 constexpr double kMinCoverage = 0.93, kMaxCoverage = 0.97;
-/// Fraction of the draws that must pass without a warning for a cell to be judged.
+/// Minimum fraction of the draws without a warning for a cell to be evaluated.
 constexpr double kMinPassingFraction = 0.1;
 /// Number of standard errors beyond which a deviation is not due to the number of draws.
 constexpr double kMaxStandardErrors = 3;
@@ -110,7 +110,7 @@ struct Trial {
 /// does not go together with opposite yaws.
 double height_m(int k) { return k / 2 % 2 == 0 ? 0 : 0.3; }
 
-/// Draws the captures of one cell: lamps, a camera that leans, and a survey of the lamps.
+/// Draws the captures of one cell: lamps, a tilted camera, and a survey of the lamps.
 class Room {
  public:
   Room(const Cell& cell, double tilt_rad, Random& random)
@@ -130,8 +130,8 @@ class Room {
   const Calibration& calibration() const { return rig_.calibration; }
   const RotationCenter& center() const { return *rig_.calibration.rotation_center; }
 
-  /// Returns the yaw of capture `k`. All yaws: unevenly around the turn, which three captures
-  /// cover, too.
+  /// Returns the yaw of capture `k`. All yaws: unevenly around the circle, which already three
+  /// captures cover.
   double draw_yaw(int k) {
     constexpr double uneven = 0.3;
     switch (cell_.heading) {
@@ -164,7 +164,7 @@ class Room {
     return detections;
   }
 
-  /// Adds noise to detections and states it as the cell requires.
+  /// Adds noise to detections, and sets its reported size as the cell requires.
   std::vector<Detection> draw_noise(std::vector<Detection> exact) {
     std::vector<Detection> detections = with_noise(std::move(exact), random_);
     for (Detection& detection : detections) {
@@ -186,7 +186,7 @@ class Room {
   double base_yaw_rad_;
 };
 
-/// Camera that turns about an axis at one or more heights.
+/// Camera that rotates about an axis at one or more heights.
 struct Turn {
   Eigen::Vector2d axis_m{0.05, -0.03};
   Eigen::Vector2d lever_arm_m;
@@ -199,7 +199,7 @@ struct Turn {
   }
 };
 
-/// Turn with a lever arm, at two heights, which determine it.
+/// Rotation with a lever arm, at two heights, which determine it.
 Turn make_two_turns() { return {.lever_arm_m = {0.012, -0.009}, .heights_m = {0, 0.3}}; }
 
 /// Divides errors by the square roots of the variances on the diagonal of `covariance`.
@@ -211,8 +211,8 @@ NormalizedErrors normalize(const Eigen::VectorXd& error, const Eigen::MatrixXd& 
   return normalized;
 }
 
-/// Returns true if a warning is not the one about the lever arm. `joint` and `circle` always give
-/// that one, whatever the captures are.
+/// Returns true unless a warning is the one about the lever arm, which `joint` and `circle` give
+/// for all captures.
 bool has_warning(const StepResult& result) {
   return std::ranges::any_of(result.warnings, [](const std::string& warning) {
     return warning.find("lever arm") == std::string::npos;
@@ -286,7 +286,7 @@ Trial try_lamps(const Cell& cell, Random& random) {
   return trial;
 }
 
-/// Camera at a known station, its calibrated zenith wrong by 0.01 rad. The true offset is that of
+/// Camera at a known reference point, with a zenith error of 0.01 rad. The true offset is that of
 /// the same captures without noise, with the true map.
 Trial try_dispersion(const Cell& cell, Random& random, DispersionMethod method) {
   constexpr double zenith_error_rad = 0.01;
@@ -327,7 +327,7 @@ Trial try_paper_dispersion(const Cell& cell, Random& random) {
   return try_dispersion(cell, random, DispersionMethod::paper);
 }
 
-/// Turns at two heights, with the place of the axis measured once at each.
+/// Rotations at two heights, with the axis position measured once at each.
 Trial try_adjustment(const Cell& cell, Random& random) {
   const Turn turn = make_two_turns();
   Room room(cell, kTilt_rad, random);
@@ -425,11 +425,11 @@ struct Consistency {
   double coverage() const { return static_cast<double>(within) / count; }
 };
 
-/// Side of the limits on which a figure lies.
+/// Side of the limits on which a value lies.
 enum class Verdict { honest, too_small, too_large };
 
-/// Judges stated standard deviations, with the limits widened by a number of standard errors of
-/// `independent` errors: too small if errors are larger than stated.
+/// Compares reported standard deviations with errors, with limits widened by a number of standard
+/// errors of `independent` errors: too small if errors are larger than reported.
 Verdict judge(const Consistency& found, int independent, double standard_errors) {
   const double n = independent;
   const double ratio_margin = standard_errors / std::sqrt(2 * n);
@@ -472,11 +472,11 @@ CellResult run_cell(const Method& method, const Cell& cell, int draws, std::uint
 /// Counts over the cells of one method.
 struct Tally {
   int cells = 0, results = 0, judged = 0, outside = 0;
-  /// Cells that are outside by more than chance, by the side.
+  /// Cells that are significantly outside, by side.
   int too_small = 0, too_large = 0;
 };
 
-/// Judges the parameters of a cell, adds them to the tally, and returns the mark of the cell.
+/// Evaluates the parameters of a cell, adds them to the tally, and returns the mark of the cell.
 const char* mark_cell(const Method& method, const CellResult& cell, int draws, Tally& tally) {
   ++tally.cells;
   tally.results += cell.results;

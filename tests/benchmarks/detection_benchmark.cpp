@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// An 800 x 600 frame with four lamps from pixels in memory to identified centres, on one core, and
-/// two calls of OpenCV on the same frame beside it; then the same in the middle of 33 Mpx.
+/// Measures the detection of four lamps in an 800 x 600 frame, on one core, from pixels in memory
+/// to identified centers. Compares it with two calls of OpenCV on the same frame. Then measures the
+/// same in the middle of 33 Mpx.
 #include <benchmark/benchmark.h>
 
 #include <opencv2/core/utility.hpp>
@@ -75,7 +76,7 @@ void opencv_components(benchmark::State& state) {
   }
 }
 
-/// 70 times the pixels; the lens is of the small frame, so that it is left out.
+/// 70 times the pixels, without the lens, which is that of the small frame.
 void detect_in_33_mpx(benchmark::State& state) {
   detect_in(state, captures().large,
             {Readout::rows, captures().scene.camera.row_time_s, std::nullopt});

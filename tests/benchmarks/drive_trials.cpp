@@ -1,20 +1,24 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// drive_trials [CAPTURES]: fixes of rendered cameras that drive in all directions and turn by up
-/// to 90 degrees a second, under the lamps of datasets/paper-rig, found and located as users do: as
-/// if it stood; with nothing known but the greatest speed (2.5 m/s, 180 degrees a second); with
-/// odometry good to 1 %. Each speed has the same places, and so a camera that stands to compare
-/// with. Rms errors over those of the standing camera; of the velocity its rms error and the
-/// chi-square of it per degree of freedom. Captures of fewer than four lamps are left out. Of each
-/// capture two lamps alone, too, with odometry and with those two in a capture 50 ms before, of
-/// which nothing is known but the greatest speed. Then cameras that stand and lean by up to 15
-/// degrees, by 30, of which nobody knows how. The chi-square of the pose is the square of its
-/// errors over what pixels of that noise allow.
+/// drive_trials [CAPTURES]: measures fixes of rendered cameras that drive in all directions and
+/// rotate by up to 90 degrees per second, under the lamps of datasets/paper-rig. Lamps are detected
+/// and located as by users:
+/// - as if the camera stood,
+/// - with only the maximum speed known (2.5 m/s, 180 degrees per second),
+/// - with odometry accurate to 1 %.
 ///
-/// "possible" is what exact centres with the noise of those of the standing camera allow
-/// (body_limit), over what they allow one that is known to stand. Of the centres there is the mean
-/// error along the motion of the lamps in the image and across it, and what scatters about it per
-/// axis.
+/// All speeds use the same positions, including a standing camera for comparison. Prints RMS errors
+/// divided by those of the standing camera, and for the velocity its RMS error and its chi-square
+/// per degree of freedom. Skips captures of fewer than four lamps.
+///
+/// Each capture is also located by two of its lamps: with odometry, and with those two in a capture
+/// 50 ms before, with only the maximum speed known. Then follow standing cameras with an unknown
+/// tilt of up to 15 and 30 degrees. The chi-square of the pose is its squared error relative to the
+/// bound for pixels of that noise.
+///
+/// "possible" is the bound of exact centers with the noise of the standing camera (body_limit()),
+/// divided by that of a camera known to stand. For centers, prints the mean error along and across
+/// the motion of the lamps in the image, and the standard deviation per axis.
 #include <fmt/core.h>
 
 #include <Eigen/Cholesky>
@@ -39,7 +43,7 @@ namespace {
 
 struct Errors {
   double horizontal = 0, height = 0, yaw = 0, velocity = 0, chi_squared = 0, pose_chi_squared = 0;
-  /// Of the velocity's error, along the velocity.
+  /// Velocity error along the velocity.
   double along = 0;
   int fixes = 0, refused = 0;
 
@@ -69,14 +73,14 @@ struct Errors {
   double rms(double sum) const { return std::sqrt(sum / fixes); }
 };
 
-/// A capture as a limit is of it.
+/// Capture for the computation of a bound.
 struct Seen {
   std::vector<Eigen::Vector3d> lamps_m;
   Pose pose;
   double speed_m_per_s, turn_rate_rad_per_s;
 };
 
-/// Mean squares that exact centres with that noise allow.
+/// Mean squares at the bound for exact centers with that noise.
 struct Possible {
   double horizontal = 0, height = 0, yaw = 0, velocity = 0;
 
@@ -88,7 +92,7 @@ struct Possible {
   }
 };
 
-/// Of lamps' centres, along the motion in the image and across it.
+/// Errors of lamp centers along and across the motion in the image.
 struct CenterErrors {
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
   double squares = 0;
@@ -112,7 +116,7 @@ class Trials {
     scene_.camera.row_time_s = row_time_s;
   }
 
-  /// The room is too low for more: lamps would leave the image.
+  /// The room is too low for a larger tilt: lamps would leave the image.
   void run_leaning(int captures) {
     const FrameRenderer renderer(scene_);
     const Calibration calibration = true_calibration(scene_);
@@ -138,7 +142,7 @@ class Trials {
         const Fix fix = positioner.locate(detections, in_hand);
         errors.add(fix, motion);
         if (!fix.ok()) continue;
-        // Discs are circles in the level plane: looked at again where that now is known to be.
+        // Discs are circles in the level plane: detected again with the estimated tilt.
         DetectorCamera leaning = detector_camera(calibration);
         leaning.level_from_camera =
             level_from_inclination(fix.body->inclination) * leaning.level_from_camera;
@@ -242,7 +246,7 @@ class Trials {
   }
 
  private:
-  /// Of a camera of which nothing is known but its greatest speed, or with odometry.
+  /// Results with only the maximum speed known, or with odometry.
   void print_possible(const std::string& speed, const std::vector<Seen>& captures, bool odometry,
                       double noise_px) const {
     const Lens lens(scene_.camera.lens_model, scene_.camera.intrinsics);
@@ -305,7 +309,7 @@ class Trials {
     return two;
   }
 
-  /// With how many times the errors of `standing` they are.
+  /// Prints errors as multiples of those of `standing`.
   void print(const std::string& what, const char* how, const Errors& e,
              const Errors* standing) const {
     const auto times = [&](double Errors::*sum) {

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// A million fixes against their truth: the program; of it reading both tables; the figures with
-/// their intervals.
+/// Measures the evaluation of a million fixes: the program, the reading of both tables, and the
+/// statistics with their intervals.
 #include <benchmark/benchmark.h>
 
 #include <cstdlib>
@@ -23,7 +23,7 @@ struct Tables {
   }
 };
 
-/// Each capture at a place of its own, or twelve at each.
+/// Each capture at its own position, or twelve at each.
 Tables written(std::size_t count, std::size_t at_each) {
   Tables tables;
   Random random(1);

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// A fix from pixel positions, the lens included, beside OpenCV's undistortPoints and solvePnP on
-/// the same points in the same run.
+/// Measures a fix from pixel positions, including the lens, and OpenCV's undistortPoints and
+/// solvePnP on the same points in the same run.
 #include <benchmark/benchmark.h>
 
 #include <filesystem>
@@ -66,7 +66,7 @@ void fix_in_c(benchmark::State& state) {
 }
 BENCHMARK(fix_in_c)->ArgName("lamps")->Arg(2)->Arg(3)->Arg(4)->Arg(8);
 
-/// The same with what calibration and lamp map state of their errors: lens, zenith, survey.
+/// The same with the reported uncertainties of calibration and lamp map: lens, zenith, survey.
 void fix_with_the_common_part(benchmark::State& state) {
   Scene scene = scene_of(static_cast<std::size_t>(state.range(0)));
   SyntheticRig& rig = scene.rig;
@@ -87,7 +87,8 @@ void fix_with_the_common_part(benchmark::State& state) {
 }
 BENCHMARK(fix_with_the_common_part)->ArgName("lamps")->Arg(2)->Arg(3)->Arg(4)->Arg(8);
 
-/// The same lamps from a camera that drives at 1 m/s, turns and leans, with more and more unknown.
+/// The same lamps from a camera that drives at 1 m/s, rotates and is tilted, with more and more
+/// unknowns.
 void fix_of_a_body(benchmark::State& state, const Sensors& sensors, const BodyMotion& motion) {
   BodyRig rig{synthetic_lamps(), rolling_calibration(), {{{0.1, -0.05, 0}, 0.4}, motion}, {}};
   rig.map.lamps.resize(static_cast<std::size_t>(state.range(0)));
@@ -128,7 +129,7 @@ BENCHMARK_CAPTURE(fix_of_a_body, velocity_and_free_lean, sensors_of(0, 1.6), kLe
     ->Arg(4)
     ->Arg(8);
 
-/// solvePnP takes four points or more for its iterative method.
+/// The iterative method of solvePnP requires four points.
 void opencv_undistort_and_solve_pnp(benchmark::State& state) {
   const Scene scene = scene_of(static_cast<std::size_t>(state.range(0)));
   const auto& k = scene.rig.calibration.camera.intrinsics;

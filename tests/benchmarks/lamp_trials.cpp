@@ -2,14 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 /// lamp_trials KIND [IMAGES [SEED]]: renders images of lamps in memory, detects the lamps in them,
 /// and compares with the truth. KIND is
-///   recessed   scene datasets/recessed: sources deep in reflectors, from aside;
+///   recessed   scene datasets/recessed: sources deep in reflectors, viewed obliquely;
 ///   chips      scene datasets/paper-rig with seven random LED chips behind each lamp's diffuser,
 ///              drawn again in each image, and a halo of 12 % on the ceiling;
 ///   foreign    images of 400 x 300 with foreign lights, mirrors, blinds and signs, all drawn at
 ///              random in each image;
 ///   a scene    the path of a scene.yaml.
-/// Scenes are rendered by their folders of lamps (but `sample`), one image of each in turn; when
-/// all are used up, again with the next seed. IMAGES is 200, SEED 1, of a scene its own.
+/// Scenes are rendered by their folders of lamps (except `sample`), one image of each alternately,
+/// and then again with the next seed. IMAGES is 200. SEED is 1, or that of the scene.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -45,7 +45,7 @@ std::vector<Light> detect_lights(const LightDetector& detector, const cv::Mat& i
   return detector.detect(image_view(image));
 }
 
-/// The image of a shot as a program reads it from a file: grey, rows from the top.
+/// Returns the image of a shot as read from a file: gray, rows from the top.
 cv::Mat render_image(const Scene& scene, const FrameRenderer& renderer, const LampShot& shot) {
   cv::Mat image =
       expose(scene.sensor, renderer.lamp_electrons(shot), shot.noise_seed, scene.picture);
@@ -54,14 +54,14 @@ cv::Mat render_image(const Scene& scene, const FrameRenderer& renderer, const La
   return cv::imdecode(encoded(image, scene.picture), cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
 }
 
-/// A lamp as a shot shows it.
+/// Lamp in a shot.
 struct Extent {
   double radius_px;  ///< largest distance of the rim or sides from the centre
   double periods;    ///< periods of its stripes across the part that is bright
 };
 
-/// Points of a lamp's face that have at least 2 % of its greatest radiance: around a lamp that is
-/// lit evenly, all over one with a recess.
+/// Points of a lamp's face that have at least 2 % of its maximum radiance. For an evenly lit lamp
+/// they are on the contour, for a recessed one on the whole face.
 std::vector<Eigen::Vector3d> bright_points(const Glow& lamp, const Eigen::Vector3d& eye_m) {
   constexpr double least_fraction = 0.02;
   constexpr int steps = 60;
@@ -109,12 +109,12 @@ Extent extent_of(const Scene& scene, const FrameRenderer& renderer, const LampSh
   return {radius_px, (last_line - first_line) / period_lines};
 }
 
-/// Counts of lamps wholly in view.
+/// Counts of lamps completely in view.
 struct Tally {
   int lamps = 0, found = 0, missed = 0, wrong = 0;
 };
 
-/// Results of all images so far.
+/// Results of all processed images.
 class Score {
  public:
   void add(const Scene& scene, const FrameRenderer& renderer, const LampShot& shot,
@@ -238,7 +238,7 @@ LightDetector detector_for(const Scene& scene) {
   return {lamp_map_of(scene, false), detector_camera(true_calibration(scene))};
 }
 
-/// Images of a scene's folders of lamps. Another seed in each round draws other chips, too.
+/// Images of a scene's folders of lamps. The seed of each round also changes the chips.
 void try_scene(Scene scene, std::uint64_t seed, int images, bool new_seed_in_each, Score& score) {
   std::vector<CaptureSet> sets;
   for (const CaptureSet& set : scene.sets) {
@@ -253,7 +253,7 @@ void try_scene(Scene scene, std::uint64_t seed, int images, bool new_seed_in_eac
     const auto round = new_seed_in_each ? static_cast<std::size_t>(i) : index / shots_in(set);
     scene.seed = seed + round;
     draw_random_parts(scene);
-    // Spread over the whole of a folder, however few images there are.
+    // Spread over the whole folder, even for few images.
     const auto wanted = static_cast<std::size_t>(images) / sets.size() + 1;
     const std::size_t step = std::max<std::size_t>(1, shots_in(set) / wanted);
     try_shot(scene, renderer, detector, lamp_shot(scene, set, index * step % shots_in(set)), score);
@@ -270,8 +270,8 @@ Scene chips_scene() {
   return scene;
 }
 
-/// A rig like paper-rig with half as many pixels each way, eight lamps, and foreign lights drawn at
-/// random for each image.
+/// Rig like paper-rig with half the resolution, eight lamps, and foreign lights drawn at random for
+/// each image.
 class ForeignScene {
  public:
   explicit ForeignScene(std::uint64_t seed) : seed_(seed) {
@@ -296,7 +296,7 @@ class ForeignScene {
     set_.lamps->interval_s = 1;
   }
 
-  /// Another duty for each lamp; the lamp map has it, too.
+  /// Sets a different duty cycle for each lamp, also in the lamp map.
   void draw_duties(int index) {
     cv::RNG random = random_of(seed_, "duties", static_cast<std::size_t>(index));
     for (SceneLamp& lamp : scene_.lamps) lamp.duty = random.uniform(0.3, 0.7);
@@ -323,7 +323,7 @@ class ForeignScene {
     double radius_m;
   };
 
-  /// A free place on the ceiling.
+  /// Returns a free position on the ceiling.
   std::optional<Eigen::Vector2d> draw_place(double radius_m) {
     constexpr int tries = 40;
     constexpr double gap_m = 0.02;
@@ -344,7 +344,7 @@ class ForeignScene {
     return std::exp(random_.uniform(std::log(least), std::log(most)));
   }
 
-  /// A frequency at least 4 % from those of the lamps.
+  /// Returns a frequency at least 4 % from those of the lamps.
   double draw_pwm_frequency_hz() {
     constexpr double apart = 0.04;
     while (true) {
@@ -393,7 +393,7 @@ class ForeignScene {
                  draw_log(3e7, 3e8)};
   }
 
-  /// A wall of glass along one side of the room.
+  /// Adds a glass wall along one side of the room.
   void draw_mirror() {
     const double side = draw_chance(0.5) ? 1 : -1;
     const double begin = random_.uniform(-1.0, 0.2), length = random_.uniform(0.4, 1.5);

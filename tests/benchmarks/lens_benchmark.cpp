@@ -1,11 +1,11 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
 
-// The lens evaluated here beside mrcal and OpenCV: the same lens, points and pixels, in one run.
-// items_per_second counts points. worst_px: how far from its pixel the ray is that was found for
-// it, here and of OpenCV, of 1000. OpenCV's five iterations for OPENCVn, its default, leave pixels;
-// `exact` has it go on until 1e-8 px are left, as here. cv::fisheye takes ten steps of Newton's
-// method unless the last one is below 1e-8, which is exact.
+// Compares the lens evaluation with mrcal and OpenCV: the same lens, points and pixels, in one run.
+// items_per_second counts points. worst_px is the maximum distance of 1000 pixels from the
+// reprojection of their rays, here and for OpenCV. OpenCV's default of five iterations for OPENCVn
+// leaves residuals; `exact` iterates to 1e-8 px, as here. cv::fisheye runs at most ten Newton
+// steps, until the last one is below 1e-8, which is exact.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -62,7 +62,7 @@ std::vector<Eigen::Vector2d> random_pixels() {
   return pixels;
 }
 
-/// Points one to three metres away that `lens` sees at the random pixels.
+/// Returns points at one to three meters that `lens` images at the random pixels.
 std::vector<Eigen::Vector3d> points_seen_by(const Lens& lens) {
   Random random(2);
   std::vector<Eigen::Vector3d> points;
@@ -80,7 +80,7 @@ void count_points(benchmark::State& state) {
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(kPoints));
 }
 
-/// ray_of: the ray that was found for the i-th pixel.
+/// `ray_of` returns the ray found for the i-th pixel.
 template <typename RayOf>
 void tell_worst(benchmark::State& state, LensModel model, const RayOf& ray_of) {
   const Lens lens(model, parameters_of(model));

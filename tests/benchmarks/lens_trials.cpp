@@ -1,11 +1,15 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// lens_trials [SETS]: lenses solved for from random sets of views with known truth, and how many
-/// were called good that are not. Every set has another lens, 8 to 36 views, plain or Kalibr's
-/// board tilted by up to 60 degrees and partly out of view, corners with 0.05 px of noise; in every
-/// fourth set one view is spoilt. Good: solved, and the default gates are met. Wrong: further from
-/// the truth than four times what noise explains, and than 0.02 px, rms per axis. Exit code 1 when
-/// a wrong one was called good.
+/// lens_trials [SETS]: calibrates lenses from random sets of views with known truth, and counts
+/// wrong lenses that were accepted.
+///
+/// Each set has another lens and 8 to 36 views of a plain or Kalibr board with 0.05 px of corner
+/// noise. The boards are tilted by up to 60 degrees and partly out of view. In every fourth set one
+/// view is corrupted.
+///
+/// A lens is accepted if it is solved and passes the default gates. It is wrong if its RMS error
+/// per axis exceeds both four times the error expected from noise and 0.02 px. Exit code 1 if a
+/// wrong lens was accepted.
 #include <fmt/core.h>
 
 #include <cstdlib>

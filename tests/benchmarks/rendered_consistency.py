@@ -32,7 +32,7 @@ import sys
 import numpy as np
 
 SOURCE = pathlib.Path(__file__).resolve().parents[2]
-# Standard deviation per axis of the survey; of a known place.
+# Standard deviation per axis of the survey, and of a known position.
 SURVEY_SD_M = {"paper-rig": 1e-4, "paper-rig-faulty": 2e-3, "wide": 1e-3, "downlights": 1e-3}
 PLACE_SD_M = 1e-4
 LEAST, MOST = 0.8, 1.25
@@ -141,7 +141,7 @@ def unit(programs, name, seed, survey_sd_m, place_off_sd_m, folder):
     camera = (session / "true_calibration.yaml").read_text()
     run(programs, "vlp-calibrate", session, "-o", folder / "steps", "--no-report", "--row-time-s",
         re.search(r"row_time_s: ([^\s,}]+)", camera)[1], "--readout", re.search(r"readout: (\w+)", camera)[1],
-        may_fail=True)  # gates may be missed
+        may_fail=True)  # gates may fail
     found = {"steps": (*errors_and_sds(folder / "steps/check-fixes.csv", check / "truth.csv"), None)}
     for way, captures in (("adjusted", ["rotation", "dispersion"]), ("places", ["places"])):
         refined, adjusted = folder / f"{way}-lamps.yaml", folder / f"{way}.yaml"

@@ -2,16 +2,16 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
 #
-# What scripts/reprocess.sh costs on this machine, beside its programs run by hand. For a machine that
-# has nothing else to do; where there is little time, step by step.
+# Measures the cost of scripts/reprocess.sh on this machine, compared with its programs alone. Requires
+# an idle machine; the steps can be run separately.
 #
-#   reprocess_benchmark.sh FOLDER [archive] [hand] [half] [all] [verdict]    without a step: all of them
+#   reprocess_benchmark.sh FOLDER [archive] [hand] [half] [all] [verdict]    default: all steps
 #
-# archive  renders 200 sessions of datasets/archive (SESSIONS=N: others), once
-# hand     the programs alone over the first half, as many sessions at a time as there are cores
-# half     reprocess.sh over the same half
-# all      reprocess.sh over all
-# verdict  exit code 1 when a limit is not kept to
+# archive  renders 200 sessions of datasets/archive (or SESSIONS=N), once
+# hand     runs the programs alone over the first half, one session per core at a time
+# half     runs reprocess.sh over the same half
+# all      runs reprocess.sh over all sessions
+# verdict  exit code 1 if a limit is exceeded
 set -euo pipefail
 source_dir=$(cd "$(dirname "$0")/../.." && pwd)
 bin=${VLP_PROGRAMS_DIR:-$source_dir/build/bin}
@@ -25,7 +25,7 @@ archive() {
   "$bin/vlp-simulate" --quiet "$source_dir/datasets/archive/scene.yaml" --archive "$sessions" -o "$folder/all"
   rm -rf "$folder/half"
   mkdir "$folder/half"
-  # Two sessions a camera.
+  # Two sessions per camera.
   find "$folder/all" -mindepth 1 -maxdepth 1 -name 'camera-*' | sort | head -n $((sessions / 4)) |
     xargs ln -s --target-directory="$folder/half"
 }
@@ -34,12 +34,12 @@ busy_s() {  # processor time of the whole machine since it started
   awk -v hz="$(getconf CLK_TCK)" '/^cpu / { print ($2 + $3 + $4 + $7 + $8) / hz }' /proc/stat
 }
 
-# Seconds, processor time, the largest MB of all its processes at a time, and what others took meanwhile.
+# Measures time, processor time, the maximum memory of all processes in MB, and the processor time of other programs.
 measured() {  # NAME COMMAND...
   local name=$1 largest=0 now TIMEFORMAT='%R %U %S' run before
   shift
   before=$(busy_s)
-  { # In a session of its own, by which its processes are known.
+  { # In its own session, which identifies its processes.
     time setsid --wait bash -c 'echo $$ >"$0"; exec "$@"' "$folder/measured/$name.session" "$@" \
       >"$folder/measured/$name.said" 2>&1
   } 2>"$folder/measured/$name.time" &
@@ -73,7 +73,7 @@ by_hand() {  # SESSION
       vlp-locate "$station/check" --lamps "$station/lamps.yaml" --calibration calibration.yaml \
         --threads 1 -o fixes.csv &&
       vlp-evaluate fixes.csv --truth "$station/check/truth.csv" --threads 1 --json evaluation.json
-  } >said.txt 2>&1 || true  # some are damaged
+  } >said.txt 2>&1 || true  # some sessions are damaged
 }
 export -f by_hand
 all_by_hand() {
@@ -89,7 +89,7 @@ hand() {
 }
 reprocess() {  # half OR all
   rm -rf "$folder/$1-results"
-  printf 'format: vlp-archive-gates/1\ngates: {gate_share: 1}\n' >"$folder/gates.yaml"  # some lenses miss theirs
+  printf 'format: vlp-archive-gates/1\ngates: {gate_share: 1}\n' >"$folder/gates.yaml"  # some lenses fail their gates
   measured "$1" "$source_dir/scripts/reprocess.sh" "$folder/$1" "$folder/$1-results" --row-time-s 3e-5 \
     --readout rows --gates "$folder/gates.yaml"
 }

@@ -42,9 +42,9 @@ from files import read_table, table, write_whole
 
 CAMERAS, SESSIONS, DAYS = 20, 10, 365
 BOARDS, YAWS = 28, 12
-# Over the year: share of the focal length; degrees, towards the image's x; px along x.
+# Changes over the year: fraction of the focal length; degrees towards the image's x; px along x.
 FOCAL, TILT, CENTER = (3, 0.001), (8, 0.02), (15, 0.3)
-MOVED = [(0, 2, 150, (0.0008, 0.0006)), (1, 5, 240, (-0.003, 0.004))]  # room, lamp, day, by how many metres
+MOVED = [(0, 2, 150, (0.0008, 0.0006)), (1, 5, 240, (-0.003, 0.004))]  # room, lamp, day, displacement in meters
 
 
 def name_of(camera):
@@ -151,7 +151,7 @@ def render(year, archive, programs):
     with ThreadPoolExecutor(os.cpu_count()) as threads:
         list(threads.map(one, year.sessions()))
     rows = []
-    surveyed = {}  # a moved lamp's place and error add up to what was surveyed, but for the last digit
+    surveyed = {}  # position plus error of a moved lamp equals the surveyed position, except for the last digit
     for camera, session, name in year.sessions():
         room = year.room(camera, session)
         lamps = archive / name_of(camera) / name / "lamps.yaml"
@@ -164,7 +164,7 @@ def render(year, archive, programs):
 
 def calibrate(archive, results, programs):
     gates = archive.parent / "gates.yaml"
-    gates.write_text("format: vlp-archive-gates/1\ngates: {gate_share: 1}\n")  # of lenses; no matter here
+    gates.write_text("format: vlp-archive-gates/1\ngates: {gate_share: 1}\n")  # gate of lenses; irrelevant here
     command = [SOURCE / "scripts/reprocess.sh", archive, results, "--row-time-s", "3e-5", "--readout", "rows"]
     environment = {**os.environ, "VLP_PROGRAMS_DIR": str(programs)}
     subprocess.run([*command, "--gates", gates], check=True, env=environment)

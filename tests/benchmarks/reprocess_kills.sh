@@ -2,12 +2,12 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
 #
-# Kills scripts/reprocess.sh, the whole of it, at random moments while it runs over an archive of datasets/archive, and
-# goes on: what stands there at any moment is whole, and in the end it has the bytes of an undisturbed run. What is done
-# is thrown away and begun again, until so many kills hit a run at work. Shards are of three sessions, so that one's
-# result is on its way to its place while another is at work.
+# Kills scripts/reprocess.sh with all of its processes at random times while it runs over an archive of
+# datasets/archive, and continues it. All files must be complete at any time, and the final results identical to those
+# of an undisturbed run. Finished runs are deleted and started again until the number of kills is reached. Shards have
+# three sessions, so that results of one session are moved while another one runs.
 #
-#   reprocess_kills.sh FOLDER    of 50 kills, or KILLS=N, and 6 sessions, or SESSIONS=N; SEED=N: other moments
+#   reprocess_kills.sh FOLDER    50 kills (KILLS=N), 6 sessions (SESSIONS=N); SEED=N: other times
 source_dir=$(cd "$(dirname "$0")/../.." && pwd)
 bin=${VLP_PROGRAMS_DIR:-$source_dir/build/bin}
 kills=${KILLS:-50} RANDOM=${SEED:-1}
@@ -42,7 +42,7 @@ while [ $killed -lt "$kills" ]; do
   elif [ $code != 0 ]; then
     fail "exit code $code: $(cat "$said")"
   fi
-  # What came to its end is begun again; every tenth time what was killed is gone on with to its end.
+  # Finished runs are started again; every tenth killed run is continued to its end.
   if [ $code = 0 ] || [ $((killed % 10)) = 0 ]; then
     reprocess "$results" "${run[@]}" >"$said"
     expect_baseline "$results"

@@ -43,8 +43,8 @@ for folder, images in (("rotation", 12), ("dispersion", 6), ("check", 12)):
     FILES += [f"{folder}/{name}.csv" for name in ("captures", "true_detections", "truth")]
 FOLDERS = ["boards", "rotation", "dispersion", "check"]
 IN_A_FLEET = 200
-# What is asked for of 100,000 sessions: seconds of processor time, and MB.
-SETTLED_S = 2.5  # what changed within two seconds of a look is looked at again by the next one
+# Limits for 100,000 sessions: seconds of processor time, and MB.
+SETTLED_S = 2.5  # changes within two seconds of a scan are scanned again the next time
 LIMITS = {"plan, unchanged": (5, 500), "plan, changed": (6, 500), "summary and overview": (20, None), "other session gates": (30, None)}
 
 
@@ -148,7 +148,7 @@ def run(options, folder):
     time.sleep(SETTLED_S)
     measured("plan, the first", *plan)
     apart(reprocessed, folder)
-    files.write_whole(results / "summary.csv", "")  # as if that were summed up
+    files.write_whole(results / "summary.csv", "")  # as if the summary existed
     measured("plan, unchanged, --look files", *plan, "--look", "files")
     took["plan, unchanged"] = measured("plan, unchanged", *plan)
     names = [f"{camera.name}/{session.name}" for camera in sorted(archive.iterdir()) for session in camera.iterdir()]

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// The steps of a rendered capture on one core: light, sensor, PNG.
+/// Measures the steps of a rendered capture on one core: light, sensor, PNG.
 #include <benchmark/benchmark.h>
 
 #include <opencv2/core/utility.hpp>

@@ -2,12 +2,12 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
 #
-# Stations that share a database of PostgreSQL: each takes unit after unit, all at once, each run
-# with a hook. In the project's folder, built, with PostgreSQL's server installed:
+# Tests stations that share a PostgreSQL database and run concurrently, each with one unit after
+# another and a hook per run. Requires a build in the project's folder and an installed PostgreSQL server:
 #   tests/benchmarks/station_database.sh [RUNS [STATIONS]]     by default 500 runs of 8 stations
-# The units have no image, so that they are INVALID at once: what is tried are the records. A server
-# of its own, in a folder of its own. Exit code 1 when a run is lost or twice, when one had to wait
-# in a spool, when the trail has an error, or when the server tells of a deadlock.
+# The units have no images and are INVALID immediately, because only the records are tested. Starts
+# its own server in its own folder. Exit code 1 if a run is lost or duplicated, if one had to wait in
+# a spool, if the trail has an error, or if the server reports a deadlock.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 programs=$(ls -d /usr/lib/postgresql/*/bin | tail -1)

@@ -28,19 +28,19 @@ trap 'rm -rf "$work"' EXIT
 cp -rT datasets/station "$work/station"
 wrong=0
 
-# uniform VARIABLE FROM TO: a number that the seed decides.
+# uniform VARIABLE FROM TO: draws a number that depends on the seed.
 uniform() {
   state=$(((state * 1103515245 + 12345) % 2147483648))
   printf -v "$1" '%s' "$(awk -v s="$state" -v a="$2" -v b="$3" \
     'BEGIN { printf "%.6g", a + (b - a) * s / 2147483648 }')"
 }
 
-# scene_of SEED FOCAL_FROM FOCAL_TO CENTRE_OFF_PX BLUR_PX: a unit with its lens in this range, up to
-# one degree of tilt and 5 mm beside the axis.
+# scene_of SEED FOCAL_FROM FOCAL_TO CENTRE_OFF_PX BLUR_PX: makes the scene of a unit with its lens in
+# this range, up to one degree of tilt and up to 5 mm of lever arm.
 scene_of() {
   state=$(($1 * 7919))
   local fx ratio direction tilt azimuth arm_x arm_y
-  uniform fx "$2" "$3"  # the first numbers of seeds side by side are alike
+  uniform fx "$2" "$3"  # the first numbers of successive seeds are similar
   uniform fx "$2" "$3"
   uniform ratio 0.999 1.001
   uniform direction 0 6.28318
@@ -63,7 +63,7 @@ render() {
   vlp-simulate -q "$work/scene.yaml" -o "$work/unit" "$@"
 }
 
-# tried KIND SEED EXPECTED: runs the unit; the verdict's line should hold the text.
+# tried KIND SEED EXPECTED: runs the unit; the line of the verdict must contain the text.
 tried() {
   local said
   said=$(vlp-station run --station "$work/station/station.yaml" --camera-id "$1-$2" \
@@ -98,7 +98,7 @@ faulty() {
   rm -rf "$work/good"
   cp -r "$work/unit" "$work/good"
   local lamps=$work/station/lamps.yaml lamp=$((1 + $1 % 6)) other=$((1 + ($1 + 1 + $1 % 5) % 6))
-  # The lamp is where the scene has it, and is 2 to 6 cm off in the map.
+  # The lamp is at its position of the scene, and has an error of 2 to 6 cm in the map.
   awk -v id="$lamp" -v off=0.0$((2 + $1 % 5)) -F'[][]' '$0 ~ "id: " id "," {
     split($2, at, ", "); $0 = $1 "[" at[1] + off ", " at[2] - off / 2 ", " at[3] "]" $3 } { print }' \
     datasets/station/lamps.yaml >"$lamps"
@@ -118,14 +118,14 @@ faulty() {
   cp datasets/station/board.yaml "$work/station/board.yaml"
 }
 
-# scene_change SED_SCRIPT: of the scene that scene_of has written.
+# scene_change SED_SCRIPT: changes the scene that scene_of has written.
 scene_change() {
   local before
   before=$(<"$work/scene.yaml")
   sed -i "$1" "$work/scene.yaml"
   [ "$before" != "$(<"$work/scene.yaml")" ] || { echo "nothing of the scene is $1" >&2; exit 2; }
 }
-# station_change FILE SED_SCRIPT; station_again: the files of the station as they are shipped.
+# station_change FILE SED_SCRIPT: changes a file of the station; station_again: restores all of them.
 station_change() {
   local before
   before=$(<"$work/station/$1")
@@ -134,7 +134,7 @@ station_change() {
 }
 station_again() { cp datasets/station/*.yaml "$work/station/"; }
 
-# unit_again: the good unit as another camera would take it: the same pictures, other files.
+# unit_again: makes the images of the good unit appear as those of another camera: equal pixels, other files.
 again=0
 unit_again() {
   rm -rf "$work/unit"
@@ -143,8 +143,8 @@ unit_again() {
   find "$work/unit" -name '*.png' -exec sh -c 'for f; do echo "$0" >>"$f"; done' "$again" {} +
 }
 
-# picture COMMANDS STEP...: changes all images of steps; `image` is one, of floats, `x` and `y` are
-# the places of its pixels.
+# picture COMMANDS STEP...: changes all images of steps. `image` has floats; `x` and `y` are the
+# coordinates of its pixels.
 picture() {
   local commands=$1 step
   shift
@@ -162,8 +162,8 @@ EOF
   done
 }
 
-# Whatever can be wrong with a camera, with the station or with what the operator does, once each:
-# the cause that is named first.
+# Each kind of fault of the camera, the station or the operator once, with the cause that is reported
+# first.
 kinds() {
   local seed=$1 table
   # The camera.
@@ -185,12 +185,12 @@ kinds() {
   render
   tried beside "$seed" 'the camera sits beside its axis'
 
-  # The good unit that the station and the operator do wrong.
+  # The good unit with errors of the station and of the operator.
   scene_of "$seed" 514.8 525.2 5 0.7
   render
   rm -rf "$work/good"
   cp -r "$work/unit" "$work/good"
-  # A finger has been on the lens: a veil, and all of it a bit blurred.
+  # A fingerprint on the lens: a veil and a slight blur.
   picture 'image = 0.7 * cv2.GaussianBlur(image, (0, 0), 2.5) + 0.3 * image.mean()' \
     boards rotation dispersion check
   tried dirty-lens "$seed" 'the lens is blurred: out of focus, or dirty'
@@ -215,7 +215,7 @@ kinds() {
   render --only boards
   tried dark-boards "$seed" 'too dark'
 
-  # The lamps, and what the station's files say of them.
+  # The lamps, and their entries in the station's files.
   unit_again
   station_change lamps.yaml 's/\[0, 0.28, 1.6\]/[0.04, 0.26, 1.6]/'
   tried loose-lamp "$seed" 'lamp 5 hangs'
@@ -261,7 +261,7 @@ kinds() {
   tried row-time-25-percent "$seed" 'row time is 37.5 us in camera_type.yaml'
   station_again
 
-  # The places.
+  # The known positions.
   unit_again
   for table in captures truth; do
     [ ! -e "$work/unit/check/$table.csv" ] || awk -F, -v OFS=, \
@@ -298,7 +298,7 @@ kinds() {
   cp -r "$work/good/boards" "$work/unit/"
   find "$work/unit/boards" -name '*.png' -exec sh -c 'for f; do echo y >>"$f"; done' sh {} +
   tried swapped-units "$seed" 'the lamps are seen through another lens than the boards'
-  # The capture tool writes each view of four again and again.
+  # The capture tool writes four views repeatedly.
   unit_again
   (cd "$work/unit/boards" && for image in 00[0-3]?.png; do
     cp "000$((10#${image%.png} % 4)).png" double.png && echo "$image" >>double.png && mv double.png "$image"
@@ -309,8 +309,9 @@ kinds() {
   tried few-boards "$seed" 'boards: not enough images'
 }
 
-# mixed SEED: a good unit with three images of another camera in one step, for each step: INVALID, with
-# the name of one of them. check-whole: all images of the check are of another camera: INVALID.
+# mixed SEED: a good unit with three images of another camera in one step, for each step; expects
+# INVALID with the name of one of them. check-whole: all images of the check are of another camera;
+# expects INVALID.
 mixed() {
   local step image said named
   scene_of $(($1 + 1000)) 505 510 9 0.7
@@ -343,14 +344,14 @@ mixed() {
   tried check-whole "$1" 'not judged: the images of check are of another camera'
 }
 
-# loose SEED: a unit that moves before the check, 6 mm sideways or by 0.3 degrees of tilt: FAIL.
+# loose SEED: a unit that moves before the check, 6 mm sideways or by 0.3 degrees of tilt; expects FAIL.
 loose() {
   local table tilt expected='fails: all 36 captures of the check are off by'
   scene_of "$1" 514.8 525.2 5 0.7
   render
   rm -rf "$work/good"
   cp -r "$work/unit" "$work/good"
-  # The truth has the yaws.
+  # The ground truth contains the yaws.
   for table in captures truth; do
     awk -F, -v OFS=, -v direction="$1" 'NR == FNR { yaw[$1] = $5; next }
       FNR == 1 { x = $2 == "x_m" ? 2 : 3 }
@@ -371,8 +372,8 @@ loose() {
   tried loose-tilted "$1" "$expected"
 }
 
-# optics_of SEED LINE...: a unit whose focus, tilt and veil vary as those of good ones, and these
-# lines of the scene's optics. A lens has one defocus; a line with another takes its place.
+# optics_of SEED LINE...: makes a unit whose focus, tilt and veil vary as those of good units, with
+# these lines in the scene's optics. A line with a defocus replaces the lens's own.
 optics_of() {
   local seed=$1 blur veil tilt_x tilt_y line optics
   shift
@@ -393,10 +394,10 @@ optics_of() {
   render --only boards
 }
 
-# Sharpness and cleanliness of the lens, with the boards alone: a good unit then lacks its turn.
+# Sharpness and cleanliness of the lens, with boards only: a good unit then lacks the rotation.
 sharpness() {
   local seed=$1 x y strength
-  # A strong smear hides tags of several views, in whose place an operator takes others.
+  # A strong smear hides tags of several views, which an operator replaces.
   station_again
   station_change station.yaml 's/board_views: 36/board_views: 24/'
   optics_of "$seed"
@@ -441,7 +442,7 @@ timing() {
   for step in boards rotation dispersion check; do
     for image in "$work/unit/$step"/*.png; do
       cp "$image" "$arriving/$step/.coming"
-      # The last one comes when all others are done with.
+      # The last image arrives after all others are processed.
       [ "${image##*/unit/}" != check/0035.png ] || sleep 3
       local last_s=$EPOCHREALTIME
       mv "$arriving/$step/.coming" "$arriving/$step/${image##*/}"

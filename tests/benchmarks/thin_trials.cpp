@@ -1,10 +1,11 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// thin_trials [SETS]: lenses from sets of views that tell little, with known truth, and whether
-/// the default gates let one pass that is worse than it says: further off, anywhere in the region
-/// that is claimed, than three times the worst uncertainty stated there. Every set has another
-/// lens; boards are plain, plain and shrunk by a tone curve, or Kalibr's. Exit code 1 when a lens
-/// passed that is worse, or none that is called good did.
+/// thin_trials [SETS]: calibrates lenses from weak sets of views with known truth, and checks that
+/// the default gates pass no lens with an underestimated error. Such an error is above three times
+/// the largest reported uncertainty, anywhere in the covered region.
+///
+/// Each set has another lens; boards are plain, plain and shrunk by a tone curve, or Kalibr's. Exit
+/// code 1 if such a lens passed, or if no accurate lens did.
 #include <fmt/core.h>
 
 #include <algorithm>

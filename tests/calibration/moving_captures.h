@@ -10,21 +10,21 @@
 
 namespace vlp {
 
-/// Captures of a camera that drives in all directions and turns, at two heights.
+/// Captures of a camera that moves in all directions and rotates, at two heights.
 struct MovingCaptures {
   std::vector<Frame> frames;
   std::vector<KnownMotion> motions;
   std::vector<Pose> cameras;
 };
 
-/// Eight lamps, rows of 55 us, a camera that leans by 1.1 degrees.
+/// Returns eight lamps and a camera tilted by 1.1 degrees with a row time of 55 us.
 inline BodyRig leaning_body() {
   BodyRig rig{synthetic_lamps(), rolling_calibration(), {}, {}};
   rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.02, 0.7);
   return rig;
 }
 
-/// The motions are exact; each camera turns by up to 1.5 rad/s.
+/// Returns captures with exact motions. Each camera rotates at up to 1.5 rad/s.
 inline MovingCaptures moving_captures(BodyRig rig, int count, double speed_m_per_s, Random& random,
                                       double sigma_px) {
   MovingCaptures captures;
@@ -44,8 +44,7 @@ inline MovingCaptures moving_captures(BodyRig rig, int count, double speed_m_per
   return captures;
 }
 
-/// What odometry would say of them, which errs as it states: so much of a metre and of a radian per
-/// second.
+/// Returns odometry readings of the motions, with errors of the given standard deviations.
 inline std::vector<KnownMotion> odometry_of(const std::vector<KnownMotion>& motions,
                                             double sd_m_per_s, double sd_rad_per_s,
                                             Random& random) {

@@ -12,14 +12,14 @@
 namespace vlp {
 namespace {
 
-/// Errors that are known only together: the second is nearly the first's negative.
+/// Returns the covariance of correlated errors: the second is nearly the negative of the first.
 MatrixX together() {
   MatrixX covariance(3, 3);
   covariance << 4e-4, -3.9e-4, 0, -3.9e-4, 4e-4, 1e-7, 0, 1e-7, 1e-8;
   return covariance;
 }
 
-TEST(JacobianOf, IsThatOfALinearStepWhateverTheCovariance) {
+TEST(EstimateJacobian, MatchesLinearFunctionForAnyCovariance) {
   MatrixX expected(2, 3);
   expected << 1, -2, 30, 0.5, 4, -7;
   const Eigen::Vector2d exact(3, -1);
@@ -33,7 +33,7 @@ TEST(JacobianOf, IsThatOfALinearStepWhateverTheCovariance) {
   }
 }
 
-TEST(JacobianOf, TriesErrorsAsLargeAsTheyAreTogether) {
+TEST(EstimateJacobian, TriesCorrelatedErrorsOfActualSize) {
   std::vector<Eigen::VectorXd> tried;
   const auto solved = [&](const Eigen::VectorXd& error) {
     tried.push_back(error);
@@ -44,12 +44,12 @@ TEST(JacobianOf, TriesErrorsAsLargeAsTheyAreTogether) {
   MatrixX sum = MatrixX::Zero(3, 3);
   for (const Eigen::VectorXd& error : tried) sum += error * error.transpose();
   EXPECT_THAT(sum, IsNear(together(), 1e-15));
-  EXPECT_NEAR(tried[0][0], 0.02, 1e-15);  // one standard deviation, and the second with it
+  EXPECT_NEAR(tried[0][0], 0.02, 1e-15);  // one standard deviation, and the correlated error
   EXPECT_NEAR(tried[0][1], -0.0195, 1e-15);
 }
 
-/// The chord over one standard deviation, not the tangent: f = x^2 at x = 1 with sd 0.1.
-TEST(JacobianOf, OfACurveIsTheChordOverOneStandardDeviation) {
+/// Secant over one standard deviation, not the tangent: f = x^2 at x = 1 with sd 0.1.
+TEST(EstimateJacobian, ReturnsSecantOverOneStandardDeviation) {
   const auto solved = [](const Eigen::VectorXd& error) {
     const double x = 1 + error[0];
     return std::optional<Eigen::VectorXd>(Eigen::Vector2d(x * x, 0));
@@ -60,8 +60,8 @@ TEST(JacobianOf, OfACurveIsTheChordOverOneStandardDeviation) {
   EXPECT_EQ((*found)(1, 0), 0);
 }
 
-/// The solve has another answer, or none, beyond half a standard deviation.
-TEST(JacobianOf, TriesASmallerErrorWhereASolveHasNoResult) {
+/// The solve fails beyond half a standard deviation.
+TEST(EstimateJacobian, RetriesWithSmallerErrorWhenSolveFails) {
   const auto solved = [](const Eigen::VectorXd& error) -> std::optional<Eigen::VectorXd> {
     if (error.norm() > 0.05) return {};
     return Eigen::VectorXd(3 * error);
@@ -71,7 +71,7 @@ TEST(JacobianOf, TriesASmallerErrorWhereASolveHasNoResult) {
   EXPECT_THAT(*found, IsNear(3 * Eigen::Matrix2d::Identity(), 1e-12));
 }
 
-TEST(JacobianOf, IsNothingWhereASolveFindsNothingOrTheCovarianceIsNone) {
+TEST(EstimateJacobian, ReturnsNulloptWhenSolveFailsOrCovarianceIsInvalid) {
   const auto nothing = [](const Eigen::VectorXd& error) {
     return error[2] != 0 ? std::nullopt : std::optional<Eigen::VectorXd>(Eigen::Vector2d(0, 0));
   };

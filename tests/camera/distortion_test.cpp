@@ -16,7 +16,7 @@ namespace {
 
 using Eigen::Vector2d;
 
-/// A distortion of one coefficient: an index into k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4.
+/// Creates a distortion with one coefficient; `index` counts k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4.
 Distortion only(std::size_t index, double value) {
   Distortion distortion;
   distortion.k[index] = value;
@@ -42,13 +42,13 @@ double smallest_determinant(const Distortion& distortion, double radius) {
   return smallest;
 }
 
-TEST(Distortion, OfNoCoefficientsIsNone) {
+TEST(Distortion, ReturnsInputForZeroCoefficients) {
   const auto value = Distortion{}({0.3, -0.7});
   EXPECT_EQ(value.distorted, Vector2d(0.3, -0.7));
   EXPECT_EQ(value.d_distorted_d_z, Eigen::Matrix2d::Identity());
 }
 
-TEST(Distortion, OfEachCoefficientIsItsTerm) {
+TEST(Distortion, ComputesTermOfEachCoefficient) {
   // At z = (1, 2), r2 = 5.
   const double expected[12][2] = {
       {1 * 5, 2 * 5},                // k1: z r2
@@ -72,7 +72,7 @@ TEST(Distortion, OfEachCoefficientIsItsTerm) {
   }
 }
 
-TEST(Distortion, HasTheJacobiansOfDifferenceQuotients) {
+TEST(Distortion, JacobiansMatchDifferenceQuotients) {
   Random random(41);
   constexpr double step = 1e-6;  // rounding leaves 1e-9
   for (int trial = 0; trial < 500; ++trial) {
@@ -95,7 +95,7 @@ TEST(Distortion, HasTheJacobiansOfDifferenceQuotients) {
   }
 }
 
-TEST(ValidRadius, OfOneCoefficientIsThatOfTheFormula) {
+TEST(DistortionValidRadius, MatchesClosedFormForSingleCoefficient) {
   const double tolerance = 2e-12;  // it is bisected to 1e-12
   for (const double k1 : {-0.0334, -0.1, -0.3, -0.4, -1.5, -100.0}) {
     EXPECT_NEAR(only(0, k1).valid_radius(), 1 / std::sqrt(-3 * k1), tolerance) << k1;
@@ -115,7 +115,7 @@ TEST(ValidRadius, OfOneCoefficientIsThatOfTheFormula) {
   EXPECT_NEAR(only(11, -0.25).valid_radius(), 1, tolerance);
 }
 
-TEST(ValidRadius, IsInfiniteForALensThatDoesNotFold) {
+TEST(DistortionValidRadius, ReturnsInfinityWithoutFold) {
   EXPECT_EQ(Distortion{}.valid_radius(), kInfinity);
   for (const std::size_t radial : {0U, 1U, 4U}) {
     EXPECT_EQ(only(radial, 0.3).valid_radius(), kInfinity) << radial;
@@ -123,7 +123,7 @@ TEST(ValidRadius, IsInfiniteForALensThatDoesNotFold) {
   EXPECT_EQ(only(0, -0.0033).valid_radius(), kInfinity);  // folds at 10.05
 }
 
-TEST(ValidRadius, IsThatOfTheFirstFold) {
+TEST(DistortionValidRadius, ReturnsFirstOfTwoFolds) {
   // 1 + 3 k1 r^2 + 5 k2 r^4 has two roots: the radius grows again after the second.
   Distortion distortion = only(0, -0.4);
   distortion.k[1] = 0.06;
@@ -131,7 +131,7 @@ TEST(ValidRadius, IsThatOfTheFirstFold) {
   EXPECT_NEAR(distortion.valid_radius(), std::sqrt(first), 2e-12);
 }
 
-TEST(ValidRadius, IsWhereTheMapFoldsInItsWorstDirection) {
+TEST(DistortionValidRadius, MatchesFoldInWorstDirection) {
   Random random(42);
   int folds = 0;
   for (int trial = 0; trial < 300; ++trial) {

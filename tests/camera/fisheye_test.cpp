@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
 
-/// As of a lens of 190 degrees on 1000 x 1000 px.
+/// Creates a lens of 190 degrees for 1000 x 1000 px.
 Lens wide_lens() {
   return {LensModel::fisheye, std::array{290.0, 291.0, 501.0, 498.0, 0.03, -0.012, 0.004, -0.0006}};
 }
@@ -24,7 +24,7 @@ Eigen::Vector3d ray_at(double off_axis_rad, double around_rad) {
           std::sin(off_axis_rad) * std::sin(around_rad), std::cos(off_axis_rad)};
 }
 
-TEST(Fisheye, IsThePolynomialOfTheAngle) {
+TEST(FisheyeLens, ProjectMatchesPolynomialOfAngle) {
   const Lens lens = wide_lens();
   for (const double degrees : {0.001, 1.0, 45.0, 89.0, 90.0, 91.0, 95.0}) {
     const double a = degrees * kDegree;
@@ -38,7 +38,7 @@ TEST(Fisheye, IsThePolynomialOfTheAngle) {
   }
 }
 
-TEST(Fisheye, ComesBackToTheRayBeyondNinetyDegrees) {
+TEST(FisheyeLens, UnprojectInvertsProjectBeyond90Degrees) {
   Random random(4);
   for (int trial = 0; trial < 2000; ++trial) {
     const Lens lens(LensModel::fisheye, random_parameters(LensModel::fisheye, random));
@@ -53,7 +53,7 @@ TEST(Fisheye, ComesBackToTheRayBeyondNinetyDegrees) {
   }
 }
 
-TEST(Fisheye, HasItsJacobiansBeyondNinetyDegrees) {
+TEST(FisheyeLens, JacobiansMatchDifferenceQuotientsBeyond90Degrees) {
   const Lens lens = wide_lens();
   constexpr double step = 1e-5;
   for (const double degrees : {0.01, 30.0, 89.9, 94.0}) {
@@ -77,7 +77,7 @@ TEST(Fisheye, HasItsJacobiansBeyondNinetyDegrees) {
   }
 }
 
-TEST(Fisheye, ComesBackToThePixelUpToWhereItEnds) {
+TEST(FisheyeLens, ProjectInvertsUnprojectUpToValidAngle) {
   for (const std::array<double, 4>& k : {std::array<double, 4>{0, 0, 0, 0},
                                          {0.03, -0.012, 0.004, -0.0006},
                                          {-0.1, 0, 0, 0},
@@ -100,7 +100,7 @@ TEST(Fisheye, ComesBackToThePixelUpToWhereItEnds) {
   }
 }
 
-TEST(Fisheye, EndsWhereItFolds) {
+TEST(FisheyeLens, RejectsRaysAndPixelsBeyondFold) {
   const Fisheye fisheye{{-0.1, 0, 0, 0}};  // d' = 1 - 0.3 a^2
   const double fold_rad = std::sqrt(1 / 0.3);
   EXPECT_NEAR(fisheye.valid_angle_rad(), fold_rad, 1e-12);

@@ -56,7 +56,7 @@ class FoldingLens : public testing::TestWithParam<FoldedLens> {
   const double valid_radius_ = distortion().valid_radius();
 };
 
-TEST_P(FoldingLens, ReturnsNoWrongRayOverAndAroundTheImage) {
+TEST_P(FoldingLens, UnprojectReturnsValidRayOrNulloptInAndAroundImage) {
   int rays = 0, refused = 0;
   for (double v = -600; v <= 1200; v += 14) {
     for (double u = -800; u <= 1600; u += 14) {
@@ -78,7 +78,7 @@ TEST_P(FoldingLens, ReturnsNoWrongRayOverAndAroundTheImage) {
   EXPECT_EQ(refused > 100, GetParam().name != std::string("PoleAhead"));
 }
 
-TEST_P(FoldingLens, FindsEveryPointThatItSees) {
+TEST_P(FoldingLens, UnprojectInvertsProjectUpToFold) {
   Random random(31);
   for (int trial = 0; trial < 3000; ++trial) {
     const double radius = valid_radius_ * std::sqrt(random.uniform(0, 0.999));
@@ -93,7 +93,7 @@ TEST_P(FoldingLens, FindsEveryPointThatItSees) {
   }
 }
 
-TEST_P(FoldingLens, ProjectsNothingBeyondTheFold) {
+TEST_P(FoldingLens, ProjectReturnsNulloptBeyondFold) {
   for (double around_rad = 0; around_rad < 6.3; around_rad += 0.1) {
     const Vector2d direction(std::cos(around_rad), std::sin(around_rad));
     const auto at = [&](double radius) -> Vector3d { return (radius * direction).homogeneous(); };
@@ -106,7 +106,7 @@ TEST_P(FoldingLens, ProjectsNothingBeyondTheFold) {
 INSTANTIATE_TEST_SUITE_P(Lenses, FoldingLens, testing::ValuesIn(kFoldedLenses),
                          [](const auto& test) { return std::string(test.param.name); });
 
-TEST(FoldingBarrel, RefusesExactlyThePixelsBeyondItsFold) {
+TEST(Unproject, RejectsExactlyPixelsBeyondFoldOfBarrelLens) {
   // r (1 - 0.4 r^2) is largest at r = 1 / sqrt(1.2), where it is two thirds of r.
   const Lens lens(LensModel::opencv4, parameters_with(LensModel::opencv4, {-0.4}));
   const double edge_px = 520 * 2 / 3.0 / std::sqrt(1.2);
@@ -121,7 +121,7 @@ TEST(FoldingBarrel, RefusesExactlyThePixelsBeyondItsFold) {
   }
 }
 
-TEST(SteepPincushion, FindsPointsWhoseDistortedPointLiesBeyondALaterFold) {
+TEST(Unproject, ConvergesIfInitialPointLiesBeyondLaterFold) {
   // No fold up to r = 10, but one at 12.9, behind which 'distorted' lies as a first guess.
   const Lens lens(LensModel::opencv4,
                   parameters_with(LensModel::opencv4, {0.277, -1e-3, -9e-3, -8e-3}));

@@ -29,7 +29,7 @@ class LensJacobian : public testing::TestWithParam<LensModel> {};
 // step leaves less.
 constexpr double kStep = 1e-5, kTolerance = 1e-7;
 
-TEST_P(LensJacobian, ByThePointIsTheDifferenceQuotient) {
+TEST_P(LensJacobian, WithRespectToPointMatchesDifferenceQuotient) {
   for_random_points(GetParam(), [](const auto&, const Lens& lens, const Eigen::Vector3d& point) {
     const auto projection = lens.project_with_jacobians(point).value();
     Eigen::Matrix<double, 2, 3> expected;
@@ -43,7 +43,7 @@ TEST_P(LensJacobian, ByThePointIsTheDifferenceQuotient) {
   });
 }
 
-TEST_P(LensJacobian, ByTheParametersIsTheDifferenceQuotient) {
+TEST_P(LensJacobian, WithRespectToParametersMatchesDifferenceQuotient) {
   const LensModel model = GetParam();
   int points = 0;
   for_random_points(model, [&](const std::vector<double>& parameters, const Lens& lens,
@@ -67,7 +67,7 @@ TEST_P(LensJacobian, ByTheParametersIsTheDifferenceQuotient) {
   });
 }
 
-TEST_P(LensJacobian, OfTheRayIsTheDifferenceQuotient) {
+TEST_P(LensJacobian, RayJacobianMatchesDifferenceQuotient) {
   for_random_points(GetParam(), [](const auto&, const Lens& lens, const Eigen::Vector3d& point) {
     const Eigen::Vector2d pixel = lens.project(point).value();
     const auto ray = lens.unproject(pixel).value();
@@ -85,7 +85,7 @@ TEST_P(LensJacobian, OfTheRayIsTheDifferenceQuotient) {
   });
 }
 
-TEST_P(LensJacobian, OfTheRayUndoesThatOfThePixel) {
+TEST_P(LensJacobian, RayJacobianInvertsPixelJacobian) {
   for_random_points(GetParam(), [](const auto&, const Lens& lens, const Eigen::Vector3d& point) {
     const auto ray = lens.unproject(lens.project(point).value()).value();
     const auto projection = lens.project_with_jacobians(ray.direction).value();

@@ -9,7 +9,7 @@
 namespace vlp {
 namespace {
 
-TEST(LensModelNames, AreMrcals) {
+TEST(LensModelName, MatchesMrcal) {
   EXPECT_EQ(name_of(LensModel::pinhole), "LENSMODEL_PINHOLE");
   EXPECT_EQ(name_of(LensModel::stereographic), "LENSMODEL_STEREOGRAPHIC");
   EXPECT_EQ(name_of(LensModel::opencv4), "LENSMODEL_OPENCV4");
@@ -18,11 +18,11 @@ TEST(LensModelNames, AreMrcals) {
   EXPECT_EQ(name_of(LensModel::opencv12), "LENSMODEL_OPENCV12");
 }
 
-TEST(LensModelNames, AreReadBack) {
+TEST(LensModelFromName, InvertsNameOfEachModel) {
   for (const LensModel model : kEveryModel) EXPECT_EQ(lens_model_from_name(name_of(model)), model);
 }
 
-TEST(LensModelNames, AreReadExactly) {
+TEST(LensModelFromName, ReturnsNulloptForInexactNames) {
   for (const char* name :
        {"",
         "LENSMODEL_",
@@ -48,14 +48,14 @@ TEST(LensModelNames, AreReadExactly) {
   }
 }
 
-TEST(LensModelNames, AreAllListedForMessages) {
+TEST(LensModelNames, ListsAllModels) {
   EXPECT_EQ(lens_model_names(),
             "LENSMODEL_PINHOLE, LENSMODEL_STEREOGRAPHIC, LENSMODEL_OPENCV4, LENSMODEL_OPENCV5, "
             "LENSMODEL_OPENCV8, LENSMODEL_OPENCV12, OPENCV_FISHEYE, "
             "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=16_Ny=14_fov_x_deg=190 and its like");
 }
 
-TEST(LensModelNames, OfSplinedLensesAreAsManyAsTheirGrids) {
+TEST(LensModelFromName, ReturnsDistinctModelForEachSplineGrid) {
   for (const SplineGrid& grid : {SplineGrid{2, 3, 3, 1}, SplineGrid{3, 4, 4, 359},
                                  SplineGrid{2, 255, 255, 359}, SplineGrid{3, 30, 20, 170}}) {
     const LensModel model = splined_lens(grid);
@@ -68,7 +68,7 @@ TEST(LensModelNames, OfSplinedLensesAreAsManyAsTheirGrids) {
             "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=30_Ny=20_fov_x_deg=170");
 }
 
-TEST(LensModelParameters, AreAsManyAsMrcals) {
+TEST(ParameterCount, MatchesMrcal) {
   for (const LensModel model : kMrcalModels) {
     const std::vector<double> parameters(parameter_count(model), 1.0);
     EXPECT_NO_THROW(oracle_of(model, parameters)) << name_of(model);

@@ -12,7 +12,7 @@ namespace {
 constexpr int kMrcalCameras = 100;
 constexpr std::size_t kMrcalPoints = 50;
 
-class LensBesideMrcal : public testing::TestWithParam<LensModel> {
+class LensAgainstMrcal : public testing::TestWithParam<LensModel> {
  protected:
   Random random_{11};
 
@@ -23,7 +23,7 @@ class LensBesideMrcal : public testing::TestWithParam<LensModel> {
   }
 };
 
-TEST_P(LensBesideMrcal, ProjectsToTheSamePixels) {
+TEST_P(LensAgainstMrcal, ProjectMatchesPixels) {
   for (int camera = 0; camera < kMrcalCameras; ++camera) {
     const auto parameters = random_parameters(GetParam(), random_);
     const Lens lens(GetParam(), parameters);
@@ -37,7 +37,7 @@ TEST_P(LensBesideMrcal, ProjectsToTheSamePixels) {
   }
 }
 
-TEST_P(LensBesideMrcal, HasTheSameGradients) {
+TEST_P(LensAgainstMrcal, JacobiansMatchGradients) {
   for (int camera = 0; camera < kMrcalCameras; ++camera) {
     const auto parameters = random_parameters(GetParam(), random_);
     const Lens lens(GetParam(), parameters);
@@ -67,7 +67,7 @@ TEST_P(LensBesideMrcal, HasTheSameGradients) {
 // more than 1e-9 rad; it may end on the second ray of a pixel, beyond the fold of the model, or
 // nowhere (NaN). Those pixels are left out of the comparison, but not of the comparison with the
 // points that made them.
-TEST_P(LensBesideMrcal, UnprojectsToTheSameRays) {
+TEST_P(LensAgainstMrcal, UnprojectMatchesRays) {
   int compared = 0;
   for (int camera = 0; camera < kMrcalCameras; ++camera) {
     const auto parameters = random_parameters(GetParam(), random_);
@@ -89,7 +89,7 @@ TEST_P(LensBesideMrcal, UnprojectsToTheSameRays) {
   EXPECT_GT(compared, 0.95 * kMrcalCameras * static_cast<int>(kMrcalPoints));
 }
 
-INSTANTIATE_TEST_SUITE_P(Models, LensBesideMrcal, testing::ValuesIn(kMrcalModels),
+INSTANTIATE_TEST_SUITE_P(Models, LensAgainstMrcal, testing::ValuesIn(kMrcalModels),
                          testing::PrintToStringParamName());
 
 }  // namespace

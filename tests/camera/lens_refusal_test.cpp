@@ -12,9 +12,9 @@ namespace {
 
 using Eigen::Vector3d;
 
-class LensRefusal : public testing::TestWithParam<LensModel> {};
+class LensWithInvalidInput : public testing::TestWithParam<LensModel> {};
 
-TEST_P(LensRefusal, OfPixelsThatAreNotFinite) {
+TEST_P(LensWithInvalidInput, UnprojectReturnsNulloptForNonFinitePixels) {
   const Lens lens = plain_lens(GetParam());
   for (const double bad : {kNan, kInfinity, -kInfinity}) {
     EXPECT_FALSE(lens.unproject({bad, 0}));
@@ -22,7 +22,7 @@ TEST_P(LensRefusal, OfPixelsThatAreNotFinite) {
   }
 }
 
-TEST_P(LensRefusal, OfPointsThatAreNotFinite) {
+TEST_P(LensWithInvalidInput, ProjectReturnsNulloptForNonFinitePoints) {
   const Lens lens = plain_lens(GetParam());
   for (const double bad : {kNan, kInfinity, -kInfinity}) {
     for (int i = 0; i < 3; ++i) {
@@ -35,7 +35,7 @@ TEST_P(LensRefusal, OfPointsThatAreNotFinite) {
   }
 }
 
-TEST_P(LensRefusal, OfResultsThatAreNotFinite) {
+TEST_P(LensWithInvalidInput, ReturnsOnlyFiniteResultsForHugeInput) {
   const Lens lens = plain_lens(GetParam());
   for (const double huge : {1e150, 1e160, 1e305, 1e308}) {
     const auto ray = lens.unproject({huge, -huge});
@@ -45,11 +45,11 @@ TEST_P(LensRefusal, OfResultsThatAreNotFinite) {
   }
 }
 
-TEST_P(LensRefusal, OfTheCameraItself) {
+TEST_P(LensWithInvalidInput, ProjectReturnsNulloptForCameraCenter) {
   EXPECT_FALSE(plain_lens(GetParam()).project(Vector3d::Zero()));
 }
 
-TEST_P(LensRefusal, OfParametersThatAreNotItsOwnNumberOrNotFinite) {
+TEST_P(LensWithInvalidInput, ConstructorThrowsForInvalidParameters) {
   const auto good = parameters_with(GetParam(), {});
   EXPECT_NO_THROW(Lens(GetParam(), good));
   auto parameters = good;
@@ -74,10 +74,10 @@ TEST_P(LensRefusal, OfParametersThatAreNotItsOwnNumberOrNotFinite) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Models, LensRefusal, testing::ValuesIn(kEveryModel),
+INSTANTIATE_TEST_SUITE_P(Models, LensWithInvalidInput, testing::ValuesIn(kEveryModel),
                          testing::PrintToStringParamName());
 
-TEST(Lens, SaysHowManyParametersItTakes) {
+TEST(Lens, ExceptionReportsExpectedParameterCount) {
   const std::vector<double> parameters(9, 1.0);
   EXPECT_THAT([&] { Lens(LensModel::opencv8, parameters); },
               testing::ThrowsMessage<std::invalid_argument>(
@@ -85,7 +85,7 @@ TEST(Lens, SaysHowManyParametersItTakes) {
                                  testing::HasSubstr("9"))));
 }
 
-TEST(Lens, SeesNothingBehindItButForTheWide) {
+TEST(Lens, ProjectsPointsBehindCameraForWideModelsOnly) {
   for (const LensModel model : kEveryModel) {
     const Lens lens = plain_lens(model);
     if (is_splined(model)) continue;  // as far as their control points go

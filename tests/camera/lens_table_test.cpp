@@ -21,13 +21,13 @@ std::vector<std::string_view> names_of(LensModel model) {
   return names;
 }
 
-TEST(LensTable, IsInTheOrderOfTheEnumeration) {
+TEST(LensModels, MatchOrderOfEnumeration) {
   for (std::size_t i = 0; i < lens_models().size(); ++i) {
     EXPECT_EQ(static_cast<std::size_t>(lens_models()[i].model), i);
   }
 }
 
-TEST(LensTable, NamesTheDistortionsInTheirOrder) {
+TEST(DistortionsOf, ReturnsNamesInParameterOrder) {
   EXPECT_THAT(names_of(LensModel::stereographic), ElementsAre());
   EXPECT_THAT(names_of(LensModel::opencv5), ElementsAre("k1", "k2", "p1", "p2", "k3"));
   EXPECT_THAT(names_of(LensModel::fisheye), ElementsAre("k1", "k2", "k3", "k4"));
@@ -36,7 +36,7 @@ TEST(LensTable, NamesTheDistortionsInTheirOrder) {
               ElementsAre());
 }
 
-TEST(LensTable, StartsAnAngularLensWhereItIsStereographic) {
+TEST(DistortionsOf, InitialFisheyeLensIsNearlyStereographic) {
   std::vector<double> parameters{400, 400, 320, 240};
   const Lens stereographic(LensModel::stereographic, parameters);
   for (const LensDistortion& distortion : distortions_of(LensModel::fisheye)) {

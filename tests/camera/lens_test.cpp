@@ -15,7 +15,7 @@ using Eigen::Vector3d;
 
 class EveryLens : public testing::TestWithParam<LensModel> {};
 
-TEST_P(EveryLens, GivesBackItsParameters) {
+TEST_P(EveryLens, ReturnsItsModelFocalLengthsAndCenter) {
   auto parameters = parameters_with(GetParam(), {});
   parameters[1] = 530;
   const Lens lens(GetParam(), parameters);
@@ -24,7 +24,7 @@ TEST_P(EveryLens, GivesBackItsParameters) {
   EXPECT_EQ(lens.center_px(), Vector2d(399.5, 299.5));
 }
 
-TEST_P(EveryLens, SeesItsAxisAtItsCenter) {
+TEST_P(EveryLens, ProjectsOpticalAxisToCenter) {
   const Lens lens = plain_lens(GetParam());
   EXPECT_EQ(lens.project({0, 0, 2}), lens.center_px());
   const auto ray = lens.unproject(lens.center_px());
@@ -32,7 +32,7 @@ TEST_P(EveryLens, SeesItsAxisAtItsCenter) {
   EXPECT_EQ(ray->direction, Vector3d::UnitZ());
 }
 
-TEST_P(EveryLens, ProjectsARayToItsPixel) {
+TEST_P(EveryLens, ProjectInvertsUnproject) {
   Random random(21);
   for (int trial = 0; trial < 2000; ++trial) {
     const Lens lens(GetParam(), random_parameters(GetParam(), random));
@@ -45,7 +45,7 @@ TEST_P(EveryLens, ProjectsARayToItsPixel) {
   }
 }
 
-TEST_P(EveryLens, FindsThePointOfAPixel) {
+TEST_P(EveryLens, UnprojectInvertsProject) {
   Random random(22);
   for (int trial = 0; trial < 2000; ++trial) {
     const Lens lens(GetParam(), random_parameters(GetParam(), random));
@@ -58,7 +58,7 @@ TEST_P(EveryLens, FindsThePointOfAPixel) {
   }
 }
 
-TEST_P(EveryLens, DoesNotCareHowFarAPointIs) {
+TEST_P(EveryLens, ProjectIsIndependentOfDistance) {
   Random random(23);
   const Lens lens(GetParam(), random_parameters(GetParam(), random));
   const Vector3d point = random_point(random);
@@ -70,7 +70,7 @@ TEST_P(EveryLens, DoesNotCareHowFarAPointIs) {
 INSTANTIATE_TEST_SUITE_P(Models, EveryLens, testing::ValuesIn(kEveryModel),
                          testing::PrintToStringParamName());
 
-TEST(Lens, StereographicFindsRaysBehindItsPlane) {
+TEST(Lens, UnprojectsStereographicRaysBehindCamera) {
   const Lens lens = plain_lens(LensModel::stereographic);
   const Vector3d point(1, -2, -3);
   const auto ray = lens.unproject(lens.project(point).value());

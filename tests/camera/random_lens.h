@@ -41,7 +41,7 @@ inline constexpr LensModel kEveryModel[] = {
 inline constexpr LensModel kOpencvModels[] = {LensModel::opencv4, LensModel::opencv5,
                                               LensModel::opencv8, LensModel::opencv12};
 
-/// Of a splined lens: equidistant, d(a) = a, with errors of its own at each control point.
+/// Splined lens: equidistant, d(a) = a, with independent errors at each control point.
 std::vector<double> splined_parameters(const SplineGrid& grid, double error, Random& random);
 
 /// A random plausible lens that is one to one up to 60 degrees off axis and a little more; the

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Splined lenses of 190 degrees beside mrcal, and where they end.
+/// Splined lenses of 190 degrees, compared with mrcal, and their limits.
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
@@ -31,7 +31,7 @@ class SplinedLens : public testing::TestWithParam<LensModel> {
   }
 };
 
-TEST_P(SplinedLens, IsMrcalsAllOverItsControlPoints) {
+TEST_P(SplinedLens, MatchesMrcalOverAllControlPoints) {
   const MrcalOracle oracle = oracle_of(GetParam(), parameters_);
   std::vector<Vector3d> rays;
   std::vector<Vector2d> pixels;
@@ -57,7 +57,7 @@ TEST_P(SplinedLens, IsMrcalsAllOverItsControlPoints) {
   EXPECT_GT(compared, 2700);
 }
 
-TEST_P(SplinedLens, ReachesAsFarAsItsPieces) {
+TEST_P(SplinedLens, ProjectsUpToEndOfPiecesOnly) {
   const double edge_rad = grid_.fov_x_deg / 2.0 * std::numbers::pi / 180;
   EXPECT_NEAR(reach_.x(), 2 * std::tan(edge_rad / 2), 1e-12);
   EXPECT_NEAR(reach_.y() / reach_.x(), double(grid_.ny - grid_.order) / (grid_.nx - grid_.order),
@@ -78,7 +78,7 @@ TEST_P(SplinedLens, ReachesAsFarAsItsPieces) {
   }
 }
 
-TEST_P(SplinedLens, GivesNoRayToPixelsBeyond) {
+TEST_P(SplinedLens, UnprojectReturnsNulloptForPixelsOutside) {
   int rays = 0, refused = 0;
   for (double v = -1200; v <= 1800; v += 29) {
     for (double x = -1200; x <= 2000; x += 29) {
@@ -97,7 +97,7 @@ TEST_P(SplinedLens, GivesNoRayToPixelsBeyond) {
   EXPECT_GT(refused, 1000);
 }
 
-TEST_P(SplinedLens, SharesItsControlPointsBetweenCopies) {
+TEST_P(SplinedLens, CopyProjectsToSamePixels) {
   const Lens copy = lens_;
   const Vector3d ray = ray_of(somewhere());
   EXPECT_EQ(copy.project(ray), lens_.project(ray));
@@ -109,7 +109,7 @@ INSTANTIATE_TEST_SUITE_P(Grids, SplinedLens, testing::Values(kCubic, kQuadratic)
                            return test.param == kCubic ? "Cubic" : "Quadratic";
                          });
 
-TEST(WildSplines, GiveRaysOnlyWhereTheyDoNotFold) {
+TEST(SplinedLensWithRandomControlPoints, UnprojectReturnsRaysOnlyWithoutFold) {
   Random random(62);
   int rays = 0;
   for (int trial = 0; trial < 20; ++trial) {
@@ -130,7 +130,7 @@ TEST(WildSplines, GiveRaysOnlyWhereTheyDoNotFold) {
   EXPECT_GT(rays, 1000);
 }
 
-TEST(WildSplines, OfAnyNumbersGiveNothingThatIsNotFinite) {
+TEST(SplinedLensWithRandomControlPoints, ReturnsOnlyFiniteResults) {
   const LensModel model = splined_lens({3, 5, 4, 90});
   for (const double all : {0.0, -1.0, 1e150, -1e300}) {
     std::vector<double> parameters(parameter_count(model), all);

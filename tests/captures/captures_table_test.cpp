@@ -12,7 +12,7 @@ namespace {
 
 using testing::HasSubstr;
 
-TEST(CapturesTable, ReadsAnyOfItsColumns) {
+TEST(ReadCaptures, ReadsAnyColumns) {
   const TemporaryFolder folder;
   const auto captures = read_captures(
       folder.file("captures.csv",
@@ -30,7 +30,7 @@ TEST(CapturesTable, ReadsAnyOfItsColumns) {
   EXPECT_FALSE(captures.at("b").z_m);
 }
 
-TEST(CapturesTable, TellsWhosePlaceItIsAndWhichCapturesAreOfOneSpot) {
+TEST(ReadCaptures, ReadsPlaceAndSpot) {
   const TemporaryFolder folder;
   const auto captures = read_captures(folder.file(
       "captures.csv", "image,x_m,y_m,place,place_sd_m,spot\na,1,2,axis,0.001,s1\nb,1,2,,,\n"));
@@ -42,7 +42,7 @@ TEST(CapturesTable, TellsWhosePlaceItIsAndWhichCapturesAreOfOneSpot) {
   EXPECT_TRUE(captures.at("b").spot.empty());
 }
 
-TEST(CapturesTable, ReadsOdometry) {
+TEST(ReadCaptures, ReadsOdometry) {
   const TemporaryFolder folder;
   const auto captures = read_captures(folder.file(
       "captures.csv",
@@ -57,7 +57,7 @@ TEST(CapturesTable, ReadsOdometry) {
   EXPECT_FALSE(captures.at("c").velocity_m_per_s);
 }
 
-TEST(CapturesTable, RefusesWhatContradicts) {
+TEST(ReadCaptures, RejectsContradictions) {
   const TemporaryFolder folder;
   const auto refusal = [&](const std::string& content) {
     return refusal_of([&] { read_captures(folder.file("c.csv", content)); });

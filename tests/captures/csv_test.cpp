@@ -12,7 +12,7 @@ namespace {
 
 using testing::HasSubstr;
 
-class Csv : public testing::Test {
+class CsvTableTest : public testing::Test {
  protected:
   TemporaryFolder folder;
   CsvTable read(const std::string& content) { return CsvTable(folder.file("a.csv", content)); }
@@ -21,7 +21,7 @@ class Csv : public testing::Test {
   }
 };
 
-TEST_F(Csv, FindsColumnsByNameInAnyOrder) {
+TEST_F(CsvTableTest, FindsColumnsByNameInAnyOrder) {
   const CsvTable table = read("b,extra,a\n1,x,2\n3,,4\n");
   ASSERT_EQ(table.rows(), 2);
   EXPECT_EQ(table.number(0, table.required("a")), 2);
@@ -30,7 +30,7 @@ TEST_F(Csv, FindsColumnsByNameInAnyOrder) {
   EXPECT_FALSE(table.optional("c"));
 }
 
-TEST_F(Csv, ReadsQuotesAsTheyAreMeant) {
+TEST_F(CsvTableTest, ReadsQuotedFields) {
   const CsvTable table =
       read("image,a\n\"one, two.png\",1\n\"say \"\"hi\"\"\",2\n\"two\nlines\",3\n\"\",4\n");
   ASSERT_EQ(table.rows(), 4);
@@ -41,32 +41,32 @@ TEST_F(Csv, ReadsQuotesAsTheyAreMeant) {
   EXPECT_EQ(table.text(3, image), "");
 }
 
-TEST_F(Csv, ReadsCarriageReturnsAByteOrderMarkAndEmptyLines) {
+TEST_F(CsvTableTest, ReadsCarriageReturnsByteOrderMarkAndEmptyLines) {
   const CsvTable table = read("\xEF\xBB\xBFimage,a\r\n\r\nx.png,1\r\ny.png,2\r\n\r\n");
   ASSERT_EQ(table.rows(), 2);
   EXPECT_EQ(table.text(1, table.required("image")), "y.png");
   EXPECT_EQ(table.integer(1, table.required("a")), 2);
 }
 
-TEST_F(Csv, ReadsAHeaderWithoutRows) { EXPECT_EQ(read("a,b\n").rows(), 0); }
+TEST_F(CsvTableTest, ReadsHeaderWithoutRows) { EXPECT_EQ(read("a,b\n").rows(), 0); }
 
-TEST_F(Csv, NamesTheMissingColumn) {
+TEST_F(CsvTableTest, ReportsMissingColumn) {
   const CsvTable table = read("image,lamp\nx,1\n");
   EXPECT_THAT(refusal_of([&] { (void)table.required("u_px"); }),
               HasSubstr("a.csv:1: u_px: this column is missing; the columns are: image, lamp"));
 }
 
-TEST_F(Csv, NamesTheLineOfARowCutShort) {
+TEST_F(CsvTableTest, ReportsLineOfTruncatedRow) {
   EXPECT_THAT(refusal("a,b,c\n1,2,3\n1,2\n"), HasSubstr("a.csv:3: has 2 fields, the header has 3"));
   EXPECT_THAT(refusal("a,b,c\n1,2,3,4\n"), HasSubstr("a.csv:2: has 4 fields, the header has 3"));
   EXPECT_THAT(refusal("a,b,c\n1,2,3"), HasSubstr("a.csv:2: the last line has no end"));
 }
 
-TEST_F(Csv, CountsLinesThroughQuotedLineEnds) {
+TEST_F(CsvTableTest, CountsLinesInQuotedFields) {
   EXPECT_THAT(refusal("a,b\n\"x\ny\",1\n\n\nz\n"), HasSubstr("a.csv:6: has 1 fields"));
 }
 
-TEST_F(Csv, RefusesWhatIsNoCsv) {
+TEST_F(CsvTableTest, RejectsInvalidCsv) {
   EXPECT_THAT(refusal("a,b\n1,\"2\n3,4\n"), HasSubstr("a.csv:2: a quote opens"));
   EXPECT_THAT(refusal("a,b\n1,x\"y\"\n"), HasSubstr("a.csv:2: a quote stands where none may"));
   EXPECT_THAT(refusal("a,a\n1,2\n"), HasSubstr("a.csv:1: a: this column stands twice"));
@@ -74,7 +74,7 @@ TEST_F(Csv, RefusesWhatIsNoCsv) {
   EXPECT_THAT(refusal(""), HasSubstr("a.csv: is empty"));
 }
 
-TEST_F(Csv, NamesLineAndColumnOfWhatIsNoNumber) {
+TEST_F(CsvTableTest, ReportsLineAndColumnOfInvalidNumber) {
   for (const std::string bad : {"", "x", "1.5 m", "nan", "inf", "-inf", "1e999", "0x10", "1,5"}) {
     const CsvTable table = read("image,u_px\nok,1\nbad,\"" + bad + "\"\n");
     EXPECT_THAT(refusal_of([&] { (void)table.number(1, table.required("u_px")); }),
@@ -85,7 +85,7 @@ TEST_F(Csv, NamesLineAndColumnOfWhatIsNoNumber) {
               HasSubstr("a.csv:2: lamp: should be a whole number, not '1.5'"));
 }
 
-TEST_F(Csv, WritesWhatItReads) {
+TEST_F(CsvTableTest, ReadsFieldsOfCsvWriter) {
   const std::vector<std::string> fields{"plain", "a,b", "say \"hi\"", "two\nlines", " spaces ", ""};
   CsvWriter writer(folder / "b.csv", {"one", "two"});
   for (const std::string& field : fields) writer.row({field, "x"});
@@ -97,7 +97,7 @@ TEST_F(Csv, WritesWhatItReads) {
   }
 }
 
-TEST_F(Csv, WritesFormulasAsTextAndReadsThemBack) {
+TEST_F(CsvTableTest, ReadsFormulasEscapedByCsvWriter) {
   const std::vector<std::string> formulas{"=1+1", "+A1", "-A1",    "@sum(a)", "\tx",  "\rx",
                                           "'=1",  "''=", "=\"a\"", "=a,b",    "-1-1", "+1 m"};
   CsvWriter writer(folder / "b.csv", {"one", "=two"});
@@ -113,14 +113,14 @@ TEST_F(Csv, WritesFormulasAsTextAndReadsThemBack) {
   }
 }
 
-TEST_F(Csv, WritesNumbersAndOtherTextAsTheyAre) {
+TEST_F(CsvTableTest, ReadsNumbersUnescapedByCsvWriter) {
   CsvWriter writer(folder / "b.csv", {"a", "b", "c", "d", "e", "f"});
   writer.row({"-0.5", "+1.5e-3", "-", "'quoted'", "a=b", "-inf"});
   writer.save();
   EXPECT_EQ(folder.content_of(folder / "b.csv"), "a,b,c,d,e,f\n-0.5,+1.5e-3,-,'quoted',a=b,-inf\n");
 }
 
-TEST_F(Csv, NamesTheColumnThatStandsTwiceAmongMany) {
+TEST_F(CsvTableTest, ReportsDuplicateColumnAmongMany) {
   std::string header = "twice", row = "0";
   for (int i = 0; i < 200'000; ++i) {
     header += ",c" + std::to_string(i);

@@ -12,7 +12,7 @@ namespace {
 
 using testing::HasSubstr;
 
-class DetectionsTable : public testing::Test {
+class ReadDetections : public testing::Test {
  protected:
   TemporaryFolder folder;
   std::vector<Frame> read(const std::string& content) {
@@ -23,7 +23,7 @@ class DetectionsTable : public testing::Test {
   }
 };
 
-TEST_F(DetectionsTable, GroupsRowsByImageInOrderOfAppearance) {
+TEST_F(ReadDetections, GroupsRowsByImageInOrderOfAppearance) {
   const auto frames = read("image,lamp,u_px,v_px\nb,2,10,20\na,1,1.5,-2\nb,1,3,4\n");
   ASSERT_EQ(frames.size(), 2);
   EXPECT_EQ(frames[0].image, "b");
@@ -34,14 +34,14 @@ TEST_F(DetectionsTable, GroupsRowsByImageInOrderOfAppearance) {
   EXPECT_FALSE(frames[0].detections[0].sigma_px);
 }
 
-TEST_F(DetectionsTable, ReadsSigmaWhereItIsStated) {
+TEST_F(ReadDetections, ReadsSigmaWhenGiven) {
   const auto frames = read("lamp,sigma_px,image,v_px,u_px,note\n1,0.05,a,2,1,x\n2,,a,4,3,y\n");
   ASSERT_EQ(frames.size(), 1);
   EXPECT_EQ(frames[0].detections[0].sigma_px, 0.05);
   EXPECT_FALSE(frames[0].detections[1].sigma_px);
 }
 
-TEST_F(DetectionsTable, ReadsWhatItWrites) {
+TEST_F(ReadDetections, ReturnsWrittenFrames) {
   const std::vector<Frame> frames{{"a, b.png", {{3, {1.25, -7.5}, 0.05}, {4, {100, 200}, {}}}},
                                   {"c.png", {{3, {0.0625, 2}, 1.5}}}};
   write_detections(folder / "e.csv", frames);
@@ -58,7 +58,7 @@ TEST_F(DetectionsTable, ReadsWhatItWrites) {
   }
 }
 
-TEST_F(DetectionsTable, NamesFileLineAndColumn) {
+TEST_F(ReadDetections, ReportsFileLineAndColumn) {
   const std::string header = "image,lamp,u_px,v_px,sigma_px\n";
   EXPECT_THAT(refusal("image,lamp,u,v\na,1,2,3\n"),
               HasSubstr("d.csv:1: u_px: this column is missing"));

@@ -12,7 +12,7 @@ namespace {
 
 using testing::HasSubstr;
 
-TEST(FixesTable, HasTheColumnsOfTheContract) {
+TEST(WriteFixes, WritesDocumentedColumns) {
   const TemporaryFolder folder;
   const Pose pose{{1.5, -0.25, 0.1234567891}, 3};
   write_fixes(folder / "fixes.csv",
@@ -26,7 +26,7 @@ TEST(FixesTable, HasTheColumnsOfTheContract) {
             "\"c,d.png\",too_few_lamps,,,,,,,,,0,\n");
 }
 
-TEST(FixesTable, ReadsWhatItWrites) {
+TEST(ReadFixes, ReturnsWrittenRows) {
   const TemporaryFolder folder;
   const Pose pose{{1.5, -0.25, 0.125}, 3};
   write_fixes(folder / "fixes.csv",
@@ -47,7 +47,7 @@ TEST(FixesTable, ReadsWhatItWrites) {
   EXPECT_EQ(rows[2].line, 4);
 }
 
-TEST(FixesTable, HasMotionLeanAndTimeWhereThereAreAny) {
+TEST(WriteFixes, WritesMotionLeanAndTimeWhenGiven) {
   const TemporaryFolder folder;
   const Pose pose{{1.5, -0.25, 0.125}, 3};
   FixRow moving{"a.png", "ok", FixRow::Fix{pose, {}, 0.05}, 4};
@@ -76,7 +76,7 @@ TEST(FixesTable, HasMotionLeanAndTimeWhereThereAreAny) {
               testing::HasSubstr("residual_px,vx_m_per_s,vy_m_per_s\n"));
 }
 
-TEST(FixesTable, NamesTheLineOfBadRows) {
+TEST(ReadFixes, ReportsLineOfInvalidRow) {
   const TemporaryFolder folder;
   const auto refusal = [&](const std::string& rows) {
     const std::string header = "image,status,x_m,y_m,z_m,yaw_rad,sd_x_m,sd_y_m,sd_z_m,sd_yaw_rad\n";
@@ -98,7 +98,7 @@ TEST(FixesTable, NamesTheLineOfBadRows) {
   EXPECT_THAT(refusal(""), HasSubstr("fixes.csv: holds no fix"));
 }
 
-TEST(FixesTable, HasTheNoisesPartAndTheLampsLeftOutWhereThereAreAny) {
+TEST(WriteFixes, WritesNoisePartAndRejectedLampsWhenGiven) {
   const TemporaryFolder folder;
   FixRow plain{"a", "ok", FixRow::Fix{{{1, 2, 3}, 0.5}, Eigen::Vector4d(1, 1, 1, 1), 0.1}, 4};
   FixRow whole = plain;
@@ -123,7 +123,7 @@ TEST(FixesTable, HasTheNoisesPartAndTheLampsLeftOutWhereThereAreAny) {
   EXPECT_EQ(read[1].outside_region, whole.outside_region);
 }
 
-TEST(FixesTable, RefusesLampsLeftOutThatAreNoIds) {
+TEST(ReadFixes, RejectsInvalidIdsOfRejectedLamps) {
   const TemporaryFolder folder;
   for (const char* ids : {"7;12", "lamp", "7 x", "7  12", "99999999999"}) {
     const auto file =

@@ -9,7 +9,7 @@
 namespace vlp {
 namespace {
 
-TEST(NameIndex, FindsEachNameAmongMany) {
+TEST(NameIndex, FindReturnsEachOfManyNames) {
   std::vector<std::string> names;
   for (int i = 0; i < 10000; ++i) names.push_back(std::to_string(i) + ".png");
   NameIndex index(names.size());
@@ -21,7 +21,7 @@ TEST(NameIndex, FindsEachNameAmongMany) {
   EXPECT_EQ(index.find(""), std::nullopt);
 }
 
-TEST(NameIndex, OfNoNamesIsEmpty) { EXPECT_EQ(NameIndex(0).find("a"), std::nullopt); }
+TEST(NameIndex, FindReturnsNulloptWhenEmpty) { EXPECT_EQ(NameIndex(0).find("a"), std::nullopt); }
 
 }  // namespace
 }  // namespace vlp

@@ -9,7 +9,7 @@
 namespace vlp {
 namespace {
 
-TEST(NumberText, HasTheDigitsAskedFor) {
+TEST(NumberText, ReturnsRequestedDigits) {
   EXPECT_EQ(fixed(1.0 / 3, 4), "0.3333");
   EXPECT_EQ(fixed(-2e-12, 9), "-0.000000000");
   EXPECT_EQ(significant(1234.5678, 6), "1234.57");

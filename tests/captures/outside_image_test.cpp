@@ -13,7 +13,7 @@ std::size_t far_outside(double u_px, double v_px) {
                            {800, 600});
 }
 
-TEST(OutsideImage, IsWhatIsATenthBeyondItsEdges) {
+TEST(CountFarOutside, CountsDetectionsBeyondTenPercent) {
   for (const auto& [u_px, v_px] : {std::pair(400, 300), {-79, 300}, {879, 300}, {400, -59}}) {
     EXPECT_EQ(far_outside(u_px, v_px), 0) << u_px << " " << v_px;
   }

@@ -13,7 +13,7 @@ namespace {
 
 using testing::HasSubstr;
 
-TEST(PathTable, HasHeightsOrNot) {
+TEST(ReadPath, ReadsOptionalHeights) {
   const TemporaryFolder folder;
   const Path flat = read_path(folder.file("p.csv", "y_m,x_m\n1,2\n3,4\n"));
   EXPECT_EQ(flat.waypoints_m[1], Eigen::Vector2d(4, 3));
@@ -22,7 +22,7 @@ TEST(PathTable, HasHeightsOrNot) {
             (std::vector<double>{3, 6}));
 }
 
-TEST(PathTable, RefusesWhatLeadsNowhere) {
+TEST(ReadPath, RejectsPathWithoutLength) {
   const TemporaryFolder folder;
   for (const char* text : {"x_m,y_m\n", "x_m,y_m\n1,2\n", "x_m,y_m\n1,2\n1,2\n"}) {
     EXPECT_THAT(refusal_of([&] { read_path(folder.file("p.csv", text)); }),
@@ -32,7 +32,7 @@ TEST(PathTable, RefusesWhatLeadsNowhere) {
               HasSubstr("p.csv:2: y_m"));
 }
 
-TEST(PathTable, HasItsNearestPointWhereItIsNearest) {
+TEST(FindNearestOnPath, ReturnsNearestPoint) {
   Random random(1);
   Path path;
   for (int i = 0; i < 30; ++i) {
@@ -41,7 +41,7 @@ TEST(PathTable, HasItsNearestPointWhereItIsNearest) {
   }
   for (int i = 0; i < 100; ++i) {
     const Eigen::Vector2d place(random.uniform(-2, 2), random.uniform(-2, 2));
-    double least = 1e9;  // by brute force: a thousand points a leg
+    double least = 1e9;  // brute force: a thousand points for each segment
     for (std::size_t leg = 1; leg < path.waypoints_m.size(); ++leg) {
       for (int step = 0; step <= 1000; ++step) {
         const Eigen::Vector2d point =
@@ -54,7 +54,7 @@ TEST(PathTable, HasItsNearestPointWhereItIsNearest) {
   }
 }
 
-TEST(PathTable, RefusesWhatIsTooFarOff) {
+TEST(ReadPath, RejectsDistantWaypoint) {
   const TemporaryFolder folder;
   const auto refusal = [&](const std::string& row) {
     return refusal_of([&] { read_path(folder.file("p.csv", "x_m,y_m,z_m\n1,2,3\n" + row)); });
@@ -65,7 +65,7 @@ TEST(PathTable, RefusesWhatIsTooFarOff) {
   EXPECT_THAT(refusal("0,0,1e7\n"), HasSubstr("p.csv:3: z_m"));
 }
 
-TEST(PathTable, HasHeightsInBetween) {
+TEST(FindNearestOnPath, InterpolatesHeight) {
   const Path path{{{0, 0}, {2, 0}, {2, 2}}, {0, 1, 5}};
   EXPECT_DOUBLE_EQ(*nearest_on(path, {1, 1e-3}).z_m, 0.5);
   EXPECT_DOUBLE_EQ(*nearest_on(path, {3, 1.5}).z_m, 4);

@@ -7,13 +7,13 @@
 namespace vlp {
 namespace {
 
-TEST(Printable, LeavesTextAsItIs) {
+TEST(Printable, KeepsPlainText) {
   const std::string text = "0000.png: taken\n\tr\u00f6tlich \u20ac \U0001f4f7 \u00a0";
   EXPECT_EQ(printable(text), text);
   EXPECT_EQ(printable(""), "");
 }
 
-TEST(Printable, EscapesWhatATerminalWouldObey) {
+TEST(Printable, EscapesControlCharacters) {
   EXPECT_EQ(printable("\x1b[2J.png"), "\\x1b[2J.png");
   EXPECT_EQ(printable("a\rb\x07\x7f"), "a\\x0db\\x07\\x7f");
   EXPECT_EQ(printable(std::string("\0", 1)), "\\x00");
@@ -26,7 +26,7 @@ TEST(Printable, EscapesWhatATerminalWouldObey) {
             "\\x9b2J");
 }
 
-TEST(Printable, EscapesWhatIsNoUtf8) {
+TEST(Printable, EscapesInvalidUtf8) {
   EXPECT_EQ(printable("\xc3"), "\\xc3");
   EXPECT_EQ(printable("\xc3z"), "\\xc3z");
   EXPECT_EQ(printable("\xe2\x82"), "\\xe2\\x82");
@@ -38,14 +38,14 @@ TEST(Printable, EscapesWhatIsNoUtf8) {
   EXPECT_EQ(printable("\xf4\x90\x80\x80"), "\\xf4\\x90\\x80\\x80");
 }
 
-TEST(Printable, EscapesMarksThatReorderTheText) {
+TEST(Printable, EscapesDirectionMarks) {
   EXPECT_EQ(printable("\u202egnp.FAIL"), "\\xe2\\x80\\xaegnp.FAIL");
   EXPECT_EQ(printable("a\u2028b"), "a\\xe2\\x80\\xa8b");
   EXPECT_EQ(printable("\u061c"), "\\xd8\\x9c");
   EXPECT_EQ(printable("\u2065\u2070\u2027\u202f"), "\u2065\u2070\u2027\u202f");
 }
 
-TEST(Printable, EscapesWhatIsNoCharacter) {
+TEST(Printable, EscapesNoncharacters) {
   EXPECT_EQ(printable("\xef\xbf\xbe"), "\\xef\\xbf\\xbe");
   EXPECT_EQ(printable("\xef\xb7\x90"), "\\xef\\xb7\\x90");
   EXPECT_EQ(printable("\xf1\x8f\xbf\xbe"), "\\xf1\\x8f\\xbf\\xbe");
@@ -53,12 +53,12 @@ TEST(Printable, EscapesWhatIsNoCharacter) {
             "\ufffd\xc2\xbf\xe2\xbf\xbf\xf1\x8e\xbf\xbe");
 }
 
-TEST(PrintableLine, IsOneLine) {
+TEST(PrintableLine, EscapesLineEnds) {
   EXPECT_EQ(printable_line("a\n2026 PASS\tb"), "a\\x0a2026 PASS\\x09b");
   EXPECT_EQ(printable_line("r\u00f6tlich"), "r\u00f6tlich");
 }
 
-TEST(FirstCharacters, CutNoneInTwo) {
+TEST(TruncateUtf8, KeepsWholeCharacters) {
   EXPECT_EQ(first_characters("abc", 3), "abc");
   EXPECT_EQ(first_characters("abc", 2), "ab");
   EXPECT_EQ(first_characters("a\xc3\xb6", 2), "a");

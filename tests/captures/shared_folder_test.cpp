@@ -27,7 +27,7 @@ class SharedFolderTest : public testing::Test {
   const fs::path outside = folder.file("outside.txt", "mine");
 };
 
-TEST_F(SharedFolderTest, WritesReadsRenamesAndRemoves) {
+TEST_F(SharedFolderTest, WritesReadsRenamesAndRemovesFiles) {
   const SharedFolder shared(path);
   EXPECT_FALSE(shared.has("a"));
   EXPECT_EQ(shared.read("a", 10), std::nullopt);
@@ -44,7 +44,7 @@ TEST_F(SharedFolderTest, WritesReadsRenamesAndRemoves) {
   EXPECT_TRUE(fs::is_empty(path)) << "no temporary file is left";
 }
 
-TEST_F(SharedFolderTest, FoldersInItAreMadeAndFound) {
+TEST_F(SharedFolderTest, CreatesAndFindsFolders) {
   const SharedFolder shared(path);
   EXPECT_FALSE(shared.find_folder(id("0001")));
   shared.make_folder(id("0001")).replace("a", "a");
@@ -57,7 +57,7 @@ TEST_F(SharedFolderTest, FoldersInItAreMadeAndFound) {
   EXPECT_THAT(refusal_of([&] { SharedFolder(path / "file"); }), HasSubstr("cannot be opened"));
 }
 
-TEST_F(SharedFolderTest, FollowsNoLinkBelowIt) {
+TEST_F(SharedFolderTest, RejectsLinksInFolder) {
   fs::create_symlink(outside, path / "link");
   fs::create_directory_symlink(folder / "", path / "folder");
   const SharedFolder shared(path);
@@ -77,7 +77,7 @@ TEST_F(SharedFolderTest, FollowsNoLinkBelowIt) {
   EXPECT_EQ(TemporaryFolder::content_of(outside), "mine");
 }
 
-TEST_F(SharedFolderTest, NamesNothingOutside) {
+TEST_F(SharedFolderTest, RejectsNamesOutsideFolder) {
   const SharedFolder shared(path);
   for (const std::string& name :
        {std::string(), std::string("."), std::string(".."), std::string("../outside.txt"),
@@ -96,7 +96,7 @@ TEST_F(SharedFolderTest, NamesNothingOutside) {
   EXPECT_EQ(TemporaryFolder::content_of(outside), "mine");
 }
 
-TEST_F(SharedFolderTest, RemovesItsContentWhateverItsNameLeadsTo) {
+TEST_F(SharedFolderTest, RemovesContentOfOpenedFolderAfterRename) {
   fs::create_directories(folder / "elsewhere/kept");
   fs::create_directories(path / "sub");
   folder.file("shared/sub/file", "");
@@ -119,7 +119,7 @@ TEST_F(SharedFolderTest, ReadsRegularFilesOnly) {
   EXPECT_THAT(refusal_of([&] { shared.read("folder", 10); }), HasSubstr("is no regular file"));
 }
 
-TEST_F(SharedFolderTest, KeepsModeAndOwnerOfWhatItReplaces) {
+TEST_F(SharedFolderTest, KeepsModeAndOwnerOfReplacedFile) {
   const SharedFolder shared(path);
   shared.replace("a", "first");
   ASSERT_EQ(::chmod((path / "a").c_str(), 0640), 0);

@@ -12,7 +12,7 @@ namespace {
 
 using testing::HasSubstr;
 
-TEST(TruthTable, NeedsNeitherHeightNorYaw) {
+TEST(ReadTruth, AcceptsMissingHeightAndYaw) {
   const TemporaryFolder folder;
   const auto rows = read_truth(folder.file("t.csv", "image,x_m,y_m,yaw_rad\nb,1,2,\na,3,4,0.5\n"));
   ASSERT_EQ(rows.size(), 2);
@@ -24,7 +24,7 @@ TEST(TruthTable, NeedsNeitherHeightNorYaw) {
   EXPECT_EQ(rows[1].line, 3);
 }
 
-TEST(TruthTable, NamesTheLineOfBadRows) {
+TEST(ReadTruth, ReportsLineOfInvalidRow) {
   const TemporaryFolder folder;
   const auto refusal = [&](const std::string& rows) {
     return refusal_of([&] { read_truth(folder.file("t.csv", "image,x_m,y_m,z_m\n" + rows)); });

@@ -22,7 +22,7 @@ cv::Mat1w gradient() {
   return image;
 }
 
-TEST(Codecs, DecodeAnImageAsItWasEncoded) {
+TEST(Codecs, DecodeRestoresEncodedImage) {
   const cv::Mat1w image = gradient();
   for (const char* ending : {".png", ".tiff", ".pgm"}) {
     std::string bytes = codecs().encode(ending, image, {});
@@ -33,16 +33,16 @@ TEST(Codecs, DecodeAnImageAsItWasEncoded) {
   }
 }
 
-TEST(Codecs, DecodeNothingFromOtherBytes) {
+TEST(Codecs, DecodeReturnsEmptyImageForOtherBytes) {
   std::string bytes = "no image";
   EXPECT_TRUE(codecs().decode(bytes, kUnchanged).empty());
 }
 
-TEST(Codecs, RefuseAnUnknownEnding) {
+TEST(Codecs, EncodeThrowsForUnknownExtension) {
   EXPECT_ANY_THROW(codecs().encode(".unknown", gradient(), {}));
 }
 
-TEST(Codecs, OpenNoVideoThatIsNotThere) {
+TEST(VideoReader, OpenFailsForMissingFile) {
   constexpr int ffmpeg = 1900;  // cv::CAP_FFMPEG
   if (!codecs().has_video_backend(ffmpeg)) GTEST_SKIP() << "OpenCV without FFmpeg";
   const auto reader = codecs().make_video_reader();

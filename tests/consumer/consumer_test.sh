@@ -2,12 +2,11 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
 #
-# Installs the library, then builds the example of a robot's loop in lib/README.md against the installed
-# tree: with its CMake package, and with pkg-config for this very processor (-march=native), which
-# changes the layout of Eigen's own types. Both programs run, and the example in C: from the pixels of a
-# rendered image to its fix. Then the same fixes through the C API, from C99 and C++17, and through the C++ API,
-# by GCC and by Clang where there is one, without optimisation and with all of it: they are the same to the last
-# bit.
+# Installs the library, then builds the robot loop of lib/README.md against the installed tree: with its CMake
+# package, and with pkg-config for this processor (-march=native), which changes the layout of Eigen's types. Both
+# programs and the example in C compute a fix from the pixels of a rendered image. Then compares fixes by the C API
+# (C99, C++17) and by the C++ API, compiled by GCC and, if installed, Clang, without and with full optimization:
+# they agree to the last bit.
 set -euo pipefail
 source_dir=$1 build_dir=$2 scratch=$3 flags=${4:-}
 

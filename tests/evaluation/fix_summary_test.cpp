@@ -14,7 +14,7 @@ FixRow row(int lamps, double residual_px, double sd_m) {
       lamps};
 }
 
-TEST(FixSummary, CountsFixesReasonsAndLamps) {
+TEST(Summarize, CountsFixesStatusesAndLamps) {
   const std::vector<FixRow> rows{row(2, 0, 1),
                                  row(5, 3, 2),
                                  row(3, 1, 3),
@@ -37,7 +37,7 @@ TEST(FixSummary, CountsFixesReasonsAndLamps) {
   EXPECT_EQ(summary.median_sd->yaw_rad, 4);
 }
 
-TEST(FixSummary, LeavesOutWhatIsNotThere) {
+TEST(Summarize, OmitsMissingStatistics) {
   EXPECT_FALSE(summarize({}).typical);
   FixRow without_sd = row(3, 1, 1);
   without_sd.fix->sd.reset();

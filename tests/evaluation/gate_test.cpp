@@ -19,7 +19,8 @@ namespace {
 
 using testing::HasSubstr;
 
-/// Three fixes of four captures, off by 1, 2 and 6 mm; only the first's height is known, 3 mm off.
+/// Three fixes of four captures with errors of 1, 2 and 6 mm. Only the first has a known height,
+/// with an error of 3 mm.
 Evaluation evaluation() {
   EvaluationInput input;
   input.fixes.rows = {{"a", "ok", FixRow::Fix{{{1e-3, 0, 3e-3}, 0}, {}, 0}, 3},
@@ -32,7 +33,7 @@ Evaluation evaluation() {
   return evaluate(input);
 }
 
-TEST(Gates, HoldWhenTheFigureIsNoLarger) {
+TEST(CheckGates, PassesIfValueDoesNotExceedLimit) {
   const auto results = check_gates({{"mean_mm", 3.001},
                                     {"mean_mm", 2.999},
                                     {"p90_mm", 6.001},
@@ -48,7 +49,7 @@ TEST(Gates, HoldWhenTheFigureIsNoLarger) {
   EXPECT_EQ(words_of(results[5]), "height_rms_mm is 3 mm, at most 2.9 mm is asked for");
 }
 
-TEST(Gates, AreMetUpToTheLimitOrFromItOn) {
+TEST(CheckGates, IncludesLimitInBothDirections) {
   EXPECT_TRUE(check_gates({{"rms_px", 0.3}}, {{"rms_px", 0.3}})[0].met());
   EXPECT_FALSE(check_gates({{"rms_px", 0.3}}, {{"rms_px", 0.31}})[0].met());
   const auto coverage = check_gates({{"coverage", 0.7}}, {{"coverage", 0.69}});
@@ -59,7 +60,7 @@ TEST(Gates, AreMetUpToTheLimitOrFromItOn) {
   EXPECT_TRUE(check_gates({{"coverage", 0.7}}, {{"coverage", 0.7}})[0].met());
 }
 
-TEST(Gates, WithAGuardBandAskForMore) {
+TEST(CheckGates, TightensLimitByGuardBand) {
   const auto of = [](const char* metric, double limit, double value) {
     return check_all({{metric, limit, GuardBand{0.01, 1.5}}}, {{metric, value}},
                      {*metric_kind(metric)})[0];
@@ -75,7 +76,7 @@ TEST(Gates, WithAGuardBandAskForMore) {
   EXPECT_FALSE(below.met());
   EXPECT_EQ(words_of(below),
             "coverage is 0.714, at least 0.7 and a guard band of 0.015 is asked for");
-  // The normal distribution's tables.
+  // Tables of the normal distribution.
   EXPECT_NEAR(*of("rms_px", 0.3, 0.286).conformance_probability(), 0.91924, 5e-6);
   EXPECT_NEAR(*of("coverage", 0.7, 0.714).conformance_probability(), 0.91924, 5e-6);
   EXPECT_NEAR(*of("rms_px", 0.3, 0.32).conformance_probability(), 0.02275, 5e-6);
@@ -83,9 +84,9 @@ TEST(Gates, WithAGuardBandAskForMore) {
   EXPECT_FALSE(check_gates({{"rms_px", 0.3}}, {{"rms_px", 0.1}})[0].conformance_probability());
 }
 
-/// Of units of any quality that are measured with an uncertainty: how many are passed and should
-/// not have been, and the other way round, against what their probabilities say.
-TEST(Gates, WithAGuardBandStateTheirErrors) {
+/// Draws units of any quality and measures them with an uncertainty. Compares the number of false
+/// passes and false failures with the sum of their reported probabilities.
+TEST(ConformanceProbability, MatchesSimulatedDecisionErrors) {
   constexpr double limit = 1, u = 0.05, k = 1.645;
   CheckedMetric unit = check_gates({{"rms_px", limit, GuardBand{u, k}}}, {})[0];
   Random random(11);
@@ -112,7 +113,7 @@ TEST(Gates, WithAGuardBandStateTheirErrors) {
   EXPECT_NEAR(double(passed_at_limit) / units, 0.05, 0.005);
 }
 
-TEST(Gates, OfAllMetricsHaveThoseWithoutAGateAndWithoutAValue) {
+TEST(CheckAll, IncludesMetricsWithoutGateAndGatesWithoutValue) {
   const double infinity = std::numeric_limits<double>::infinity();
   const auto known = metric_kinds({MetricSource::lens, MetricSource::rotation});
   const auto all = check_all({{"rms_px", 0.3}}, {{"tilt_deg", 1}, {"rms_px", infinity}}, known);
@@ -126,7 +127,7 @@ TEST(Gates, OfAllMetricsHaveThoseWithoutAGateAndWithoutAValue) {
   EXPECT_TRUE(all[1].met());
 }
 
-TEST(Gates, ThatChangeTakeThePlaceOfTheSame) {
+TEST(WithChanges, ReplacesLimitsAndAppendsNewGates) {
   const auto gates =
       with_changes({{"rms_px", 1}, {"halves_px", 1}}, {{"coverage", 0.6}, {"rms_px", 2}});
   ASSERT_EQ(gates.size(), 3);
@@ -135,7 +136,7 @@ TEST(Gates, ThatChangeTakeThePlaceOfTheSame) {
   EXPECT_EQ(gates[2].metric, "coverage");
 }
 
-TEST(Gates, OfAComparisonOfTooFewDoNotFail) {
+TEST(CheckGates, ComparisonOfTooFewUnitsPasses) {
   Evaluation compared = evaluation();
   compared.comparison = Comparison{};
   const auto passed = [&] { return check_gates({{"worse_mm", 0}}, metrics_of(compared))[0].met(); };
@@ -152,7 +153,7 @@ TEST(Gates, OfAComparisonOfTooFewDoNotFail) {
   EXPECT_TRUE(passed());
 }
 
-TEST(Gates, HaveLimitsThatAFigureCanReach) {
+TEST(ParseGate, RejectsUnreachableLimits) {
   const auto known = metric_kinds({MetricSource::lens, MetricSource::evaluation});
   const auto words = [&](const char* text) -> std::string {
     try {
@@ -180,7 +181,7 @@ TEST(Gates, HaveLimitsThatAFigureCanReach) {
               HasSubstr("g.yaml:3: gates.yaw_rms_deg: should not be negative"));
 }
 
-TEST(Gates, OfWhatIsNotKnownAreNotMet) {
+TEST(CheckGates, FailsGateWithoutValue) {
   const CheckedMetric gate = check_gates({{"halves_px", 1}}, {{"rms_px", 0.1}})[0];
   EXPECT_EQ(words_of(gate), "halves_px is not known, at most 1 px is asked for");
   const auto json = nlohmann::json::parse(json_of(evaluation(), {gate}));
@@ -191,7 +192,7 @@ TEST(Gates, OfWhatIsNotKnownAreNotMet) {
   EXPECT_THAT(tests[0].message, HasSubstr("halves_px is not known, at most 1 px"));
 }
 
-TEST(Gates, AreReadFromWords) {
+TEST(ParseGate, ParsesNameAndLimit) {
   const auto known = metric_kinds({MetricSource::evaluation});
   const Gate gate = gate_of("p90_mm=2.5", known);
   EXPECT_EQ(gate.metric, "p90_mm");
@@ -202,7 +203,7 @@ TEST(Gates, AreReadFromWords) {
   }
 }
 
-TEST(Gates, AreReadFromAFile) {
+TEST(ReadGates, ReadsFileAndRejectsInvalidOnes) {
   const TemporaryFolder folder;
   const auto known = metric_kinds({MetricSource::evaluation});
   const auto gates = read_gates(
@@ -221,7 +222,7 @@ TEST(Gates, AreReadFromAFile) {
   EXPECT_THAT(refusal("gates: {}\n"), HasSubstr("holds no gate"));
 }
 
-TEST(EvaluationFiles, AreJsonWithUnitsInTheKeys) {
+TEST(EvaluationJson, HasUnitsInKeys) {
   const auto json = nlohmann::json::parse(json_of(
       evaluation(), check_gates({{"max_mm", 5}, {"missing", 1}}, metrics_of(evaluation()))));
   EXPECT_EQ(json["format"], "vlp-evaluation/1");
@@ -235,7 +236,7 @@ TEST(EvaluationFiles, AreJsonWithUnitsInTheKeys) {
   EXPECT_EQ(json["passed"], false);
 }
 
-TEST(EvaluationFiles, HaveNoIntervalOfP90OfFewUnits) {
+TEST(EvaluationJson, OmitsP90IntervalForFewUnits) {
   Evaluation few = evaluation();
   const Interval interval{0.001, 0.002};
   few.intervals_m = {interval, interval, {}, interval, 19};

@@ -9,7 +9,7 @@
 namespace vlp {
 namespace {
 
-TEST(LimitsTable, HasAColumnForEachSourceAndLeavesOpenWhatHasNoFix) {
+TEST(WriteLimits, HasColumnForEachSourceAndEmptyCellsWithoutFix) {
   Matrix4 noise = Matrix4::Zero(), tilt = Matrix4::Zero();
   noise.diagonal() << 9e-6, 0, 4e-6, 1e-6;
   tilt(1, 1) = 16e-6;

@@ -10,7 +10,7 @@
 namespace vlp {
 namespace {
 
-TEST(MetricKinds, HaveNamesOfTheirOwnAndWords) {
+TEST(MetricKinds, HaveUniqueNamesAndDescriptions) {
   std::set<std::string> names;
   for (const MetricKind& kind :
        metric_kinds({MetricSource::station, MetricSource::lens, MetricSource::rotation,
@@ -27,7 +27,7 @@ TEST(MetricKinds, HaveNamesOfTheirOwnAndWords) {
   EXPECT_FALSE(metric_kind("mean_cm"));
 }
 
-TEST(Metrics, WithoutAFiniteValueHaveNone) {
+TEST(FindMetricValue, ReturnsNulloptForMissingOrNonFiniteMetric) {
   const std::vector<Metric> metrics{{"a", 1}, {"b", std::numeric_limits<double>::quiet_NaN()}};
   EXPECT_EQ(value_of(metrics, "a"), 1);
   EXPECT_FALSE(value_of(metrics, "b"));

@@ -34,7 +34,7 @@ EvaluationInput draw_run(std::size_t count, unsigned seed, double height_scale =
   return input;
 }
 
-TEST(ProposeGates, AreMetByRunsOfTheSameAccuracy) {
+TEST(ProposeGates, RunsOfSameAccuracyPass) {
   int exceeded = 0, checked = 0;
   for (unsigned seed = 0; seed < 200; ++seed) {
     const EvaluationInput first = draw_run(40, 2 * seed), second = draw_run(40, 2 * seed + 1);
@@ -47,11 +47,11 @@ TEST(ProposeGates, AreMetByRunsOfTheSameAccuracy) {
     }
   }
   ASSERT_EQ(checked, 800);
-  // 0.1 % of 800 in theory; the bootstrap intervals of 40 units are somewhat narrow.
+  // Expected: 0.1 % of 800; bootstrap intervals of 40 clusters are slightly too narrow.
   EXPECT_LE(exceeded, 5);
 }
 
-TEST(ProposeGates, CatchHeightsOfADifferentScale) {
+TEST(ProposeGates, RunWithScaledHeightErrorsFails) {
   const EvaluationInput good = draw_run(40, 1), wrong = draw_run(40, 2, 3);
   const auto gates = propose_gates(good, evaluate(good));
   ASSERT_FALSE(gates.empty());
@@ -59,7 +59,7 @@ TEST(ProposeGates, CatchHeightsOfADifferentScale) {
               HasSubstr("height_rms_mm is"));
 }
 
-TEST(ProposeGates, LeaveAMarginWithoutScatter) {
+TEST(ProposeGates, KeepsMarginWithoutScatter) {
   EvaluationInput input = draw_run(8, 1);
   for (std::size_t i = 0; i < 8; ++i) {
     input.fixes.rows[i].fix->pose = {{static_cast<double>(i) + 1e-3, 0, 0}, 0};
@@ -74,12 +74,12 @@ TEST(ProposeGates, LeaveAMarginWithoutScatter) {
   EXPECT_EQ(gates[3].limit, 0);
 }
 
-TEST(ProposeGates, NeedFiveUnits) {
+TEST(ProposeGates, ReturnsNoneForFewerThanFiveUnits) {
   const EvaluationInput input = draw_run(4, 1);
   EXPECT_TRUE(propose_gates(input, evaluate(input)).empty());
 }
 
-TEST(FormatGates, AreMetByTheirOwnRunWithMissingCaptures) {
+TEST(FormatGates, OwnRunWithMissingCapturesPasses) {
   EvaluationInput input = draw_run(21, 1);
   for (std::size_t i = 0; i < 7; ++i) input.fixes.rows[3 * i].fix.reset();
   const Evaluation evaluation = evaluate(input);
@@ -91,7 +91,7 @@ TEST(FormatGates, AreMetByTheirOwnRunWithMissingCaptures) {
   EXPECT_EQ(words_of_missed(check_gates(gates, metrics_of(evaluation))), "");
 }
 
-TEST(FormatGates, AreReadBack) {
+TEST(FormatGates, RoundTripsThroughReadGates) {
   const EvaluationInput input = draw_run(40, 1);
   const Evaluation evaluation = evaluate(input);
   const auto gates = propose_gates(input, evaluation);

@@ -27,7 +27,7 @@ Evaluation evaluation(std::size_t units) {
   return evaluation;
 }
 
-TEST(Cautions, TellOfMissingFixesThatNoGateAsksFor) {
+TEST(MissingFixesWarning, WarnsIfNoGateLimitsMissingFixes) {
   const auto gates =
       check_gates({{"mean_mm", 2}, {"missing", 1}}, {{"mean_mm", 1}, {"missing", 0.9}});
   const CheckedMetric &mean = gates[0], &missing = gates[1];
@@ -42,7 +42,7 @@ TEST(Cautions, TellOfMissingFixesThatNoGateAsksFor) {
   EXPECT_EQ(unasked_missing(all, {mean}), "");
 }
 
-TEST(Cautions, TellOfFewUnits) {
+TEST(SampleSizeWarnings, WarnsForFewUnits) {
   EXPECT_THAT(sample_size_warnings(evaluation(50)), IsEmpty());
   EXPECT_THAT(sample_size_warnings(evaluation(49)),
               ElementsAre("of so few as 49 stations intervals are somewhat too narrow, that of p90 "
@@ -57,7 +57,7 @@ TEST(Cautions, TellOfFewUnits) {
               ElementsAre("there are too few stations with a fix for intervals"));
 }
 
-TEST(Cautions, TellOfALimitThatIsBeaten) {
+TEST(LimitWarning, WarnsIfErrorsAreBelowLimit) {
   Evaluation limited = evaluation(1000);
   EXPECT_EQ(warning_of_limit(limited), "");
   limited.limit = LimitRatio{0.609, 1e-3, 36, 1.0 / 12};
@@ -69,7 +69,7 @@ TEST(Cautions, TellOfALimitThatIsBeaten) {
   EXPECT_EQ(warning_of_limit(limited), "");
 }
 
-TEST(Cautions, CountTheUnitsOfThePairs) {
+TEST(SampleSizeWarnings, CountsUnitsOfPairs) {
   Evaluation compared = evaluation(1000);
   compared.comparison = Comparison{};
   compared.comparison->units = 8;

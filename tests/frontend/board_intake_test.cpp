@@ -24,14 +24,14 @@ using testing::StartsWith;
 namespace fs = std::filesystem;
 
 /// A folder for images of the board of the paper's rig.
-struct BoardImages : testing::Test {
+struct BoardIntakeOfFolder : testing::Test {
   Board board = read_board(kRig + "/board.yaml");
   TemporaryFolder folder;
   cv::Mat good = read_image(kRig + "/sample-boards/0000.png");
   cv::Mat other;  // upside down
   FrontendOptions options;
 
-  BoardImages() { cv::rotate(good, other, cv::ROTATE_180); }
+  BoardIntakeOfFolder() { cv::rotate(good, other, cv::ROTATE_180); }
 
   fs::path write(const char* name, const cv::Mat& image) const {
     cv::imwrite((folder / name).string(), image);
@@ -58,7 +58,7 @@ cv::Mat scaled(const cv::Mat& image, double factor) {
   return result;
 }
 
-TEST_F(BoardImages, KeepsAGoodImage) {
+TEST_F(BoardIntakeOfFolder, KeepsSharpImage) {
   const Observation image = observe(good);
   EXPECT_TRUE(image.is_kept()) << image.rejection->message;
   ASSERT_TRUE(image.board);
@@ -68,7 +68,7 @@ TEST_F(BoardImages, KeepsAGoodImage) {
   EXPECT_LT(*image.blur_px, 1.5);
 }
 
-TEST_F(BoardImages, RejectsPoorImagesWithTheirFigures) {
+TEST_F(BoardIntakeOfFolder, RejectsPoorImagesWithMeasuredValues) {
   cv::Mat blurred;
   cv::GaussianBlur(good, blurred, {}, 3);
   const Observation blur = observe(blurred);
@@ -87,7 +87,7 @@ TEST_F(BoardImages, RejectsPoorImagesWithTheirFigures) {
   EXPECT_EQ(reason_of(observe(good(cv::Rect(0, 0, 400, 300)))), RejectionReason::wrong_size);
 }
 
-TEST_F(BoardImages, RejectsByTheLimitsOfTheOptions) {
+TEST_F(BoardIntakeOfFolder, AppliesLimitsOfOptions) {
   cv::Mat blurred;
   cv::GaussianBlur(good, blurred, {}, 1.5);
   ASSERT_TRUE(observe(blurred).is_kept());
@@ -95,7 +95,7 @@ TEST_F(BoardImages, RejectsByTheLimitsOfTheOptions) {
   EXPECT_EQ(reason_of(observe(blurred)), RejectionReason::blurred);
 }
 
-TEST_F(BoardImages, RejectsImagesWithTooLittleOfTheBoard) {
+TEST_F(BoardIntakeOfFolder, RejectsImagesWithTooFewTags) {
   // Some tags are left, then none.
   cv::Mat few = good.clone(), none = good.clone();
   const SeenBoard seen = BoardDetector(board).detect(good);
@@ -116,7 +116,7 @@ TEST_F(BoardImages, RejectsImagesWithTooLittleOfTheBoard) {
   EXPECT_EQ(reason_of(observe(none)), RejectionReason::no_board);
 }
 
-TEST_F(BoardImages, RejectsTagsOfAnotherBoard) {
+TEST_F(BoardIntakeOfFolder, RejectsTagsOfOtherBoard) {
   const Observation before = observe(good);
   ASSERT_TRUE(before.is_kept());
   board.first_id += 100;
@@ -124,7 +124,7 @@ TEST_F(BoardImages, RejectsTagsOfAnotherBoard) {
   EXPECT_EQ(reason_of(image), RejectionReason::other_board);
 }
 
-TEST_F(BoardImages, GivesTheSameForAnyNumberOfThreads) {
+TEST_F(BoardIntakeOfFolder, ReturnsSameResultForAnyNumberOfThreads) {
   for (const char* name : {"a.png", "b.png", "c.png", "d.png"}) write(name, good);
   write("e.png", other);
   folder.file("bad.png", "no image");
@@ -152,7 +152,7 @@ TEST_F(BoardImages, GivesTheSameForAnyNumberOfThreads) {
   }
 }
 
-TEST_F(BoardImages, RejectsRepeatedImagesAndViews) {
+TEST_F(BoardIntakeOfFolder, RejectsRepeatedImagesAndViews) {
   write("a.png", good);
   write("b.png", good);
   cv::Mat moved;
@@ -172,7 +172,7 @@ TEST_F(BoardImages, RejectsRepeatedImagesAndViews) {
   EXPECT_EQ(kept_views(seen.images).size(), 2U);
 }
 
-TEST_F(BoardImages, RejectsImagesOfAnotherSizeThanMost) {
+TEST_F(BoardIntakeOfFolder, RejectsImagesOfMinoritySize) {
   write("a.png", good(cv::Rect(0, 0, 700, 600)));
   write("b.png", good);
   write("c.png", other);
@@ -184,14 +184,14 @@ TEST_F(BoardImages, RejectsImagesOfAnotherSizeThanMost) {
   EXPECT_TRUE(seen.images[1].is_kept());
 }
 
-TEST_F(BoardImages, ThrowsIfNoImageCanBeRead) {
+TEST_F(BoardIntakeOfFolder, ThrowsIfNoImageIsReadable) {
   folder.file("a.png", "no image");
   EXPECT_THAT(refusal_of([&] { observe_all(); }),
               AllOf(HasSubstr("none of its 1 images can be used; the first, a.png: "),
                     HasSubstr("cannot be read as an image")));
 }
 
-TEST_F(BoardImages, FailsWithTheReasonIfNoImageShowsTheBoard) {
+TEST_F(BoardIntakeOfFolder, ReportsFailureIfNoImageShowsBoard) {
   write("a.png", good);
   write("b.png", other);
   board.first_id += 100;
@@ -202,7 +202,7 @@ TEST_F(BoardImages, FailsWithTheReasonIfNoImageShowsTheBoard) {
   EXPECT_THAT(seen.failure->message, HasSubstr("with other ids than the board has"));
 }
 
-TEST_F(BoardImages, GivesTheSameFromTheCache) {
+TEST_F(BoardIntakeOfFolder, ReturnsCachedDetection) {
   const fs::path file = write("a.png", good);
   options.corner_cache = folder / "cache";
   const BoardIntake intake(board, options);

@@ -21,8 +21,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Files of the cache do not wait for the disk: a power cut may leave the first lines of one.
-TEST(CornerCache, TakesNoFileThatLacksLines) {
+/// Files of the cache are not synchronized: a power failure may truncate a file.
+TEST(CornerCache, IgnoresTruncatedFiles) {
   const fs::path rig = kRig;
   const TemporaryFolder folder;
   const Board board = read_board(rig / "board.yaml");
@@ -48,8 +48,8 @@ TEST(CornerCache, TakesNoFileThatLacksLines) {
   }
 }
 
-/// What an image calls for is told by others of the camera, too, so that all is kept.
-TEST(CornerCache, KeepsCornersBehindCurves) {
+/// The tone curve is estimated from all images of a camera, so that fits for all curves are stored.
+TEST(CornerCache, RestoresFitsForAllToneCurves) {
   const fs::path rig = kRig;
   const TemporaryFolder folder;
   const Board board = read_board(rig / "board.yaml");

@@ -23,9 +23,9 @@ std::string encoded_as(const std::string& ending, int width, int height) {
   return {bytes.begin(), bytes.end()};
 }
 
-class SizeInHeader : public testing::TestWithParam<const char*> {};
+class ReadHeaderSizeOfFormat : public testing::TestWithParam<const char*> {};
 
-TEST_P(SizeInHeader, IsThatOfTheImage) {
+TEST_P(ReadHeaderSizeOfFormat, ReturnsSizeOfImage) {
   for (const Size size : {Size{1, 1}, Size{2, 100}, Size{641, 3}, Size{300, 517}}) {
     const std::string bytes =
         encoded_as(GetParam(), static_cast<int>(size[0]), static_cast<int>(size[1]));
@@ -33,7 +33,7 @@ TEST_P(SizeInHeader, IsThatOfTheImage) {
   }
 }
 
-TEST_P(SizeInHeader, OfAFileCutShortIsTheSameOrNone) {
+TEST_P(ReadHeaderSizeOfFormat, ReturnsSizeOrNulloptForTruncatedFile) {
   const std::string bytes = encoded_as(GetParam(), 33, 21);
   for (std::size_t length = 0; length < bytes.size(); ++length) {
     const auto size = size_in_header(std::string_view(bytes).substr(0, length));
@@ -41,11 +41,11 @@ TEST_P(SizeInHeader, OfAFileCutShortIsTheSameOrNone) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Formats, SizeInHeader,
+INSTANTIATE_TEST_SUITE_P(Formats, ReadHeaderSizeOfFormat,
                          testing::Values(".png", ".jpg", ".bmp", ".tif", ".pgm"),
                          [](const auto& ending) { return std::string(ending.param + 1); });
 
-TEST(SizeInHeaderOf, BigTiffIsThatOfItsDirectory) {
+TEST(ReadHeaderSize, ReadsDirectoryOfBigTiff) {
   std::string bytes("II+\0\x08\0\0\0\x10\0\0\0\0\0\0\0", 16);
   bytes += std::string("\x02\0\0\0\0\0\0\0", 8);
   bytes += std::string("\0\x01\x04\0\x01\0\0\0\0\0\0\0\x20\x4e\0\0\0\0\0\0", 20);
@@ -56,19 +56,19 @@ TEST(SizeInHeaderOf, BigTiffIsThatOfItsDirectory) {
   }
 }
 
-TEST(SizeInHeaderOf, OtherFilesIsNotKnown) {
+TEST(ReadHeaderSize, ReturnsNulloptForOtherFiles) {
   EXPECT_FALSE(size_in_header(""));
   EXPECT_FALSE(size_in_header("no image"));
   EXPECT_FALSE(size_in_header("P5 # never ends"));
 }
 
-TEST(SizeInHeaderOf, JpegIsFoundBehindBytesThatAreNoMarker) {
+TEST(ReadHeaderSize, SkipsNonMarkerBytesInJpeg) {
   std::string bytes = encoded_as(".jpg", 33, 21);
   bytes.insert(2, std::string("\x01\xff\x00\x02", 4));
   EXPECT_EQ(size_in_header(bytes), (Size{33, 21}));
 }
 
-TEST(SizeInHeaderOf, JpegIsFoundBehindMarkersWithoutLength) {
+TEST(ReadHeaderSize, SkipsJpegMarkersWithoutLength) {
   // Read as lengths, the two bytes behind the marker lead to the frame header in the comment.
   std::string comment("\xff\xe1\xff\xff", 4);
   const std::string small("\xff\xc0\0\x0b\x08\0\x10\0\x10", 9);
@@ -95,7 +95,7 @@ std::string tiff_of(const std::vector<std::string>& entries) {
   return bytes + std::string(4, '\0');
 }
 
-TEST(SizeInHeaderOf, TiffIsThatOfItsFirstTags) {
+TEST(ReadHeaderSize, UsesFirstTagsOfTiff) {
   const std::string width("\0\x01\x04\0\x01\0\0\0\x30\x75\0\0", 12),
       height("\x01\x01\x04\0\x01\0\0\0\x2c\x01\0\0", 12),
       small_width("\0\x01\x04\0\x01\0\0\0\x02\0\0\0", 12),
@@ -104,7 +104,7 @@ TEST(SizeInHeaderOf, TiffIsThatOfItsFirstTags) {
   EXPECT_FALSE(size_in_header(tiff_of({elsewhere, height})));
 }
 
-TEST(ReadImage, NamesFilesThatAreCutShort) {
+TEST(ReadImage, ReportsTruncatedFiles) {
   const TemporaryFolder folder;
   const std::string tiff = encoded_as(".tif", 33, 21), jpeg("\xff\xd8\xff\xda\xff\xd9");
   for (const std::string& content : {tiff.substr(0, 8), jpeg, std::string("BM12"), tiff_of({})}) {
@@ -113,7 +113,7 @@ TEST(ReadImage, NamesFilesThatAreCutShort) {
   }
 }
 
-TEST(ReadImage, RefusesOtherFormatsUndecoded) {
+TEST(ReadImage, RejectsOtherFormatsBeforeDecoding) {
   const TemporaryFolder folder;
   const std::string webp("RIFF\x10\0\0\0WEBPVP8L\x04\0\0\0\x2f\xff\xff\xff", 24);
   for (const std::string& content : {webp, std::string("no image"), std::string(100, '\0')}) {
@@ -126,7 +126,7 @@ TEST(ReadImage, RefusesOtherFormatsUndecoded) {
   }
 }
 
-TEST(ReadImage, RefusesWhatItsHeaderSaysIsTooLargeUndecoded) {
+TEST(ReadImage, RejectsTooLargeImagesBeforeDecoding) {
   std::string bytes = encoded_as(".png", 30, 30);
   for (const std::size_t at : {16U, 20U}) bytes.replace(at, 4, std::string("\0\0\x75\x30", 4));
   const TemporaryFolder folder;

@@ -17,7 +17,7 @@ std::vector<Observation> sample_lights() {
   return LampIntake(detector, ImageUse::fixes, {}, {}).observe_all(list_images(kSample)).images;
 }
 
-TEST(LabelledLights, AreThoseThatTheTableNames) {
+TEST(AddLabelled, AddsLightsNamedByTable) {
   const auto images = sample_lights();
   ASSERT_EQ(images.size(), 2);
   Labelled labelled;
@@ -37,7 +37,7 @@ TEST(LabelledLights, AreThoseThatTheTableNames) {
   EXPECT_EQ(labelled.lights.back().image, 3);
 }
 
-TEST(LabelledLights, AreNoneWhereTheLabelIsElsewhere) {
+TEST(AddLabelled, CountsLabelsWithoutLight) {
   auto labels = read_detections(kSample + "/true_detections.csv");
   labels[0].detections[0].pixel.x() += 30;
   Labelled labelled;
@@ -46,7 +46,7 @@ TEST(LabelledLights, AreNoneWhereTheLabelIsElsewhere) {
   EXPECT_EQ(labelled.lights.size(), 11);
 }
 
-TEST(LabelledLights, LeaveOutLightsThatTheEdgeCuts) {
+TEST(AddLabelled, RejectsTruncatedLights) {
   auto images = sample_lights();
   const auto labels = read_detections(kSample + "/true_detections.csv");
   images[0].size_px = {int(labels[0].detections[0].pixel.x()), 600};
@@ -55,7 +55,7 @@ TEST(LabelledLights, LeaveOutLightsThatTheEdgeCuts) {
   EXPECT_GT(labelled.without_light, 0);
 }
 
-TEST(MeasuredPeriods, AreOfAllLightsOrOfThoseWithALabel) {
+TEST(MeasuredPeriods, ReturnsPeriodsOfAllOrLabelledLights) {
   const auto images = sample_lights();
   const auto all = measured_periods(images, {});
   EXPECT_GE(all.size(), 8);

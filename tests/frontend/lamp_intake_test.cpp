@@ -16,7 +16,7 @@ namespace {
 using testing::StartsWith;
 
 /// Images of lamps seen by the camera of the paper's rig.
-struct LampImage : testing::Test {
+struct LampIntakeOfImage : testing::Test {
   LampMap lamps = read_lamp_map(kRig + "/lamps.yaml");
   Calibration calibration = read_calibration(kRig + "/true_calibration.yaml");
   TemporaryFolder folder;
@@ -32,7 +32,8 @@ struct LampImage : testing::Test {
     const Observation seen = observe(image);
     return seen.is_kept() ? "" : seen.rejection->message;
   }
-  /// A ceiling at a level, its noise, and a lamp with stripes that are so much brighter.
+  /// Creates an image of a ceiling with this level and noise, and a lamp with stripes brighter by
+  /// `lamp`.
   cv::Mat1b ceiling(double level, double sd, double lamp) const {
     cv::Mat1f image(600, 800);
     cv::RNG random(3);
@@ -46,27 +47,27 @@ struct LampImage : testing::Test {
   }
 };
 
-/// Whatever is detected in its noise.
-TEST_F(LampImage, IsTooDarkWhenNothingStandsOutOfTheNoise) {
+/// Independent of false detections in the noise.
+TEST_F(LampIntakeOfImage, RejectsImageBelowNoiseAsTooDark) {
   EXPECT_THAT(refusal(ceiling(2, 0.5, 2)), StartsWith("too dark: the brightest is "));
   EXPECT_THAT(refusal(ceiling(20, 3, 5)), StartsWith("too dark: the brightest is "));
   EXPECT_THAT(refusal(ceiling(0, 0, 0)), StartsWith("too dark: the brightest is 0 times"));
   EXPECT_THAT(refusal(ceiling(20, 1, 100)), StartsWith("too few lamps: ")) << "one lamp, bright";
 }
 
-/// At full scale, and where the sensor is full before that.
-TEST_F(LampImage, IsOverexposedWhenAllOfItIsBright) {
+/// At full scale, and for a sensor that saturates below full scale.
+TEST_F(LampIntakeOfImage, RejectsUniformlyBrightImageAsOverexposed) {
   EXPECT_THAT(refusal(ceiling(400, 1, 100)),
               StartsWith("overexposed: all of the image is at 100 % of the full scale"));
   EXPECT_THAT(refusal(ceiling(240, 0.3, 0)), StartsWith("overexposed: all of the image is at 9"));
 }
 
-TEST_F(LampImage, OfAnotherSizeIsOfAnotherCamera) {
+TEST_F(LampIntakeOfImage, RejectsImageOfOtherSize) {
   EXPECT_EQ(refusal(cv::Mat1b(100, 200, static_cast<unsigned char>(0))),
             "is 200 x 100 px, the camera's images are 800 x 600 px");
 }
 
-TEST_F(LampImage, IsKeptWithItsLamps) {
+TEST_F(LampIntakeOfImage, KeepsImageWithLamps) {
   const Observation image = observe(read_image(kRig + "/sample/0000.png"));
   EXPECT_TRUE(image.is_kept());
   EXPECT_GE(lamps_in(image).size(), 4U);
@@ -74,14 +75,14 @@ TEST_F(LampImage, IsKeptWithItsLamps) {
   for (const Light& light : image.lights) EXPECT_TRUE(light.outline.empty());
 }
 
-/// A fix of a dark image is no fix, which its row says.
-TEST_F(LampImage, IsKeptForFixesWhateverItShows) {
+/// Dark images have a row in the table of fixes, without a fix.
+TEST_F(LampIntakeOfImage, KeepsDarkImageForFixes) {
   const Observation image = observe(ceiling(2, 0.5, 2), ImageUse::fixes);
   EXPECT_TRUE(image.is_kept());
   EXPECT_TRUE(lamps_in(image).empty());
 }
 
-TEST(ObserveLamps, RejectsByUse) {
+TEST(ObserveLamps, RejectsImagesByUse) {
   const TemporaryFolder folder;
   for (const char* name : {"a.png", "b.png"}) {
     std::filesystem::copy_file(kRig + "/sample/0000.png", folder / name);

@@ -40,7 +40,7 @@ Observation image_with(const char* name, std::vector<Light> lights) {
   return image;
 }
 
-TEST(LightsTable, HasARowForEachLight) {
+TEST(WriteLights, WritesOneRowPerLight) {
   Light lamp = light_of_kind(LightKind::lamp, LightReason::identified);
   lamp.lamp = 4;
   Light steady = light_of_kind(LightKind::steady, LightReason::overexposed);
@@ -76,7 +76,7 @@ TEST(LightsTable, HasARowForEachLight) {
   EXPECT_THROW(write_lights(folder / "no" / "lights.csv", {}), InputError);
 }
 
-TEST(LightsTable, CountsReasonsThoseOfLikelyLampsFirst) {
+TEST(CountReasons, SortsByFrequencyWithFormlessLightsLast) {
   Light lamp = light_of_kind(LightKind::lamp, LightReason::identified);
   lamp.lamp = 4;
   const Light soft = light_of_kind(LightKind::unknown, LightReason::reflection);
@@ -96,7 +96,7 @@ TEST(LightsTable, CountsReasonsThoseOfLikelyLampsFirst) {
   EXPECT_EQ(count_of(images, LightKind::cut), 0);
 }
 
-TEST(LightsTable, HasWordsOfItsOwnForEachReason) {
+TEST(LightReasonText, IsUniqueForEachReason) {
   std::set<std::string> names, explanations;
   int reasons = 0;
   for (int i = 0; i <= static_cast<int>(LightReason::incomplete); ++i, ++reasons) {
@@ -113,7 +113,7 @@ TEST(LightsTable, HasWordsOfItsOwnForEachReason) {
 constexpr int kReasonPeriod_lines = 11;
 const cv::Size kReasonSize(300, 200);
 
-/// The lights that a drawing shows to a detector that knows its lamp.
+/// Detects the lights in a drawing by a detector whose map contains its lamp.
 std::vector<Light> lights_in_drawing(const cv::Mat& image) {
   return LightDetector({{drawn_lamp(1, kReasonPeriod_lines)}}, drawn_camera(kReasonSize))
       .detect(image_view(image));
@@ -125,7 +125,7 @@ cv::Mat drawn_lamp_at(const Eigen::Vector2d& center, double radius_px, double le
                kReasonSize, CV_8U, 0.5);
 }
 
-TEST(LightReasons, TellAClippedLampFromASteadyOne) {
+TEST(LightReasons, DistinguishClippedFromUnmodulatedLamp) {
   const DrawnStripes steady{.period_lines = kReasonPeriod_lines, .duty = 1};
   for (const auto& [level, reason] :
        {std::pair(0.7, LightReason::steady), {1.5, LightReason::overexposed}}) {
@@ -136,7 +136,7 @@ TEST(LightReasons, TellAClippedLampFromASteadyOne) {
   }
 }
 
-TEST(LightReasons, AreThereForWhatHasNoForm) {
+TEST(LightReasons, ReportReasonForLightsWithoutOutline) {
   cv::Mat cross(kReasonSize, CV_8U, cv::Scalar(10));
   cv::rectangle(cross, {50, 95, 200, 8}, 200, cv::FILLED);
   cv::rectangle(cross, {146, 20, 8, 160}, 200, cv::FILLED);

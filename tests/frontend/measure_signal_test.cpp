@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kFull = 65535;
 
-/// Noise about a level, at 16 bits.
+/// Creates an image of 16 bits with noise around a level.
 cv::Mat noise(double level, double sd) {
   cv::Mat1f image(300, 400);
   cv::RNG random(7);
@@ -22,21 +22,21 @@ cv::Mat noise(double level, double sd) {
   return levels;
 }
 
-/// A lamp of stripes, as a rolling shutter shows it.
+/// Adds a lamp with the stripes of a rolling shutter.
 void add_lamp(cv::Mat& image, double height) {
   for (int v = 100; v < 160; ++v) {
     if (v / 5 % 2 == 0) image(cv::Rect(150, v, 60, 1)) += height;
   }
 }
 
-TEST(MeasureSignal, IsNoMoreThanNoiseWhereThereIsNothing) {
+TEST(MeasureSignal, ReturnsSmallRatioForPureNoise) {
   for (const double sd : {20., 300.}) {
     EXPECT_LT(measure_signal(noise(5000, sd)).signal_to_noise, 7) << sd;
     EXPECT_GT(measure_signal(noise(5000, sd)).signal_to_noise, 2) << sd;
   }
 }
 
-TEST(MeasureSignal, IsWhatALampStandsOutByAndTheNoiseWithIt) {
+TEST(MeasureSignal, MatchesContrastOfLamp) {
   for (const double times : {10., 30., 100.}) {
     constexpr double sd = 50;
     cv::Mat image = noise(2000, sd);
@@ -49,13 +49,13 @@ TEST(MeasureSignal, IsWhatALampStandsOutByAndTheNoiseWithIt) {
   }
 }
 
-TEST(MeasureSignal, IsNoHotPixel) {
+TEST(MeasureSignal, IgnoresHotPixel) {
   cv::Mat image = noise(2000, 50);
   image.at<unsigned short>(20, 30) = 65535;
   EXPECT_LT(measure_signal(image).signal_to_noise, 7);
 }
 
-TEST(MeasureSignal, IsThatOfStripesOfOneLine) {
+TEST(MeasureSignal, DetectsStripesOfOneScanline) {
   for (const bool rows : {true, false}) {
     cv::Mat image = noise(2000, 50);
     for (int i = 100; i < 200; i += 4) {
@@ -65,8 +65,8 @@ TEST(MeasureSignal, IsThatOfStripesOfOneLine) {
   }
 }
 
-/// Without noise, rounding is what is left: a level more is three and a half times that.
-TEST(MeasureSignal, IsNoLessNoisyThanRounding) {
+/// Without noise only the rounding remains: one level is 3.5 times its standard deviation.
+TEST(MeasureSignal, AssumesAtLeastRoundingNoise) {
   cv::Mat1b image(300, 400, static_cast<unsigned char>(2));
   EXPECT_EQ(measure_signal(image).signal_to_noise, 0);
   image(cv::Rect(10, 10, 20, 20)) = static_cast<unsigned char>(3);

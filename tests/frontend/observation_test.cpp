@@ -24,7 +24,7 @@ Observation observe(const std::function<void(const cv::Mat&)>& detect,
   return image;
 }
 
-TEST(ObservePixels, PassesThePixels) {
+TEST(ObservePixels, PassesPixelsToDetector) {
   cv::Size size;
   const Observation image = observe([&](const cv::Mat& pixels) { size = pixels.size(); });
   EXPECT_TRUE(image.is_kept());
@@ -32,7 +32,7 @@ TEST(ObservePixels, PassesThePixels) {
   EXPECT_EQ(image.size_px, (std::array{800, 600}));
 }
 
-TEST(ObservePixels, RejectsWithTheReasonInOneLine) {
+TEST(ObservePixels, RejectsImageWithReasonInOneLine) {
   const Observation broken =
       observe([](const cv::Mat&) { throw std::runtime_error("first\nsecond"); });
   ASSERT_FALSE(broken.is_kept());
@@ -48,7 +48,7 @@ TEST(ObservePixels, RejectsWithTheReasonInOneLine) {
   EXPECT_EQ(missing.rejection->message, "cannot be opened: No such file or directory");
 }
 
-TEST(ObservePixels, RejectsLargeImagesUnread) {
+TEST(ObservePixels, RejectsLargeImagesWithoutDecoding) {
   FrontendOptions options;
   options.max_mpx = 0.1;
   Observation image{kImage};
@@ -68,7 +68,7 @@ std::vector<Observation> rejected(const std::vector<RejectionReason>& reasons) {
   return images;
 }
 
-TEST(SummarizeRejections, CountsReasonsAndNamesTheRemedyOfMost) {
+TEST(SummarizeRejections, CountsReasonsAndReportsRemedyOfMajority) {
   using enum RejectionReason;
   EXPECT_EQ(summarize_rejections(rejected({})), "");
   EXPECT_EQ(summarize_rejections(rejected({blurred, too_dark, too_dark})),
@@ -76,7 +76,7 @@ TEST(SummarizeRejections, CountsReasonsAndNamesTheRemedyOfMost) {
   EXPECT_EQ(summarize_rejections(rejected({blurred, overexposed})), "1 overexposed, 1 blurred");
 }
 
-TEST(NameOf, IsDifferentForEachReason) {
+TEST(RejectionReasonName, IsUniqueForEachReason) {
   std::set<std::string_view> names;
   int count = 0;
   for (auto reason = RejectionReason::unreadable; reason <= RejectionReason::used_elsewhere;
@@ -88,7 +88,7 @@ TEST(NameOf, IsDifferentForEachReason) {
   EXPECT_EQ(std::ssize(names), count);
 }
 
-TEST(CheckAnyReadable, ThrowsWithTheFirstReason) {
+TEST(CheckAnyReadable, ThrowsWithReasonOfFirstImage) {
   auto images = rejected({RejectionReason::unreadable, RejectionReason::wrong_size});
   EXPECT_NO_THROW(check_any_readable("folder", images));
   images.erase(images.begin());

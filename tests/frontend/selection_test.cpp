@@ -37,7 +37,7 @@ std::vector<std::optional<RejectionReason>> select(std::vector<Observation> imag
 using Reasons = std::vector<std::optional<RejectionReason>>;
 const std::vector<Eigen::Vector2d> kPixels{{100, 100}, {400, 120}, {700, 90}, {420, 500}};
 
-TEST(Selection, RejectsCopiesAndViewsOfATurn) {
+TEST(Selection, RejectsCopiesAndRepeatedViewsByUse) {
   auto near = kPixels, far = kPixels;
   for (Eigen::Vector2d& pixel : near) pixel.x() += 7.9;  // 1 % of the width is 8 px
   for (Eigen::Vector2d& pixel : far) pixel.x() += 8.1;
@@ -49,7 +49,7 @@ TEST(Selection, RejectsCopiesAndViewsOfATurn) {
   EXPECT_EQ(select(images, ImageUse::fixes), (Reasons{{}, {}, {}, {}}));
 }
 
-TEST(Selection, KeepsViewsThatShareTooLittle) {
+TEST(Selection, KeepsViewsWithFewCommonLamps) {
   auto fewer = kPixels;
   fewer.resize(2);  // half of the lamps
   EXPECT_EQ(select({image_of_lamps("a", kPixels), image_of_lamps("b", fewer)}, ImageUse::turn),
@@ -66,12 +66,12 @@ TEST(Selection, ComparesWithKeptImagesOnly) {
   EXPECT_EQ(select(images, ImageUse::turn), (Reasons{RejectionReason::blurred, {}}));
 }
 
-TEST(Selection, LeavesImagesWithoutLamps) {
+TEST(Selection, KeepsImagesWithoutLamps) {
   EXPECT_EQ(select({image_of_lamps("a", {}), image_of_lamps("b", {})}, ImageUse::turn),
             (Reasons{{}, {}}));
 }
 
-TEST(Selection, GivesTheSameImageByImage) {
+TEST(Selection, RejectsCopyOfSeparatelyKeptImage) {
   std::vector images{image_of_lamps("a", kPixels), image_of_lamps("b", kPixels)};
   Selection selection(ImageUse::turn, {});
   selection.keep(images[0]);

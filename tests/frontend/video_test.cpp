@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Frames of videos, against the images that they were made of.
+/// Frames of videos, compared with the images from which they were made.
 #include "frontend/video.h"
 
 #include <gmock/gmock.h>
@@ -27,7 +27,7 @@ using testing::IsEmpty;
 
 constexpr int kFrames = 40;
 
-/// Soft noise, which every codec can hold.
+/// Creates a frame with smooth noise, which all codecs can encode.
 cv::Mat frame_of(int number) {
   cv::Mat1b image(240, 320);
   cv::RNG random(static_cast<std::uint64_t>(number) + 1);
@@ -37,7 +37,7 @@ cv::Mat frame_of(int number) {
   return image;
 }
 
-class Videos : public testing::Test {
+class VideoOfFrames : public testing::Test {
  protected:
   void SetUp() override {
     for (int i = 0; i < kFrames; ++i) frames.push_back(frame_of(i));
@@ -48,7 +48,7 @@ class Videos : public testing::Test {
     while (const auto image = source.next()) all.push_back(image->file.filename().string());
     return all;
   }
-  /// The first bytes of the film, a share of them.
+  /// Writes a file with the first part of the video.
   fs::path cut(const std::string& name, double share) const {
     const std::string bytes = TemporaryFolder::content_of(film);
     return folder.file(name, bytes.substr(0, std::size_t(share * double(bytes.size()))));
@@ -59,7 +59,7 @@ class Videos : public testing::Test {
   std::vector<cv::Mat> frames;
 };
 
-TEST(VideoNames, AreThoseOfFilesAndFrames) {
+TEST(VideoNames, MatchFilesAndFrames) {
   EXPECT_TRUE(is_video_name("a/drive.MP4"));
   EXPECT_FALSE(is_video_name("a/drive.png"));
   EXPECT_EQ(frame_name("drive.mp4", 123), "drive.mp4#000123");
@@ -70,7 +70,7 @@ TEST(VideoNames, AreThoseOfFilesAndFrames) {
   }
 }
 
-TEST_F(Videos, GiveTheFramesThatTheyWereMadeOf) {
+TEST_F(VideoOfFrames, ReturnsAllFramesWithTimes) {
   Video video(film.string());
   EXPECT_EQ(video.frames_stated(), std::size_t{kFrames});
   EXPECT_EQ(video.size_px(), (std::array{320, 240}));
@@ -85,7 +85,7 @@ TEST_F(Videos, GiveTheFramesThatTheyWereMadeOf) {
   EXPECT_EQ(video.missing(), "");
 }
 
-TEST_F(Videos, GiveEveryFewthFrameBetweenImages) {
+TEST_F(VideoOfFrames, SourceReturnsEveryNthFrameBetweenImages) {
   const fs::path image = folder / "image.png";
   cv::imwrite(image.string(), frames[0]);
   FrontendOptions options;
@@ -102,7 +102,7 @@ TEST_F(Videos, GiveEveryFewthFrameBetweenImages) {
   EXPECT_EQ(cv::norm(second->read(options), frames[15], cv::NORM_INF), 0);
 }
 
-TEST_F(Videos, ThatAreCutShortSaySo) {
+TEST_F(VideoOfFrames, SourceWarnsOfTruncatedVideo) {
   ImageSource source({cut("cut.avi", 0.6)});
   const auto count = names(source).size();
   EXPECT_GT(count, 20U);
@@ -113,8 +113,8 @@ TEST_F(Videos, ThatAreCutShortSaySo) {
                                     "damaged?")));
 }
 
-/// The frames behind the damage are there, with their own times.
-TEST_F(Videos, ThatAreDamagedGoOnBehindIt) {
+/// The frames after the damage exist, with their own times.
+TEST_F(VideoOfFrames, ReadingContinuesAfterDamagedFrames) {
   if (!write_video(film, frames, "PNG ")) GTEST_SKIP() << "OpenCV writes no PNG";
   std::string bytes = TemporaryFolder::content_of(film);
   bytes.replace(bytes.find("PNG", bytes.size() * 4 / 10), 3, "bad");
@@ -133,7 +133,7 @@ TEST_F(Videos, ThatAreDamagedGoOnBehindIt) {
   EXPECT_THAT(video.missing(), HasSubstr(" of its 40 frames can be decoded"));
 }
 
-TEST_F(Videos, ThatAreNoneAreRefused) {
+TEST_F(VideoOfFrames, SourceThrowsForInvalidVideos) {
   const auto refusal = [&](const fs::path& file, const FrontendOptions& options = {},
                            const std::optional<std::array<int, 2>>& imager_px = {}) {
     return refusal_of([&] { ImageSource({file}, options, imager_px); });
@@ -154,7 +154,7 @@ TEST_F(Videos, ThatAreNoneAreRefused) {
               HasSubstr("is 320 x 240 px, the camera's images are 800 x 600 px"));
 }
 
-TEST_F(Videos, ShowTheLampsOfTheSameImages) {
+TEST_F(VideoOfFrames, YieldsSameLampsAsImages) {
   const auto files = list_images(kRig + "/sample");
   std::vector<cv::Mat> images;
   for (const auto& file : files) images.push_back(read_image(file));
@@ -185,7 +185,7 @@ TEST_F(Videos, ShowTheLampsOfTheSameImages) {
 }
 
 /// Corners of a frame are kept as those of a file are.
-TEST_F(Videos, ShowTheBoardOfTheSameImages) {
+TEST_F(VideoOfFrames, YieldsSameBoardsAsImages) {
   const fs::path file = kRig + "/sample-boards/0000.png";
   const cv::Mat image = read_image(file);
   ASSERT_TRUE(write_video(film, {image, image / 2}));

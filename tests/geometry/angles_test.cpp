@@ -11,19 +11,19 @@ namespace {
 
 using std::numbers::pi;
 
-TEST(Angles, DegreesAndRadiansConvertBothWays) {
+TEST(Angles, DegreesAndRadiansAreConvertedBothWays) {
   EXPECT_DOUBLE_EQ(rad_from_deg(180), pi);
   EXPECT_DOUBLE_EQ(deg_from_rad(-pi / 2), -90);
   EXPECT_DOUBLE_EQ(deg_from_rad(rad_from_deg(33.3)), 33.3);
 }
 
-TEST(Angles, WrappedKeepsAnglesOfOneTurnExactly) {
+TEST(WrapRad, KeepsAnglesWithinPiExactly) {
   for (const double angle_rad : {0.0, -0.0, 1e-300, 3.0, -3.0, pi, -pi}) {
     EXPECT_EQ(wrapped_rad(angle_rad), angle_rad);
   }
 }
 
-TEST(Angles, WrappedIsTheSameDirectionWithinHalfATurn) {
+TEST(WrapRad, ReturnsSameDirectionWithinPi) {
   for (int tenths = -1000; tenths <= 1000; ++tenths) {
     const double angle_rad = tenths * 0.1;
     const double wrapped = wrapped_rad(angle_rad);
@@ -34,14 +34,14 @@ TEST(Angles, WrappedIsTheSameDirectionWithinHalfATurn) {
   }
 }
 
-TEST(Angles, WrappedTakesOffWholeTurns) {
+TEST(WrapRad, SubtractsFullTurns) {
   EXPECT_NEAR(wrapped_rad(2 * pi + 0.25), 0.25, 1e-15);
   EXPECT_NEAR(wrapped_rad(-4 * pi - 0.25), -0.25, 2e-15);
   EXPECT_NEAR(wrapped_rad(pi + 0.25), 0.25 - pi, 1e-15);
   EXPECT_NEAR(wrapped_rad(-pi - 0.25), pi - 0.25, 1e-15);
 }
 
-TEST(Angles, WrappedOfNoAngleIsNoAngle) {
+TEST(WrapRad, ReturnsNanForNonFiniteAngle) {
   EXPECT_TRUE(std::isnan(wrapped_rad(std::numeric_limits<double>::quiet_NaN())));
   EXPECT_TRUE(std::isnan(wrapped_rad(std::numeric_limits<double>::infinity())));
 }

@@ -13,7 +13,7 @@ namespace vlp {
 
 using Points = std::vector<Eigen::Vector2d>;
 
-/// `count` points of `circle` between two angles, evenly; the end is left out.
+/// Returns `count` evenly spaced points of `circle` between two angles, without the last one.
 inline Points arc(const Circle& circle, double from_rad, double to_rad, std::size_t count) {
   Points points;
   for (std::size_t i = 0; i < count; ++i) {
@@ -25,7 +25,7 @@ inline Points arc(const Circle& circle, double from_rad, double to_rad, std::siz
   return points;
 }
 
-/// The points with normal noise on both coordinates.
+/// Adds normal noise to both coordinates of the points.
 inline Points with_noise(Points points, double sigma, Random& random) {
   for (auto& point : points) {
     point.x() += sigma * random.normal();

@@ -26,7 +26,7 @@ void expect_found(const Circle& truth, const Points& points, double tolerance) {
   EXPECT_LE(fit->rms, tolerance);
 }
 
-TEST(CircleFit, FindsExactCirclesOfAnySize) {
+TEST(FitCircle, IsExactForCirclesOfAnySize) {
   for (const double scale : {1e-6, 1.0, 1e6}) {
     const Circle truth{Vector2d(3, -2) * scale, 5 * scale};
     for (const std::size_t count : {3U, 4U, 12U, 1000U}) {
@@ -35,18 +35,18 @@ TEST(CircleFit, FindsExactCirclesOfAnySize) {
   }
 }
 
-TEST(CircleFit, FindsExactShortArcs) {
+TEST(FitCircle, IsExactForShortArcs) {
   const Circle truth{{3, -2}, 5};
   for (const double arc_deg : {90.0, 30.0, 10.0, 3.0, 1.0}) {
     const double arc_rad = arc_deg * pi / 180;
-    // The rounding of a coordinate moves the centre by that over the arc's share of a curve: the
-    // sagitta, R arc^2 / 8, is what tells the radius.
+    // A rounding error moves the center by the error over the sagitta, R arc^2 / 8, which
+    // determines the radius.
     const double tolerance = 2e-14 / (arc_rad * arc_rad);
     expect_found(truth, arc(truth, 0.7, 0.7 + arc_rad, 12), tolerance);
   }
 }
 
-TEST(CircleFit, FindsCirclesFarFromTheOrigin) {
+TEST(FitCircle, IsAccurateFarFromOrigin) {
   // In UTM coordinates; they are rounded to 1e-9.
   for (const double radius : {0.1, 1.0, 100.0}) {
     const Circle truth{{5e5, 5e6}, radius};
@@ -55,13 +55,13 @@ TEST(CircleFit, FindsCirclesFarFromTheOrigin) {
   }
 }
 
-TEST(CircleFit, FindsShortArcsFarFromTheOrigin) {
+TEST(FitCircle, IsAccurateForShortArcsFarFromOrigin) {
   // 1e-9 of rounding over a sagitta of 2e-3 is a part in 2e6 of the radius.
   const Circle truth{{5e5, 5e6}, 1};
   expect_found(truth, arc(truth, 1, 1.12, 12), 1e-5);
 }
 
-TEST(CircleFit, OfFourPointsOnNoCircleHasTheLeastSquaresOfDistances) {
+TEST(FitCircle, MinimizesSquaredDistances) {
   const Points points{{1.4, 0}, {0, 1}, {-1, 0}, {0, -1}};
   const auto fit = fit_circle(points);
   ASSERT_TRUE(fit);
@@ -81,7 +81,7 @@ TEST(CircleFit, OfFourPointsOnNoCircleHasTheLeastSquaresOfDistances) {
   }
 }
 
-TEST(CircleFit, OfThreePointsIsExact) {
+TEST(FitCircle, IsExactForThreePoints) {
   const auto fit = fit_circle(Points{{0, 0}, {2, 0}, {0, 4}});
   ASSERT_TRUE(fit);
   EXPECT_THAT(fit->circle.center, IsNear(Vector2d(1, 2), 1e-14));
@@ -89,7 +89,7 @@ TEST(CircleFit, OfThreePointsIsExact) {
   EXPECT_LE(fit->rms, 1e-14);
 }
 
-TEST(CircleFit, OfThreePointsHasNoScatterToMeasure) {
+TEST(FitCircle, ReturnsInfiniteCovarianceForThreePoints) {
   Random random(2);
   for (int trial = 0; trial < 100; ++trial) {
     Points points = with_noise(Points(3, Vector2d(1, 2)), 1, random);
@@ -99,19 +99,19 @@ TEST(CircleFit, OfThreePointsHasNoScatterToMeasure) {
   }
 }
 
-TEST(CircleFit, OfExactPointsHasNoCovariance) {
+TEST(FitCircle, ReturnsZeroCovarianceForExactPoints) {
   const auto fit = fit_circle(arc({{3, -2}, 5}, 0, 2, 8));
   ASSERT_TRUE(fit);
   EXPECT_THAT(fit->center_covariance, IsNear(Eigen::Matrix2d::Zero(), 1e-25));
 }
 
-TEST(CircleFit, RefusesFewerThanThreePoints) {
+TEST(FitCircle, ReturnsNulloptForFewerThanThreePoints) {
   EXPECT_FALSE(fit_circle({}));
   EXPECT_FALSE(fit_circle(Points{{1, 2}}));
   EXPECT_FALSE(fit_circle(Points{{1, 2}, {3, 4}}));
 }
 
-TEST(CircleFit, RefusesPointsOnOneLine) {
+TEST(FitCircle, ReturnsNulloptForPointsOnOneLine) {
   Random random(1);
   // Far from the origin and close together the rounding of the points bends the line.
   const double places[][2] = {{0, 1}, {1, 1}, {300, 1}, {300, 1e-9}, {5e6, 1}, {5e6, 1e-3}};
@@ -128,7 +128,7 @@ TEST(CircleFit, RefusesPointsOnOneLine) {
   }
 }
 
-TEST(CircleFit, RefusesCoincidentPoints) {
+TEST(FitCircle, ReturnsNulloptForCoincidentPoints) {
   // 0.1 is not a binary number: means of it differ from it in the last place.
   for (const double offset : {0.0, 0.1, 1.0 / 3, 5e6 + 0.1}) {
     for (const std::size_t count : {3U, 5U, 12U}) {
@@ -137,11 +137,11 @@ TEST(CircleFit, RefusesCoincidentPoints) {
   }
 }
 
-TEST(CircleFit, RefusesTwoSpotsHoweverManyPoints) {
+TEST(FitCircle, ReturnsNulloptForTwoDistinctPoints) {
   EXPECT_FALSE(fit_circle(Points{{1, 2}, {3, 4}, {1, 2}, {3, 4}}));
 }
 
-TEST(CircleFit, RefusesPointsThatAreNotNumbers) {
+TEST(FitCircle, ReturnsNulloptForNonFinitePoints) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_FALSE(fit_circle(Points{{0, 0}, {2, 0}, {0, nan}, {1, 1}}));
   const double infinite = std::numeric_limits<double>::infinity();

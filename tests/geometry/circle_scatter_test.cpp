@@ -44,7 +44,7 @@ Scatter scatter_of(double arc_rad, double sigma, std::uint64_t seed) {
   return scatter;
 }
 
-class CircleFitScatter : public testing::TestWithParam<double> {
+class FitCircleMonteCarlo : public testing::TestWithParam<double> {
  protected:
   // The noise is a thousandth of the arc's sagitta, so that the bias of the geometric fit, which
   // goes with the square of the noise, is far below the scatter of the mean.
@@ -52,21 +52,21 @@ class CircleFitScatter : public testing::TestWithParam<double> {
   const Scatter scatter_ = scatter_of(arc_rad_, 1e-3 * arc_rad_ * arc_rad_ / 8, 7);
 };
 
-TEST_P(CircleFitScatter, IsAboutTheTrueCenter) {
+TEST_P(FitCircleMonteCarlo, CenterIsUnbiased) {
   // e^T C^-1 e of a mean of N is chi-square with two degrees of freedom over N; 20 is its
   // quantile of 1 - 5e-5.
   const Vector2d& e = scatter_.mean_error;
   EXPECT_LT(kTrials * e.dot(scatter_.covariance.ldlt().solve(e)), 20);
 }
 
-TEST_P(CircleFitScatter, IsWhatTheCovarianceSays) {
+TEST_P(FitCircleMonteCarlo, CenterErrorMatchesReportedCovariance) {
   // With the scatter estimated from the same n points, e^T C^-1 e / 2 is F(2, n - 3), whose mean
   // is (n - 3) / (n - 5). Its mean over 8000 trials has a standard deviation of 0.05.
   const double freedom = static_cast<double>(kPoints) - 3;
   EXPECT_NEAR(scatter_.mahalanobis_squared, 2 * freedom / (freedom - 2), 0.24);
 }
 
-TEST_P(CircleFitScatter, HasTheShapeOfTheCovariance) {
+TEST_P(FitCircleMonteCarlo, CenterCovarianceMatchesReportedShape) {
   // In units of the reported covariance the covariance found is the identity; an entry of it has
   // a standard deviation of sqrt(2 / 8000) = 0.016 at most.
   const Matrix2d root = scatter_.reported_covariance.llt().matrixL();
@@ -75,10 +75,10 @@ TEST_P(CircleFitScatter, HasTheShapeOfTheCovariance) {
               IsNear(Matrix2d::Identity(), 0.08));
 }
 
-INSTANTIATE_TEST_SUITE_P(Arcs, CircleFitScatter,
+INSTANTIATE_TEST_SUITE_P(Arcs, FitCircleMonteCarlo,
                          testing::Values(0.35, 1.0, std::numbers::pi, 2 * std::numbers::pi));
 
-TEST(CircleFit, OfLoudShortArcsDoesNotShrink) {
+TEST(FitCircle, RadiusIsUnbiasedForNoisyShortArcs) {
   // 60 degrees with a noise of a tenth of the sagitta: an algebraic (Kasa) fit is 8 % too small
   // here.
   Random random(8);

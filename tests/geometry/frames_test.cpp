@@ -30,12 +30,12 @@ void expect_rotation(const Matrix3d& rotation) {
   EXPECT_NEAR(rotation.determinant(), 1, 1e-15);
 }
 
-TEST(Frames, YawTurnsCounterClockwiseSeenFromAbove) {
+TEST(RotationAboutZ, RotatesCounterClockwiseSeenFromAbove) {
   EXPECT_THAT(rotation_about_z(pi / 2) * Vector3d::UnitX(), IsNear(Vector3d::UnitY(), 1e-16));
   EXPECT_THAT(rotation_about_z(0.3) * Vector3d::UnitZ(), IsNear(Vector3d::UnitZ(), 0));
 }
 
-TEST(Frames, LevelFromZenithTakesTheZenithUp) {
+TEST(LevelFromZenith, RotatesZenithToPlusZ) {
   Random random(1);
   for (int trial = 0; trial < 1000; ++trial) {
     const Vector3d zenith = random_zenith(random);
@@ -44,14 +44,14 @@ TEST(Frames, LevelFromZenithTakesTheZenithUp) {
   }
 }
 
-TEST(Frames, LevelFromZenithIsARotation) {
+TEST(LevelFromZenith, ReturnsRotation) {
   Random random(2);
   for (int trial = 0; trial < 1000; ++trial) {
     expect_rotation(level_from_zenith(random_zenith(random)));
   }
 }
 
-TEST(Frames, LevelFromZenithIsTheSmallestSuchRotation) {
+TEST(LevelFromZenith, ReturnsSmallestRotation) {
   Random random(3);
   for (int trial = 0; trial < 1000; ++trial) {
     const Vector3d zenith = random_zenith(random);
@@ -68,11 +68,11 @@ TEST(Frames, LevelFromZenithIsTheSmallestSuchRotation) {
   }
 }
 
-TEST(Frames, LevelFromZenithOfALevelCameraIsTheIdentity) {
+TEST(LevelFromZenith, ReturnsIdentityForLevelCamera) {
   EXPECT_THAT(level_from_zenith({0, 0, 2}), IsNear(Matrix3d::Identity(), 0));
 }
 
-TEST(Frames, LevelFromZenithHoldsForTiniestTilts) {
+TEST(LevelFromZenith, IsAccurateForTinyTilts) {
   const Vector3d zenith(1e-12, -2e-12, 1);
   // To first order the camera's axes lean by the tilt itself.
   Matrix3d expected;
@@ -80,7 +80,7 @@ TEST(Frames, LevelFromZenithHoldsForTiniestTilts) {
   EXPECT_THAT(level_from_zenith(zenith), IsNear(expected, 1e-23));
 }
 
-TEST(Frames, PitchLowersTheXAxisAndRollRaisesTheYAxis) {
+TEST(LevelFromInclination, PitchLowersXAxisAndRollRaisesYAxis) {
   // Right-handed about y: x goes to -z. Right-handed about x: y goes to +z.
   EXPECT_LT((level_from_inclination({0, 0.1}) * Vector3d::UnitX()).z(), -0.09);
   EXPECT_GT((level_from_inclination({0.1, 0}) * Vector3d::UnitY()).z(), 0.09);
@@ -88,7 +88,7 @@ TEST(Frames, PitchLowersTheXAxisAndRollRaisesTheYAxis) {
   EXPECT_THAT(level_from_inclination({0.1, 0}) * Vector3d::UnitX(), IsNear(Vector3d::UnitX(), 0));
 }
 
-TEST(Frames, InclinationIsPitchThenRollAboutTheNewAxis) {
+TEST(LevelFromInclination, AppliesPitchBeforeRoll) {
   const double roll_rad = 0.2, pitch_rad = 0.3;
   const double sr = std::sin(roll_rad), cr = std::cos(roll_rad);
   const double sp = std::sin(pitch_rad), cp = std::cos(pitch_rad);
@@ -100,21 +100,21 @@ TEST(Frames, InclinationIsPitchThenRollAboutTheNewAxis) {
               IsNear(Vector3d(cp, 0, -sp), 2e-16));
 }
 
-TEST(Frames, InclinationIsARotation) {
+TEST(LevelFromInclination, ReturnsRotation) {
   Random random(4);
   for (int trial = 0; trial < 100; ++trial) {
     expect_rotation(level_from_inclination({random.uniform(-3, 3), random.uniform(-1.5, 1.5)}));
   }
 }
 
-TEST(Frames, LevelFromWorldSeesAPointFromAPose) {
+TEST(LevelFromWorld, TransformsPointToLevelFrame) {
   // One metre along world y from the camera, which is turned by a quarter from x to y: the
   // point is on its x axis.
   const Vector3d x_in_level = level_from_world({{2, 3, 0.5}, pi / 2}, {2, 4, 2.5});
   EXPECT_THAT(x_in_level, IsNear(Vector3d(1, 0, 2), 1e-15));
 }
 
-TEST(Frames, LevelFromWorldUndoesTheDefinitionOfALevelFrame) {
+TEST(LevelFromWorld, InvertsDefinitionOfLevelFrame) {
   Random random(5);
   const auto point = [&random] {
     return Vector3d(random.uniform(-5, 5), random.uniform(-5, 5), random.uniform(-5, 5));

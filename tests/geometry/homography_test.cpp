@@ -14,7 +14,7 @@
 namespace vlp {
 namespace {
 
-TEST(Homography, OfExactPairsIsExact) {
+TEST(EstimateHomography, IsExactForExactPairs) {
   Eigen::Matrix3d truth;
   truth << 800, 30, 400, -20, 750, 300, 0.1, -0.2, 1;
   Random random(3);

@@ -17,7 +17,7 @@ constexpr std::size_t kUnknowns = 5;
 using Vector = Eigen::Matrix<double, kUnknowns, 1>;
 using Matrix = Eigen::Matrix<double, kUnknowns, kUnknowns>;
 
-TEST(NormalEquations, GiveTheStepOfWeightedLeastSquares) {
+TEST(NormalEquations, SolutionMatchesWeightedLeastSquares) {
   Random random(11);
   Normal<kUnknowns> normal;
   Matrix information = Matrix::Zero();
@@ -42,10 +42,10 @@ TEST(NormalEquations, GiveTheStepOfWeightedLeastSquares) {
   EXPECT_THAT(inverse, IsNear(Matrix(information.inverse()), 1e-12));
 }
 
-TEST(NormalEquations, SayWhatTheyDoNotDetermine) {
+TEST(Cholesky, DetectsRankDeficiency) {
   Normal<2> normal;
   normal.add_row(std::array{1.0, 1.0}, 0);
-  EXPECT_FALSE(Cholesky<2>(normal).determines(1e-12));  // only the sum is told
+  EXPECT_FALSE(Cholesky<2>(normal).determines(1e-12));  // only the sum is determined
   normal.add_row(std::array{1e-7, 0.0}, 0);
   EXPECT_FALSE(Cholesky<2>(normal).determines(1e-12));
   normal.add_row(std::array{1e-3, 0.0}, 0);

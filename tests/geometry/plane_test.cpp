@@ -30,7 +30,7 @@ Pair random_pair(Random& random) {
 // Products of numbers up to 3 differ by the rounding of 18 at most.
 constexpr double kRounding = 4e-15;
 
-TEST(Plane, TimesIsTheComplexProduct) {
+TEST(ComplexProduct, MatchesStdComplex) {
   Random random(1);
   for (int trial = 0; trial < 100; ++trial) {
     const auto [a, b] = random_pair(random);
@@ -39,7 +39,7 @@ TEST(Plane, TimesIsTheComplexProduct) {
   }
 }
 
-TEST(Plane, ConjTimesConjugatesTheFirstFactor) {
+TEST(ConjProduct, ConjugatesFirstFactor) {
   Random random(2);
   for (int trial = 0; trial < 100; ++trial) {
     const auto [a, b] = random_pair(random);
@@ -48,11 +48,11 @@ TEST(Plane, ConjTimesConjugatesTheFirstFactor) {
   }
 }
 
-TEST(Plane, ConjTimesIsDotAndCrossProduct) {
+TEST(ConjProduct, ReturnsDotAndCrossProduct) {
   EXPECT_EQ(conj_product({1, 2}, {3, 5}), Eigen::Vector2d(1 * 3 + 2 * 5, 1 * 5 - 2 * 3));
 }
 
-TEST(Plane, TimesMatrixMultiplies) {
+TEST(ProductMatrix, MatchesComplexProduct) {
   Random random(3);
   for (int trial = 0; trial < 100; ++trial) {
     const auto [a, b] = random_pair(random);

@@ -9,7 +9,7 @@
 namespace vlp {
 namespace {
 
-TEST(PolygonContains, HoldsForConcavePolygonsInEitherDirection) {
+TEST(PolygonContains, SupportsConcavePolygonsInEitherDirection) {
   std::vector<Eigen::Vector2d> polygon{{0, 0}, {400, 0}, {200, 100}, {400, 400}, {0, 400}};
   for (int direction = 0; direction < 2; ++direction) {
     EXPECT_TRUE(polygon_contains(polygon, {199, 100}));
@@ -31,7 +31,7 @@ TEST(PolygonContains, IncludesCornersAndEdges) {
   EXPECT_FALSE(polygon_contains(polygon, {400.001, 400}));
 }
 
-TEST(PolygonContains, IsFalseForFewerThanThreeCorners) {
+TEST(PolygonContains, ReturnsFalseForFewerThanThreeCorners) {
   EXPECT_FALSE(polygon_contains({}, {1, 1}));
   EXPECT_FALSE(polygon_contains({{0, 0}, {2, 2}}, {1, 1}));
   EXPECT_EQ(compute_polygon_area({}), 0);

@@ -18,7 +18,7 @@ std::vector<double> drawn_squares(Random& random, std::size_t count, double sigm
   return squares;
 }
 
-TEST(RobustPlanarVariance, ReturnsTheVariancePerAxis) {
+TEST(RobustPlanarVariance, ReturnsVariancePerAxis) {
   Random random(1);
   const double variance = robust_planar_variance(drawn_squares(random, 20000, 3), 2 * 20000);
   EXPECT_NEAR(variance / 9, 1, 0.03);

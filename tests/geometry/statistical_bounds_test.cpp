@@ -51,11 +51,11 @@ double chi_squared_upper_tail(double chi_squared, double m) {
   });
 }
 
-TEST(StatisticalBounds, OneInTenThousandIsThatOfANormalVariable) {
+TEST(SigmasOfOneInTenThousand, MatchesNormalDistribution) {
   EXPECT_NEAR(normal_upper_tail(kSigmasOfOneInTenThousand), 1e-4, 1e-7);
 }
 
-TEST(StatisticalBounds, StudentBoundIsExceededAsRarelyAsSigmas) {
+TEST(StudentBound, IsExceededAsRarelyAsSigmas) {
   for (const double sigmas : kSigmas) {
     for (const double m : kDegreesOfFreedom) {
       const double tail = student_upper_tail(std::sqrt(student_bound(sigmas, m)), m);
@@ -65,7 +65,7 @@ TEST(StatisticalBounds, StudentBoundIsExceededAsRarelyAsSigmas) {
   }
 }
 
-TEST(StatisticalBounds, ChiSquaredBoundIsExceededAsRarelyAsSigmas) {
+TEST(ChiSquaredBound, IsExceededAsRarelyAsSigmas) {
   for (const double sigmas : kSigmas) {
     for (const double m : kDegreesOfFreedom) {
       const double tail = chi_squared_upper_tail(chi_squared_bound(sigmas, m), m);
@@ -75,7 +75,7 @@ TEST(StatisticalBounds, ChiSquaredBoundIsExceededAsRarelyAsSigmas) {
   }
 }
 
-TEST(StatisticalBounds, ApproachTheNormalDistribution) {
+TEST(StatisticalBounds, ApproachNormalDistribution) {
   constexpr double m = 1e9;
   for (const double sigmas : kSigmas) {
     EXPECT_NEAR(student_bound(sigmas, m), sigmas * sigmas, 1e-6);

@@ -12,7 +12,7 @@
 namespace vlp {
 namespace {
 
-TEST(SymmetricEigen, GivesTheMatrixBackFromAscendingValues) {
+TEST(SymmetricEigen, ReconstructsMatrixFromAscendingValues) {
   Eigen::Matrix2d two;
   two << 5, 2, 2, 3;
   Eigen::MatrixXd four(4, 4);
@@ -29,14 +29,14 @@ TEST(SymmetricEigen, GivesTheMatrixBackFromAscendingValues) {
   expect_same(symmetric_eigen(four), four);
 }
 
-TEST(SymmetricEigen, IsNoNumberOfWhatIsNone) {
+TEST(SymmetricEigen, ReturnsNanForNanMatrix) {
   const Eigen::MatrixXd none =
       Eigen::MatrixXd::Constant(3, 3, std::numeric_limits<double>::quiet_NaN());
   EXPECT_FALSE(symmetric_eigen(none).values.minCoeff() > 0);
   EXPECT_EQ(symmetric_eigen(none).vectors.cols(), 3);
 }
 
-TEST(InverseOfPositive, IsTheInverseOrNothing) {
+TEST(InvertPositiveDefinite, ReturnsInverseOrNullopt) {
   Eigen::Matrix4d positive;
   positive << 4, 1, 0, -1, 1, 3, 2, 0, 0, 2, 5, 1, -1, 0, 1, 2;
   const auto inverse = inverse_of_positive(positive);

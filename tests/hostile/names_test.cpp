@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Random names through each place that takes an id or a name of a file: nothing outside the
-/// folder, nothing forged on a terminal, in a report, a table or a record.
+/// Passes random names to each function that accepts an id or a file name. No file outside the
+/// folder is touched, and nothing is forged on a terminal, in a report, a table or a record.
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <unistd.h>
@@ -48,8 +48,8 @@ std::string utf8(std::size_t code) {
           byte(0x80 | (code >> 6 & 0x3f)), byte(0x80 | (code & 0x3f))};
 }
 
-/// Returns a part of a name: a letter, a character of Unicode, a surrogate among them, a byte, or
-/// what separates, forges or escapes.
+/// Returns a part of a name: a letter, a Unicode character, including surrogates, a byte, or a
+/// separating or escaping character.
 std::string random_part(Random& random) {
   static const std::array<std::string, 40> parts{"/",
                                                  "..",
@@ -103,7 +103,7 @@ std::string random_part(Random& random) {
   }
 }
 
-/// Returns a name of 0 to 4096 bytes, of which short ones are as frequent as long ones.
+/// Returns a name of 0 to 4096 bytes; short ones are as frequent as long ones.
 std::string random_name(Random& random) {
   const auto bytes = static_cast<std::size_t>(std::exp2(random.uniform(0, 12.001))) - 1;
   std::string name;
@@ -112,7 +112,7 @@ std::string random_name(Random& random) {
   return name;
 }
 
-/// Returns true if a text is UTF-8, by another program's judgement.
+/// Returns true if a text is UTF-8 according to another implementation.
 bool is_utf8(const std::string& text) {
   try {
     return !nlohmann::json(text).dump().empty();
@@ -136,7 +136,7 @@ bool is_harmless(const std::string& text) {
          });
 }
 
-/// Returns a run whose texts are all such names.
+/// Returns a run all of whose texts are such names.
 RunRecord run_with(const std::string& name, int number) {
   RunRecord run;
   run.run = "20261121T134501Z-" + std::to_string(1'000'000 + number);
@@ -159,7 +159,7 @@ class HostileNames : public testing::Test {
   const TemporaryFolder folder;
 };
 
-TEST_F(HostileNames, AreShownInOneLine) {
+TEST_F(HostileNames, PrintableLineReturnsOneHarmlessLine) {
   int as_they_are = 0;
   for (int i = 0; i < kNames; ++i) {
     const std::string name = random_name(random);
@@ -174,7 +174,7 @@ TEST_F(HostileNames, AreShownInOneLine) {
   EXPECT_GT(as_they_are, kNames / 100) << "some are good";
 }
 
-TEST_F(HostileNames, AreIdsOnlyIfTheyNameOnePartOfAPath) {
+TEST_F(HostileNames, IdAcceptsOnlySinglePathComponents) {
   int accepted = 0;
   const fs::path root = "/results";
   for (int i = 0; i < kNames; ++i) {
@@ -194,7 +194,7 @@ TEST_F(HostileNames, AreIdsOnlyIfTheyNameOnePartOfAPath) {
   EXPECT_GT(accepted, kNames / 100);
 }
 
-TEST_F(HostileNames, NameNoFileOutsideAFolder) {
+TEST_F(HostileNames, SharedFolderOpensNoFileOutsideIt) {
   fs::create_directories(folder / "shared");
   const fs::path canary = folder.file("canary", "mine");
   const SharedFolder shared(folder / "shared");
@@ -224,7 +224,7 @@ TEST_F(HostileNames, NameNoFileOutsideAFolder) {
   EXPECT_EQ(TemporaryFolder::content_of(canary), "mine");
 }
 
-TEST_F(HostileNames, FollowNoLinkOutOfAFolder) {
+TEST_F(HostileNames, SharedFolderFollowsNoLinkOutOfIt) {
   fs::create_directories(folder / "shared");
   fs::create_directories(folder / "outside");
   const fs::path canary = folder.file("outside/canary", "mine");
@@ -258,7 +258,7 @@ TEST_F(HostileNames, FollowNoLinkOutOfAFolder) {
   EXPECT_EQ(std::distance(fs::directory_iterator(folder / "outside"), {}), 1);
 }
 
-TEST_F(HostileNames, AreReadBackFromTheSpool) {
+TEST_F(HostileNames, ReadRunReturnsWrittenNames) {
   int refused = 0;
   constexpr int every = 20;  // parsing takes long without optimisation
   for (int i = 0; i < kNames; ++i) {
@@ -279,7 +279,7 @@ TEST_F(HostileNames, AreReadBackFromTheSpool) {
   EXPECT_GT(refused, 0);
 }
 
-TEST_F(HostileNames, AreTextInReports) {
+TEST_F(HostileNames, ReportsEscapeNames) {
   const auto tags_of = [](const std::string& page) {
     std::string tags;
     bool is_tag = false;
@@ -306,7 +306,7 @@ TEST_F(HostileNames, AreTextInReports) {
   }
 }
 
-TEST_F(HostileNames, AddNoRowToTables) {
+TEST_F(HostileNames, WriteRunsAddsNoRows) {
   constexpr int every = 10;
   std::vector<RunRecord> runs;
   runs.reserve(kNames / every);
@@ -314,7 +314,7 @@ TEST_F(HostileNames, AddNoRowToTables) {
   write_runs(folder / "runs.json", runs);
   const auto json = nlohmann::json::parse(TemporaryFolder::content_of(folder / "runs.json"));
   ASSERT_EQ(json.size(), runs.size());
-  for (RunRecord& run : runs) run = printable_run(std::move(run));  // as records have them
+  for (RunRecord& run : runs) run = printable_run(std::move(run));  // as in records
   write_runs(folder / "runs.csv", runs);
   const CsvTable table(folder / "runs.csv");
   ASSERT_EQ(table.rows(), runs.size());
@@ -326,7 +326,7 @@ TEST_F(HostileNames, AddNoRowToTables) {
   }
 }
 
-TEST_F(HostileNames, AreTheCamerasOfCalibrations) {
+TEST_F(HostileNames, ReadCalibrationReturnsWrittenCameraId) {
   const fs::path example = fs::path(VLP_SOURCE_DIR) / "datasets/example/calibration.yaml";
   Calibration calibration = read_calibration(example);
   constexpr int every = 50;
@@ -340,7 +340,7 @@ TEST_F(HostileNames, AreTheCamerasOfCalibrations) {
   }
 }
 
-TEST_F(HostileNames, AddNoRunToRecordsAndLists) {
+TEST_F(HostileNames, RecordsAddNoRuns) {
   constexpr int every = 200;
   const std::string where = (folder / "records.db").string();
   {

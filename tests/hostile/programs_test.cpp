@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Programs with files, names and outputs that others control: how each trial ends, within which
-/// time and memory, and which files exist afterwards.
+/// Runs programs with files, names and outputs controlled by others. Checks the exit of each trial,
+/// its time and memory, and the remaining files.
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <sys/stat.h>
@@ -25,7 +25,7 @@ namespace fs = std::filesystem;
 using testing::HasSubstr;
 using testing::Not;
 
-/// End of a program, with what it took.
+/// Result of a program, with its time and memory.
 struct Ending {
   int exit_code = -1;
   std::string output, errors;
@@ -34,7 +34,8 @@ struct Ending {
   double max_mib = 0;
 };
 
-/// Runs a shell command line in a folder, with the example's files in it; kills it after a minute.
+/// Runs a shell command line in a folder that contains the example's files; kills it after a
+/// minute.
 Ending run_in(const TemporaryFolder& folder, const std::string& command) {
   using Clock = std::chrono::steady_clock;
   const std::string line = "cd '" + (folder / "").string() +
@@ -63,7 +64,7 @@ void add_example(const TemporaryFolder& folder) {
   fs::copy_file(kRig + "/board.yaml", folder / "board.yaml");
 }
 
-/// A command with bad input, and how it has to end.
+/// Command with bad input, and its expected result.
 struct Trial {
   std::string name;     // of the test
   std::string prepare;  // shell commands that make the input
@@ -79,7 +80,7 @@ void PrintTo(const Trial& trial, std::ostream* out) { *out << trial.name; }
 
 class HostileFile : public testing::TestWithParam<Trial> {};
 
-TEST_P(HostileFile, EndsAsItShould) {
+TEST_P(HostileFile, ProgramEndsWithinLimitsWithExpectedExitCode) {
   const TemporaryFolder folder;
   add_example(folder);
   const Trial& trial = GetParam();
@@ -251,7 +252,7 @@ INSTANTIATE_TEST_SUITE_P(
               "grep -q ^.\\\\?.=HYPERLINK fixes.csv && ! grep -q ^=HYPERLINK fixes.csv"}),
     name_of_trial);
 
-/// Programs and the arguments at whose place a file of any kind may stand.
+/// Programs with the arguments that can be replaced by any kind of file.
 const std::vector<std::string> kReaders{
     "vlp-locate BAD --lamps lamps.yaml --calibration calibration.yaml -o out.csv",
     "vlp-locate detections.csv --lamps BAD --calibration calibration.yaml -o out.csv",
@@ -280,7 +281,7 @@ void PrintTo(const BadFile& bad, std::ostream* out) { *out << bad.name; }
 
 class EveryReader : public testing::TestWithParam<BadFile> {};
 
-TEST_P(EveryReader, RefusesAtOnce) {
+TEST_P(EveryReader, RejectsSpecialFileImmediately) {
   std::size_t refused = 0;
   for (const std::string& reader : kReaders) {
     for (const char* ending : {".csv", ".yaml"}) {
@@ -311,7 +312,7 @@ INSTANTIATE_TEST_SUITE_P(
                     BadFile{"LinkToStdin", "ln -s /dev/stdin $B"}),
     [](const auto& bad) { return bad.param.name; });
 
-TEST(EveryProgram, ReportsThatItsHelpCannotBeWritten) {
+TEST(EveryProgram, ReportsWriteErrorOfHelp) {
   std::size_t programs = 0;
   for (const auto& program : fs::directory_iterator(VLP_PROGRAMS_DIR)) {
     const std::string name = program.path().filename();
@@ -326,8 +327,8 @@ TEST(EveryProgram, ReportsThatItsHelpCannotBeWritten) {
   EXPECT_GT(programs, 10U);
 }
 
-/// Formats whose size is not read from their header; none is decoded.
-TEST(ForeignImages, AreNotDecoded) {
+/// Formats whose size is not read from their header are not decoded.
+TEST(DetectPrograms, RejectUnsupportedImageFormats) {
   std::size_t formats = 0;
   for (const char* ending : {".webp", ".jp2", ".ras", ".hdr"}) {
     std::vector<unsigned char> bytes;

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// vlp-station and vlp-calibrate with folders into which others can write, and with texts that
-/// forge lines: nothing outside is changed, nothing that somebody else wrote is lost, and each is
-/// told in a line.
+/// Runs vlp-station and vlp-calibrate with folders that others can write to, and with texts that
+/// forge lines. Nothing outside is changed, no file of others is lost, and each problem is reported
+/// in one line.
 #include <gmock/gmock.h>
 #include <sys/stat.h>
 
@@ -30,30 +30,30 @@ using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
 
-/// A station with files of somebody beside it.
+/// Station with files of another user next to it.
 class HostileStation : public SmallStation {
  public:
   HostileStation() { fs::create_directory(elsewhere); }
   using SmallStation::change;
   using SmallStation::result;
 
-  /// Command of vlp-station for this station; one that hangs is killed after 30 s.
+  /// Returns a vlp-station command for this station, killed after 30 s.
   ProgramResult vlp_station(const std::string& command, const std::string& options = "") const {
     return run_program("timeout 30 vlp-station " + command + " --station " +
                        (home / "station.yaml").string() + " " + options);
   }
-  /// A run without images, which is soon INVALID.
+  /// Runs a unit without images, which is INVALID immediately.
   ProgramResult empty_run(const std::string& options = "",
                           const std::string& camera = "0001") const {
     return vlp_station("run", "--camera-id " + camera + " --idle-s 0.1 " + options);
   }
-  /// The name of the one run of the records.
+  /// Returns the id of the only run in the records.
   std::string name_of_run() const {
     const std::string listed = vlp_station("list").output;
     const auto at = listed.find("\n20");
     return at == std::string::npos ? "" : listed.substr(at + 1, 33);
   }
-  /// Makes a pipe, a link or a file, with its folder.
+  /// Creates a pipe, a link or a file, with its folder.
   fs::path in_folder(const fs::path& name) const {
     fs::create_directories((home / name).parent_path());
     return home / name;
@@ -74,7 +74,7 @@ class HostileStation : public SmallStation {
     ASSERT_EQ(done.exit_code, 0) << done.errors;
     fs::remove(folder / "script.py");
   }
-  /// Lets the one run begin and end this many days ago, as records and folders have it.
+  /// Sets the end of the only run to this many days ago, in records and folders.
   void age_run(int days) const {
     python(
         "import os, sqlite3, sys, time\n"
@@ -90,7 +90,7 @@ class HostileStation : public SmallStation {
         "    os.rename(f'{sys.argv[1]}/{place}/{name}{run}', "
         "f'{sys.argv[1]}/{place}/{name}{old}')\n");
   }
-  /// Puts a run into the spool with other texts.
+  /// Writes a run with other texts to the spool.
   void spool(const std::string& from, const std::string& to) const {
     RunRecord run;
     run.run = "20261121T134501Z-0123456789abcdef";
@@ -106,7 +106,7 @@ class HostileStation : public SmallStation {
     ASSERT_NE(at, std::string::npos) << from;
     write("spool/a.json", text.replace(at, from.size(), to));
   }
-  /// Expects that the files of somebody, and all that is beside the station, are as they were.
+  /// Expects that the other user's files, and all files next to the station, are unchanged.
   void expect_nothing_outside() const {
     std::set<std::string> names;
     for (const auto& entry : fs::directory_iterator(folder / "")) {
@@ -122,15 +122,15 @@ class HostileStation : public SmallStation {
                  mine = folder.file("mine.txt", kMine);
 };
 
-/// What is tried, and what is to come of it.
+/// Trial and its expected result.
 struct StationTrial {
   std::string name;
-  /// Prepares the folder, and runs the program.
+  /// Prepares the folder and runs the program.
   std::function<ProgramResult(const HostileStation&)> run;
   int exit_code;
-  /// Part of what is written to stderr.
+  /// Part of the expected stderr.
   std::string message;
-  /// Looks at what is there afterwards.
+  /// Checks the files afterwards.
   std::function<void(const HostileStation&, const ProgramResult&)> check = {};
 };
 
@@ -143,7 +143,7 @@ void expect_empty_records(const HostileStation& station, const ProgramResult&) {
   EXPECT_THAT(station.vlp_station("list").output, Not(HasSubstr("INVALID")));
 }
 
-/// Each line of a list is the header, of a run as it is named, empty or the count.
+/// Expects that each line of a list is the header, a run by its id, empty or the count.
 void expect_no_forged_line(const HostileStation&, const ProgramResult& result) {
   std::istringstream lines(result.output);
   std::size_t of_runs = 0;
@@ -468,7 +468,7 @@ const std::vector<StationTrial> kTextTrials{
      2, "the name of a database cannot have a quote"},
 };
 
-/// vlp-calibrate with a folder of results in which there are files of the user's own.
+/// vlp-calibrate with a folder of results that contains the user's own files.
 const std::vector<StationTrial> kResultsTrials{
     {"UnmarkedFolderWithFilesOfTheUser",
      [](const HostileStation& s) {
@@ -523,9 +523,8 @@ const std::vector<StationTrial> kResultsTrials{
      2, "steps/lock: is a symbolic link"},
 };
 
-/// Time and memory of a command with files of the spool that are as large as they may be, or
-/// larger.
-TEST_F(HostileStation, ReadsFilesOfTheSpoolWithinBounds) {
+/// Measures time and memory of a command with spool files of the maximum size, or larger.
+TEST_F(HostileStation, LimitsSizeOfSpoolFiles) {
   ASSERT_EQ(empty_run().exit_code, 3);
   RunRecord large;
   large.run = "20261121T134501Z-0123456789abcdef";
@@ -536,7 +535,7 @@ TEST_F(HostileStation, ReadsFilesOfTheSpoolWithinBounds) {
   RunRecord long_text = large;
   long_text.images.clear();
   long_text.calibration.assign(limit_bytes - 1000, 'x');
-  // Of other records, so that they are read and go nowhere.
+  // Runs of other records, so that they are read but not delivered.
   const std::vector<std::pair<std::string, std::string>> files{
       {"a million values", text_of_run({large, "elsewhere"})},
       {"a text of 64 MiB", text_of_run({long_text, "elsewhere"})},
@@ -565,7 +564,7 @@ TEST_F(HostileStation, ReadsFilesOfTheSpoolWithinBounds) {
 
 class HostileFolder : public HostileStation, public testing::WithParamInterface<StationTrial> {};
 
-TEST_P(HostileFolder, IsRefusedOrWithoutEffect) {
+TEST_P(HostileFolder, IsRejectedOrHasNoEffect) {
   const StationTrial& trial = GetParam();
   const auto begun = std::chrono::steady_clock::now();
   const ProgramResult result = trial.run(*this);

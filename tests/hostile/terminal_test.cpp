@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// A terminal whose program is stopped or ended by a key.
+/// Terminal whose program is stopped or ended by a key.
 #include "program/station/terminal.h"
 
 #include <fcntl.h>
@@ -22,7 +22,7 @@ bool echoes() {
   return ::tcgetattr(STDIN_FILENO, &settings) == 0 && (settings.c_lflag & ECHO) != 0;
 }
 
-/// Waits until the terminal echoes what is typed, or does not; ten seconds at most.
+/// Waits at most ten seconds until the terminal's echo is on or off.
 bool wait_for_echo(bool is_wanted) {
   constexpr useconds_t interval_us = 10'000;
   for (int i = 0; i < 1000 && echoes() != is_wanted; ++i) ::usleep(interval_us);
@@ -43,7 +43,8 @@ bool wait_for_echo(bool is_wanted) {
   ::_exit(0);
 }
 
-/// Starts a program at the terminal, as a shell does, sends it signals, and writes what it found.
+/// Starts a program at the terminal like a shell, sends it signals, and writes the terminal's
+/// state.
 std::string stop_and_quit() {
   const pid_t program = ::fork();
   if (program == 0) read_keys();
@@ -61,7 +62,7 @@ std::string stop_and_quit() {
   return found;
 }
 
-TEST(TerminalSettings, ArePutBackWhenTheProgramIsStoppedOrEndedByAKey) {
+TEST(TerminalSettings, AreRestoredWhenProgramIsStoppedOrEndedByKey) {
   int ends[2], terminal = -1;
   ASSERT_EQ(::pipe(ends), 0);
   const pid_t shell = ::forkpty(&terminal, nullptr, nullptr, nullptr);

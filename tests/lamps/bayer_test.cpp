@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Cameras with a mosaic of colour filters.
+/// Detection by cameras with a mosaic of color filters.
 #include <tuple>
 #include <utility>
 
@@ -15,7 +15,7 @@ Score behind_filters(const std::string& name, std::size_t step) {
   return Captures(std::move(scene), "check").score(step);
 }
 
-TEST(ColourFilters, LeaveLampsWhatAndWhereTheyAre) {
+TEST(LightDetector, DetectsDiscsWithoutBiasBehindColorFilters) {
   for (const auto& [scene, step, most_missed] : {std::tuple("paper-rig", 12, 0), {"wide", 16, 4}}) {
     const Score score = behind_filters(scene, std::size_t(step));
     EXPECT_GT(score.lamps, 90) << scene;
@@ -26,7 +26,7 @@ TEST(ColourFilters, LeaveLampsWhatAndWhereTheyAre) {
   }
 }
 
-TEST(ColourFilters, LeavePanelsAndTubesWhatAndWhereTheyAre) {
+TEST(LightDetector, DetectsPanelsAndTubesWithoutBiasBehindColorFilters) {
   const Score score = behind_filters("panels", 11);
   EXPECT_GT(score.lamps, 85);
   EXPECT_EQ(score.wrong, 0);

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// LED chips that shine through a lamp's diffuser, and a halo on the ceiling around it.
+/// LED chips visible through a lamp's diffuser, and a halo on the ceiling around the lamp.
 #include <utility>
 
 #include "lamps/rendered_captures.h"
@@ -31,11 +31,11 @@ void expect_good(const Score& score) {
   EXPECT_LT(score.chi_square / score.lamps, 1.5);
 }
 
-TEST(Chips, BehindADiffuserLeaveTheCentre) {
+TEST(LightDetector, CenterIsUnbiasedForChipsBehindDiffuser) {
   expect_good(score_with(Chips{0.3, 0.03, 0.02}, std::nullopt));
 }
 
-TEST(Chips, BehindADiffuserWithAHaloLeaveTheCentre) {
+TEST(LightDetector, CenterIsUnbiasedForChipsBehindDiffuserWithHalo) {
   expect_good(score_with(Chips{0.3, 0.03, 0.02}, Halo{0.03, 0.02}));
 }
 

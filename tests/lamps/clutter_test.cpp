@@ -1,15 +1,15 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Captures with other lights, glare, poor light and things in the way: a lamp may be missed when
-/// something hides it, but what is said to be a lamp is right.
+/// Captures with other lights, glare, poor light and occluders. A lamp may be missed if an object
+/// hides it, but every reported lamp is correct.
 #include "lamps/rendered_captures.h"
 
 namespace vlp {
 namespace {
 
-class Clutter : public testing::TestWithParam<const char*> {};
+class LightDetectorInClutter : public testing::TestWithParam<const char*> {};
 
-TEST_P(Clutter, MisleadsNoDetection) {
+TEST_P(LightDetectorInClutter, ReportsNoWrongLamps) {
   const Score score = Captures("clutter", GetParam()).score(6);
   EXPECT_GE(score.lamps, 20);
   EXPECT_EQ(score.wrong, 0);
@@ -17,10 +17,10 @@ TEST_P(Clutter, MisleadsNoDetection) {
   EXPECT_LT(score.chi_square / score.lamps, 2.5);
   EXPECT_GE(score.hidden, 15);
   EXPECT_LT(score.hidden_chi_square / score.hidden,
-            5);  // moving, too: 1 m/s and 90 degrees a second
+            5);  // includes motion: 1 m/s and 90 degrees per second
 }
 
-INSTANTIATE_TEST_SUITE_P(Folders, Clutter,
+INSTANTIATE_TEST_SUITE_P(Folders, LightDetectorInClutter,
                          testing::Values("check", "low-light", "saturated", "fast"),
                          [](const auto& folder) {
                            std::string name = folder.param;

@@ -1,13 +1,13 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Recessed downlights as a phone shows them: a source deep in a reflector, lit ten to one and
-/// more, a halo, a tone curve, sharpening, JPEG.
+/// Recessed downlights in images of a phone: a source deep in a reflector with a contrast of at
+/// least ten to one, a halo, a tone curve, sharpening and JPEG.
 #include "lamps/rendered_captures.h"
 
 namespace vlp {
 namespace {
 
-TEST(Downlights, AreFoundByTheirRims) {
+TEST(LightDetector, DetectsDownlightsByTheirRims) {
   const Score score = Captures("downlights", "check").score(1);
   testing::Test::RecordProperty("rms_px", testing::PrintToString(score.rms_px()));
   testing::Test::RecordProperty("worst_px", testing::PrintToString(score.worst_px));

@@ -19,13 +19,13 @@
 
 namespace vlp {
 
-/// A square wave as lines see it that are exposed for some lines' time each.
+/// Square wave as scanlines record it, each with an exposure of several line times.
 struct DrawnStripes {
   double period_lines = 11, duty = 0.5;
   double phase = 0.3;  // in periods
   double exposure_lines = 1.7;
 
-  /// The lit share of a line's exposure.
+  /// Returns the lit fraction of a scanline's exposure.
   double lit(double line) const {
     const auto lit_until = [&](double at) {
       const double periods = at / period_lines + phase, whole = std::floor(periods);
@@ -36,33 +36,34 @@ struct DrawnStripes {
   }
 };
 
-/// A dark bar across a lamp, so far off its centre.
+/// Dark bar across a lamp, at the distance `offset_px` from its center.
 struct DrawnBar {
   double angle_rad, offset_px, width_px;
 };
 
-/// How much of a step at 0 is seen so far into it.
+/// Returns the value of a blurred unit step at the distance `into_px` behind it.
 inline double blurred_step(double into_px, double blur_px) {
   return std::erfc(-into_px / (blur_px * std::numbers::sqrt2)) / 2;
 }
 
-/// A light without an edge falls from its middle as exp((core - sqrt(r^2 + core^2)) / fall).
+/// Light without an edge: decreases from its middle as exp((core - sqrt(r^2 + core^2)) / fall).
 struct DrawnGlow {
   double fall_px = 13, core_px = 10;
 };
 
-/// A source deep in a reflector: its walls are lit to a share of the lamp's level, a core off the
-/// middle fully, and the ceiling around to a share that falls from the rim on.
+/// Source deep in a reflector. Its walls have a fraction of the lamp's level, and a core off the
+/// middle has the full level. The ceiling around has a fraction that decreases with the distance
+/// from the rim.
 struct DrawnRecess {
   Eigen::Vector2d core_off_px{6, 14};
   double core_px = 14, walls = 0.1, halo = 0.02, halo_px = 12;
 };
 
-/// A striped disc, a bulb that glows, or a downlight.
+/// Striped disc, glowing bulb, or downlight.
 struct DrawnLamp {
   Eigen::Vector2d center{101.3, 79.6};
   double radius_px = 38.4, blur_px = 0.8;
-  double level = 0.7;  // of white, above the dark
+  double level = 0.7;  // fraction of white, above the dark level
   DrawnStripes stripes = {};
   std::optional<DrawnBar> bar = {};
   std::optional<DrawnGlow> glow = {};
@@ -93,7 +94,7 @@ struct DrawnLamp {
   }
 };
 
-/// The lamps on a dark image, with normal noise of so many of 255 grey levels.
+/// Renders lamps on a dark image with normal noise of `noise_of_255` of 255 grey levels.
 inline cv::Mat drawn(const std::vector<DrawnLamp>& lamps, const cv::Size& size, int depth,
                      double noise_of_255 = 0, std::uint64_t seed = 1) {
   const double white = depth == CV_8U ? 255 : 65535;
@@ -113,14 +114,14 @@ inline cv::Mat drawn(const std::vector<DrawnLamp>& lamps, const cv::Size& size, 
 
 constexpr double kDrawnRowTime_s = 3e-5;
 
-/// Looks straight up, through a lens without distortion.
+/// Returns a camera that looks straight up, with a lens without distortion.
 inline DetectorCamera drawn_camera(const cv::Size& size) {
   const std::vector<double> intrinsics = {520, 520, (size.width - 1) / 2.0,
                                           (size.height - 1) / 2.0};
   return {Readout::rows, kDrawnRowTime_s, Lens(LensModel::pinhole, intrinsics)};
 }
 
-/// Whose stripes have that period there.
+/// Returns a lamp with stripes of this period for drawn_camera().
 inline Lamp drawn_lamp(int id, double period_lines) {
   return {id, {0.2 * id, 0, 1.6}, {}, 1 / (period_lines * kDrawnRowTime_s), 0.5};
 }

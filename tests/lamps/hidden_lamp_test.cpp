@@ -23,7 +23,7 @@ struct Tally {
   int lamps = 0, found = 0;
 };
 
-/// A bar of that width at many angles and offsets.
+/// Counts detections behind a bar of the given width, at many angles and offsets.
 Tally tally(double width_of_diameter) {
   const LightDetector lamp_detector = detector();
   Tally tally;
@@ -51,7 +51,7 @@ Tally tally(double width_of_diameter) {
   return tally;
 }
 
-TEST(HiddenLamp, IsRightWheneverItIsSaidToBeALamp) {
+TEST(LightDetector, ReportsOnlyCorrectLampsBehindOccludingBars) {
   int lamps = 0, found = 0;
   for (const double width : {0.05, 0.1, 0.2, 0.33}) {
     const Tally some = tally(width);
@@ -64,7 +64,7 @@ TEST(HiddenLamp, IsRightWheneverItIsSaidToBeALamp) {
   EXPECT_LE(found, lamps);
 }
 
-TEST(HiddenLamp, IsFoundWhenNothingHidesIt) {
+TEST(LightDetector, DetectsLampWithoutOccluder) {
   const DrawnLamp lamp{.stripes = {.period_lines = 9.6}};
   const auto lights = detector().detect(image_view(drawn({lamp}, kHiddenSize, CV_8U, 0.5)));
   ASSERT_EQ(lights.size(), 1U);

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// The public detector in C++ and in C, which finds what the toolbox finds, and takes any pixels.
+/// Public detector in C++ and in C: it finds the same lamps as the toolbox, and accepts any pixels.
 #include "lamps/lamp_detector.h"
 
 #include <gmock/gmock.h>
@@ -50,7 +50,7 @@ Handle open(const Calibration& calibration) {
   return {positioner, &vlp_close};
 }
 
-TEST(LampDetector, DetectsTheLampsThatTheToolboxDetects) {
+TEST(LampDetector, MatchesLightDetector) {
   const cv::Mat image = sample();
   const auto lamps = LampDetector(lamp_map(), calibration()).detect(image_view(image));
   ASSERT_EQ(lamps.size(), 6U);
@@ -66,7 +66,7 @@ TEST(LampDetector, DetectsTheLampsThatTheToolboxDetects) {
   EXPECT_EQ(i, lamps.size());
 }
 
-TEST(LampDetector, RefusesWhatIsNoImageOfItsCamera) {
+TEST(LampDetector, ThrowsForImagesThatDoNotMatchCamera) {
   const cv::Mat image = sample();
   const LampDetector detector(lamp_map(), calibration());
   const auto message_of = [&](const auto& change) -> std::string {
@@ -94,12 +94,12 @@ TEST(LampDetector, RefusesWhatIsNoImageOfItsCamera) {
   EXPECT_THROW(LampDetector(lamp_map(), without), std::invalid_argument);
 }
 
-TEST(VlpDetect, DetectsWhatTheDetectorInCppDetects) {
+TEST(VlpDetect, MatchesLampDetector) {
   const cv::Mat image = sample();
   const auto expected = LampDetector(lamp_map(), calibration()).detect(image_view(image));
   ASSERT_EQ(expected.size(), 6U);
   const Handle positioner = open(calibration());
-  // Rows without a gap, and rows with one.
+  // Rows without padding, and rows with padding.
   cv::Mat wide(image.rows, image.cols + 13, CV_8U, cv::Scalar(255));
   image.copyTo(wide(cv::Rect(0, 0, image.cols, image.rows)));
   vlp_image without_gap = c_image(image_view(image));
@@ -118,12 +118,12 @@ TEST(VlpDetect, DetectsWhatTheDetectorInCppDetects) {
   }
 }
 
-TEST(VlpDetect, TellsHowManyThereAreWhenTheArrayIsTooSmall) {
+TEST(VlpDetect, ReturnsRequiredCountWhenArrayIsTooSmall) {
   const cv::Mat image = sample();
   const Handle positioner = open(calibration());
   const vlp_image given = c_image(image_view(image));
   for (const std::size_t capacity : {0U, 1U, 5U, 6U}) {
-    std::vector<vlp_detection> seen(capacity);  // of just that size, for the sanitizers
+    std::vector<vlp_detection> seen(capacity);  // of exactly this size, for the sanitizers
     std::size_t count = 99;
     EXPECT_EQ(vlp_detect(positioner.get(), &given, seen.data(), capacity, &count),
               capacity < 6 ? VLP_TOO_SMALL : VLP_OK);
@@ -133,7 +133,7 @@ TEST(VlpDetect, TellsHowManyThereAreWhenTheArrayIsTooSmall) {
   EXPECT_NE(vlp_explanation(VLP_TOO_SMALL), std::string(vlp_explanation(-99)));
 }
 
-TEST(VlpDetect, RefusesArgumentsThatCannotBe) {
+TEST(VlpDetect, RejectsInvalidArguments) {
   const cv::Mat image = sample();
   const Handle positioner = open(calibration());
   const vlp_image good = c_image(image_view(image));
@@ -174,7 +174,7 @@ TEST(VlpDetect, RefusesArgumentsThatCannotBe) {
   }));
 }
 
-TEST(VlpDetect, NeedsTheRowTime) {
+TEST(VlpDetect, ReturnsErrorWithoutRowTime) {
   const cv::Mat image = sample();
   const vlp_image given = c_image(image_view(image));
   Calibration without = calibration();
@@ -242,7 +242,7 @@ TEST(VlpOpenRoom, IdentifiesLampsOfTheChosenRoom) {
   EXPECT_THAT(vlp_last_error(), HasSubstr("has no lamp with 'room: attic'"));
 }
 
-/// Pixels of which every byte outside may be another's: rows have a gap, the last one has none.
+/// Returns pixels in a buffer without spare bytes: rows have padding, the last one has none.
 template <typename Level, typename Next>
 std::vector<Level> pixels(int width, int height, int row, Next&& next) {
   std::vector<Level> pixels(std::size_t((height - 1) * row + width));
@@ -250,7 +250,7 @@ std::vector<Level> pixels(int width, int height, int row, Next&& next) {
   return pixels;
 }
 
-TEST(VlpDetect, TakesImagesOfAnySizeAndContent) {
+TEST(VlpDetect, ReturnsOkForRandomImagesOfAnySize) {
   Random random(1);
   for (const Readout readout : {Readout::rows, Readout::columns}) {
     for (const auto& [width, height] : {std::array{1, 1},

@@ -17,7 +17,7 @@
 namespace vlp {
 namespace {
 
-TEST(LightDetector, FindsAndIdentifiesEveryLampOfThePaperRig) {
+TEST(LightDetector, IdentifiesAllLampsOfPaperRig) {
   const Score score = Captures("paper-rig", "check").score(12);
   EXPECT_GT(score.lamps, 180);
   EXPECT_EQ(score.missed, 0);
@@ -26,28 +26,28 @@ TEST(LightDetector, FindsAndIdentifiesEveryLampOfThePaperRig) {
   EXPECT_LT(score.worst_px, 0.08);
 }
 
-TEST(LightDetector, StatesTheScatterOfItsCentres) {
+TEST(LightDetector, SigmaMatchesScatterOfCenters) {
   const Score score = Captures("paper-rig", "check").score(12);
   EXPECT_GT(score.chi_square / score.lamps, 0.7);
   EXPECT_LT(score.chi_square / score.lamps, 2);
 }
 
-TEST(LightDetector, CopesWithTiltAndADecentredLens) {
+TEST(LightDetector, IsAccurateWithTiltAndDecenteredLens) {
   const Score score = Captures("paper-rig-faulty", "check").score(24);
   EXPECT_EQ(score.missed, 0);
   EXPECT_EQ(score.wrong, 0);
   EXPECT_LT(score.rms_px(), 0.02);
 }
 
-TEST(LightDetector, CopesWithAWideLensAndAReadOutAlongColumns) {
+TEST(LightDetector, IsAccurateWithWideLensAndColumnReadout) {
   const Score score = Captures("wide", "check").score(8);
   EXPECT_GT(score.lamps, 150);
-  EXPECT_LE(score.missed, 4);  // too few stripes to tell
+  EXPECT_LE(score.missed, 4);  // too few stripes for identification
   EXPECT_EQ(score.wrong, 0);
   EXPECT_LT(score.rms_px(), 0.03);
 }
 
-TEST(LightDetector, LeavesOutSteadyLightsAndReflections) {
+TEST(LightDetector, RejectsSteadyLightsAndReflections) {
   const Captures captures("clutter", "sample");
   const LampShot shot = captures.shot(0);
   std::map<LightKind, int> kinds;
@@ -59,7 +59,7 @@ TEST(LightDetector, LeavesOutSteadyLightsAndReflections) {
   EXPECT_EQ(kinds[LightKind::steady], 2) << "the steady lamp and the window";
 }
 
-TEST(LightDetector, MarksALampThatTheImagesEdgeCuts) {
+TEST(LightDetector, ReportsCutForLampsAtImageBorder) {
   const Captures captures("paper-rig", "check");
   int cut = 0;
   for (std::size_t i = 0; i < 432; i += 8) {
@@ -77,7 +77,7 @@ TEST(LightDetector, MarksALampThatTheImagesEdgeCuts) {
   EXPECT_GT(cut, 5);
 }
 
-TEST(LightDetector, CallsALampUnknownThatTheMapDoesNotHave) {
+TEST(LightDetector, ReportsUnknownForLampOutsideMap) {
   const Captures captures("paper-rig", "sample");
   const LightDetector detector(LampMap{{Lamp{7, {0, 0, 1.6}, {}, 6000, 0.5}}},
                                {Readout::rows, 3e-5, {}});
@@ -87,7 +87,7 @@ TEST(LightDetector, CallsALampUnknownThatTheMapDoesNotHave) {
   }
 }
 
-TEST(LightDetector, DoesNotChooseBetweenLampsOfNearlyOneFrequency) {
+TEST(LightDetector, RejectsLampsOfNearlyEqualFrequency) {
   const Captures captures("paper-rig", "sample");
   LampMap map{{Lamp{3, {0, 0, 1.6}, {}, 2500, 0.5}, Lamp{7, {1, 0, 1.6}, {}, 2520, 0.5}}};
   const auto identified = [&] {
@@ -101,7 +101,7 @@ TEST(LightDetector, DoesNotChooseBetweenLampsOfNearlyOneFrequency) {
   EXPECT_EQ(identified(), 1);
 }
 
-TEST(LightDetector, WantsALampWithMoreStripesBesideOneThatShowsTwo) {
+TEST(LightDetector, AcceptsFewPeriodsOnlyWithReliableLampInImage) {
   const cv::Size size(300, 160);
   const LightDetector detector(LampMap{{drawn_lamp(1, 36), drawn_lamp(2, 11)}}, drawn_camera(size));
   const DrawnLamp few{.center = {81.3, 79.6}, .stripes = {.period_lines = 36}};
@@ -116,7 +116,7 @@ TEST(LightDetector, WantsALampWithMoreStripesBesideOneThatShowsTwo) {
   for (const Light& light : both) EXPECT_EQ(light.kind, LightKind::lamp);
 }
 
-/// Kinds of the lights of an image, from left to right.
+/// Returns the kinds of the lights of an image, from left to right.
 std::vector<std::pair<LightKind, LightReason>> kinds_of(std::vector<Light> lights) {
   std::sort(lights.begin(), lights.end(),
             [](const Light& a, const Light& b) { return a.pixel.x() < b.pixel.x(); });
@@ -125,7 +125,7 @@ std::vector<std::pair<LightKind, LightReason>> kinds_of(std::vector<Light> light
   return kinds;
 }
 
-TEST(LightDetector, KeepsTheBrighterOneOfALampAndItsMirrorImage) {
+TEST(LightDetector, KeepsBrighterOneOfLampAndMirrorImage) {
   const cv::Size size(300, 160);
   const LightDetector detector(LampMap{{drawn_lamp(1, 11)}}, drawn_camera(size));
   const DrawnLamp lamp{.center = {81.3, 79.6}};
@@ -140,7 +140,7 @@ TEST(LightDetector, KeepsTheBrighterOneOfALampAndItsMirrorImage) {
   EXPECT_EQ(kinds_beside(0.8), (std::vector{reflection, reflection}));
 }
 
-TEST(LightDetector, RefusesAPeriodThatTheOtherLightsContradict) {
+TEST(LightDetector, RejectsPeriodThatContradictsOtherLights) {
   const cv::Size size(520, 160);
   const LightDetector detector(
       LampMap{{drawn_lamp(1, 9), drawn_lamp(2, 11), drawn_lamp(3, 14), drawn_lamp(4, 18)}},
@@ -160,7 +160,7 @@ TEST(LightDetector, RefusesAPeriodThatTheOtherLightsContradict) {
       << "the row time is wrong";
 }
 
-TEST(LightDetector, DoesNotCompareWhatAClassifierIdentifiesWithTheMap) {
+TEST(LightDetector, IgnoresMapFrequenciesWithClassifier) {
   const cv::Size size(520, 160);
   const std::vector<double> periods{9, 11, 14, 18};
   LampMap map;
@@ -189,7 +189,7 @@ TEST(LightDetector, DoesNotCompareWhatAClassifierIdentifiesWithTheMap) {
   EXPECT_EQ(kinds_of(by_classifier.detect(image_view(draw(0.33)))), std::vector(4, lamp));
 }
 
-TEST(LightDetector, FindsNothingInImagesWithoutLamps) {
+TEST(LightDetector, ReturnsNoLightsForUniformImages) {
   const LightDetector detector = Captures("paper-rig", "sample").detector();
   for (const int type : {CV_8U, CV_16U}) {
     for (const double level : {0.0, 100.0, 255.0, 65535.0}) {

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Panels and tubes among discs, by a camera that leans.
+/// Panels and tubes among discs, in images of a tilted camera.
 #include <algorithm>
 #include <utility>
 
@@ -16,7 +16,7 @@ constexpr std::size_t kStep = 11;  // of 144 captures, through all yaws
 
 bool is_panel_or_tube(int lamp) { return lamp <= 4; }
 
-TEST(Panels, AreFoundByTheirFourEdges) {
+TEST(FitRectangle, FindsPanelsAndTubesByTheirEdges) {
   const Score score = Captures("panels", "check").score(kStep, is_panel_or_tube);
   EXPECT_EQ(score.wrong, 0);
   EXPECT_GE(score.lamps, 50);
@@ -26,7 +26,7 @@ TEST(Panels, AreFoundByTheirFourEdges) {
   EXPECT_LT(score.chi_square / score.lamps, 1.5);
 }
 
-TEST(Panels, AreFoundWithoutATilt) {
+TEST(FitRectangle, FindsPanelsAndTubesWithUnknownTilt) {
   const Captures captures("panels", "check");
   DetectorCamera camera = detector_camera(captures.calibration());
   camera.level_from_camera.setIdentity();
@@ -40,7 +40,7 @@ TEST(Panels, AreFoundWithoutATilt) {
   EXPECT_LT(score.chi_square / score.lamps, 1.5);
 }
 
-TEST(Panels, LeaveDiscsAsTheyAre) {
+TEST(FitRectangle, DoesNotChangeDiscs) {
   const Captures captures("panels", "check");
   LampMap discs = captures.lamps();
   for (Lamp& lamp : discs.lamps) {
@@ -65,7 +65,7 @@ TEST(Panels, LeaveDiscsAsTheyAre) {
   EXPECT_GT(compared, 8);
 }
 
-TEST(Panels, AreNoLampsOfAnotherShape) {
+TEST(LightDetector, RejectsPanelsWithWrongAspectRatio) {
   const Captures captures("panels", "check");
   LampMap swapped = captures.lamps();
   for (Lamp& lamp : swapped.lamps) {
@@ -84,7 +84,7 @@ TEST(Panels, AreNoLampsOfAnotherShape) {
   EXPECT_GT(refused, 6);
 }
 
-TEST(Panels, AreFoundWithoutALensByWhatTheirBowsTellOfIt) {
+TEST(FitRectangle, CorrectsCenterOfPanelsByEdgeCurvatureWithoutLens) {
   const Captures captures("panels", "check");
   const LightDetector detector(captures.lamps(), {Readout::rows, 3e-5, std::nullopt});
   double squares = 0;
@@ -111,7 +111,7 @@ TEST(Panels, AreFoundWithoutALensByWhatTheirBowsTellOfIt) {
 
 Scene panels_scene() { return read_scene(VLP_SOURCE_DIR "/datasets/panels/scene.yaml"); }
 
-TEST(Panels, LeaveSmallDiscsBesideThemDiscs) {
+TEST(FitRectangle, DoesNotMatchSmallDiscs) {
   Scene scene = panels_scene();
   for (SceneLamp& lamp : scene.lamps) {
     if (lamp.glow.shape.kind == ShapeKind::rectangle) continue;
@@ -127,14 +127,14 @@ TEST(Panels, LeaveSmallDiscsBesideThemDiscs) {
   EXPECT_LT(score.chi_square / score.lamps, 1.5);
 }
 
-/// A bar along y, at 2.2 m, between camera and ceiling.
+/// Returns a bar along y, at 2.2 m, between camera and ceiling.
 Panel bar(double x_m, double width_m) {
   return {{x_m, -1.5, 2.2}, {width_m, 0, 0}, {0, 3, 0}, 1e6};
 }
 
-TEST(Panels, HiddenInPartAreAsSureAsTheyState) {
+TEST(FitRectangle, SigmaCoversErrorsOfPartlyHiddenPanels) {
   Scene scene = panels_scene();
-  // Along edges of panels and across a tube's end: what is left of them is a rectangle, too.
+  // Along edges of panels and across a tube's end: the visible part is also a rectangle.
   scene.clutter.occluders = {bar(-1.2, 0.08), bar(0.6, 0.3)};
   const Captures captures(std::move(scene), "check");
   int found = 0, far = 0;
@@ -147,7 +147,7 @@ TEST(Panels, HiddenInPartAreAsSureAsTheyState) {
                                      [&](const TrueLamp& one) { return one.id == light.lamp; });
       ASSERT_NE(lamp, truth.end());
       const double off_px = (light.pixel - lamp->pixel).norm();
-      // A tube of 20 px width does not show that less than 3 px of its end are hidden.
+      // For a tube of 20 px width, less than 3 px of hidden end are not detectable.
       if (off_px > 3) {
         EXPECT_LT(off_px, 3 * light.sigma_px) << "lamp " << lamp->id << " in image " << i;
         ++far;
@@ -159,7 +159,7 @@ TEST(Panels, HiddenInPartAreAsSureAsTheyState) {
   EXPECT_GT(far, 5) << "there is something to state";
 }
 
-TEST(Panels, CutByTheImagesEdgeAreNoLamps) {
+TEST(LightDetector, RejectsPanelsCutByImageBorder) {
   const Captures captures("panels", "check");
   int cut = 0;
   for (std::size_t i = 0; i < captures.size(); i += 5) {
@@ -177,7 +177,7 @@ TEST(Panels, CutByTheImagesEdgeAreNoLamps) {
   EXPECT_GT(cut, 10);
 }
 
-TEST(Panels, AreNotTheirReflections) {
+TEST(LightDetector, RejectsReflectionsOfPanels) {
   Scene scene = panels_scene();
   for (const std::size_t lamp : {1U, 2U}) {
     scene.clutter.reflections.push_back({scene.lamps[lamp].glow, lamp});
@@ -192,7 +192,7 @@ TEST(Panels, AreNotTheirReflections) {
   EXPECT_LT(score.rms_px(), 0.15);
 }
 
-TEST(Panels, GiveFixes) {
+TEST(Positioner, ComputesFixFromPanels) {
   const Captures captures("panels", "check");
   const Positioner positioner(captures.lamps(), captures.calibration());
   int fixes = 0;

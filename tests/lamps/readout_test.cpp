@@ -20,7 +20,7 @@ std::optional<Readout> found_in(const cv::Mat& image) {
   return find_readout(1, [&](std::size_t) { return image_view(image); });
 }
 
-TEST(Readout, IsFoundInRenderedImages) {
+TEST(FindReadout, ReturnsReadoutOfRenderedImages) {
   for (const char* scene : {"paper-rig", "paper-rig-faulty", "clutter"}) {
     EXPECT_EQ(found_in(sample(scene)), Readout::rows) << scene;
     EXPECT_EQ(found_in(sample(scene).t()), Readout::columns) << scene;
@@ -29,13 +29,13 @@ TEST(Readout, IsFoundInRenderedImages) {
   EXPECT_EQ(found_in(sample("wide").t()), Readout::rows);
 }
 
-TEST(Readout, IsNotFoundWhereThereAreNoLamps) {
+TEST(FindReadout, ReturnsNulloptWithoutLamps) {
   EXPECT_FALSE(found_in(cv::Mat(120, 160, CV_8U, cv::Scalar(30))));
   EXPECT_FALSE(found_in({}));
   EXPECT_FALSE(find_readout(0, [](std::size_t) { return ImageView(); }));
 }
 
-TEST(Readout, IsFoundInTheFirstImagesThatShowIt) {
+TEST(FindReadout, StopsAfterFirstConclusiveImages) {
   const cv::Mat lamps = sample("paper-rig"), dark(600, 800, CV_8U, cv::Scalar(2));
   const std::array images{cv::Mat(), dark, lamps, lamps, cv::Mat()};
   std::size_t asked = 0;
@@ -45,7 +45,7 @@ TEST(Readout, IsFoundInTheFirstImagesThatShowIt) {
   EXPECT_LE(asked, 4);
 }
 
-TEST(Readout, IsNotDecidedByOneDoubtfulLight) {
+TEST(ReadoutEvidence, ReturnsNulloptWhenEvidenceIsWeakOrContradictory) {
   EXPECT_FALSE((ReadoutEvidence{0.9, 0}).readout());
   EXPECT_FALSE((ReadoutEvidence{3, 2}).readout());
   EXPECT_EQ((ReadoutEvidence{3, 0.5}).readout(), Readout::rows);

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// The detector on photographs of real lamps, when they are there.
+/// Detector on photographs of real lamps, if they are available.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -43,7 +43,7 @@ cv::Mat encoded(const cv::Mat& image, const char* ending, int quality = -1) {
 }
 
 /// Five recessed downlights in five photographs.
-class RealDownlights : public testing::Test {
+class LightDetectorOnRealDownlights : public testing::Test {
  protected:
   const fs::path data = real_data("downlights");
 
@@ -54,7 +54,7 @@ class RealDownlights : public testing::Test {
   fs::path image(int number) const { return data / ("a0" + std::to_string(number) + ".jpg"); }
 };
 
-/// Lamps found, and of those that are not where they are expected, in all photographs.
+/// Number of lamps found in all photographs, and number of those at wrong positions.
 struct Identified {
   int lamps = 0, wrong = 0;
 };
@@ -73,7 +73,8 @@ Identified identified(const fs::path& data, const Picture& picture) {
     if (!found.contains(image)) found[image] = lamps_in(detector, picture(data / image));
     const auto lamp = found[image].find(table.integer(row, lamp_column));
     if (lamp == found[image].end()) continue;
-    // What is expected is good to 20 px or so, and of what is lit; its middle is not the rim's.
+    // Expected positions are those of the lit area, accurate to about 20 px; its middle is not that
+    // of the rim.
     const Eigen::Vector2d expected(table.number(row, u_column), table.number(row, v_column));
     const double apart_px = (lamp->second.pixel - expected).norm();
     ++result.lamps;
@@ -82,13 +83,13 @@ Identified identified(const fs::path& data, const Picture& picture) {
   return result;
 }
 
-TEST_F(RealDownlights, AreIdentified) {
+TEST_F(LightDetectorOnRealDownlights, IdentifiesAllLamps) {
   const Identified found = identified(data, [](const fs::path& file) { return read_image(file); });
   EXPECT_EQ(found.wrong, 0);
   EXPECT_EQ(found.lamps, 25);
 }
 
-TEST_F(RealDownlights, AreIdentifiedInEachFormat) {
+TEST_F(LightDetectorOnRealDownlights, IdentifiesAllLampsInEachImageFormat) {
   for (const auto& [ending, quality] :
        {std::pair(".png", -1), {".jpg", 100}, {".jpg", 90}, {".jpg", 80}}) {
     const Identified found = identified(data, [&, &e = ending, &q = quality](const fs::path& file) {
@@ -100,7 +101,7 @@ TEST_F(RealDownlights, AreIdentifiedInEachFormat) {
   }
 }
 
-TEST_F(RealDownlights, AreIdentifiedAtTwiceTheBrightness) {
+TEST_F(LightDetectorOnRealDownlights, IdentifiesLampsAtTwiceTheBrightness) {
   const Identified found = identified(data, [](const fs::path& file) {
     cv::Mat brighter;
     cv::imread(file.string(), cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION)
@@ -111,7 +112,7 @@ TEST_F(RealDownlights, AreIdentifiedAtTwiceTheBrightness) {
   EXPECT_GE(found.lamps, 22);  // measured: 23
 }
 
-TEST_F(RealDownlights, TellTheRowTime) {
+TEST_F(LightDetectorOnRealDownlights, YieldsRowTime) {
   const LightDetector detector(map(), {Readout::columns, {}, {}});
   std::vector<MeasuredPeriod> periods;
   for (int number = 1; number <= 5; ++number) {
@@ -124,8 +125,8 @@ TEST_F(RealDownlights, TellTheRowTime) {
   EXPECT_NEAR(result.found->row_time_s / 15.10e-6, 1, 0.002);
 }
 
-/// The same lamps from the side: a bright core near one edge and crescents of the rim.
-TEST(RealDownlightsFromTheSide, AreIdentified) {
+/// Same lamps from the side: a bright core near one edge, and crescents of the rim.
+TEST(LightDetectorOnRealObliqueDownlights, IdentifiesAllLamps) {
   const fs::path data = real_data("downlights-oblique");
   if (data.empty()) GTEST_SKIP() << "no real captures here";
   const Identified found = identified(data, [](const fs::path& file) { return read_image(file); });
@@ -133,8 +134,8 @@ TEST(RealDownlightsFromTheSide, AreIdentified) {
   EXPECT_EQ(found.lamps, 12);
 }
 
-/// Photographs along rows and along columns, in which no read-out is stated.
-TEST(RealGlows, AreIdentifiedWithTheReadoutOfEachPhotograph) {
+/// Photographs with readout along rows and along columns, without a given readout direction.
+TEST(DetectWithEitherReadout, FindsReadoutOfRealGlows) {
   const fs::path data = real_data("luxapose");
   if (data.empty()) GTEST_SKIP() << "no real captures here";
   const LightDetector by_rows(read_lamp_map(data / "lamps.yaml"), {Readout::rows, 1 / 47540.0, {}});
@@ -154,8 +155,8 @@ TEST(RealGlows, AreIdentifiedWithTheReadoutOfEachPhotograph) {
   }
 }
 
-/// Glowing bulbs, from a phone's own JPEG files and the same pictures in other formats.
-TEST(RealGlows, AreTheSameInEachFormat) {
+/// Glowing bulbs, in the original JPEG files of a phone and in the same images in other formats.
+TEST(LightDetectorOnRealGlows, ReturnsSameCentersInEachImageFormat) {
   const fs::path data = real_data("luxapose");
   if (data.empty()) GTEST_SKIP() << "no real captures here";
   const LampMap map = read_lamp_map(data / "lamps.yaml");

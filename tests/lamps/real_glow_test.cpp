@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Real bulbs that glow, in 33 Mpx of a phone that lay on the floor.
+/// Real glowing bulbs, in images of 33 Mpx of a phone on the floor.
 #include <gtest/gtest.h>
 
 #include <map>
@@ -51,7 +51,7 @@ Seen seen_in(const std::filesystem::path& folder, const char* name, Readout read
   return seen;
 }
 
-TEST(RealGlow, OfFiveLampsIsIdentifiedAndMakesAFix) {
+TEST(PositionerOnRealGlows, ComputesFixFromFiveLamps) {
   const auto folder = real_data("luxapose");
   if (folder.empty()) GTEST_SKIP() << "no real captures here";
   const Seen seen = seen_in(folder, "x_0_y_1.27.jpg", Readout::rows);
@@ -69,14 +69,15 @@ TEST(RealGlow, OfFiveLampsIsIdentifiedAndMakesAFix) {
   EXPECT_LT(fix.residual_px * distance_m / kFocal_px, 2e-3);
 }
 
-/// Lamps that all count alike, for what others make of them, too.
+/// Returns detections with equal weights, as OpenCV uses them.
 std::vector<Detection> alike(const Seen& seen) {
   std::vector<Detection> detections;
   for (const auto& [id, light] : seen.lamps) detections.push_back({id, light.pixel, {}});
   return detections;
 }
 
-/// Where OpenCV's PnP of coplanar points, refined, has the camera: the solutions below the lamps.
+/// Returns the camera positions of OpenCV's PnP for coplanar points, refined: the solutions below
+/// the lamps.
 std::vector<Eigen::Vector3d> opencv_places(const Seen& seen, const std::vector<Detection>& lamps,
                                            int method) {
   const auto& k = seen.calibration.camera.intrinsics;
@@ -109,9 +110,9 @@ std::vector<Eigen::Vector3d> opencv_places(const Seen& seen, const std::vector<D
   return places_m;
 }
 
-/// With roll and pitch free, as of a phone in a hand: within 1 % of the distance of what OpenCV
-/// makes of the same points. Five lamps tell all six.
-TEST(RealGlow, OfFiveLampsLeansAsOpenCvSaysThatItDoes) {
+/// Estimates roll and pitch, as for a hand-held phone. The position agrees with that of OpenCV for
+/// the same points within 1 % of the distance. Five lamps determine all six parameters.
+TEST(PositionerOnRealGlows, MatchesOpenCvPoseOfFiveLamps) {
   const auto folder = real_data("luxapose");
   if (folder.empty()) GTEST_SKIP() << "no real captures here";
   const Seen seen = seen_in(folder, "x_0_y_1.27.jpg", Readout::rows);
@@ -130,8 +131,8 @@ TEST(RealGlow, OfFiveLampsLeansAsOpenCvSaysThatItDoes) {
   EXPECT_LT(off_m, 0.01 * 2.45);
 }
 
-/// Three lamps leave several leans; a height over the floor tells them apart.
-TEST(RealGlow, OfThreeLampsLeansAsOneOfOpenCvsSolutions) {
+/// Three lamps allow several tilts; the height above the floor resolves the ambiguity.
+TEST(PositionerOnRealGlows, MatchesOneOpenCvSolutionOfThreeLamps) {
   const auto folder = real_data("luxapose");
   if (folder.empty()) GTEST_SKIP() << "no real captures here";
   const Seen seen = seen_in(folder, "2014-02-27--18-15-03-62.jpg", Readout::columns);
@@ -155,7 +156,7 @@ TEST(RealGlow, OfThreeLampsLeansAsOneOfOpenCvsSolutions) {
   }
 }
 
-TEST(RealGlow, IsIdentifiedWhenColumnsAreRead) {
+TEST(LightDetectorOnRealGlows, IdentifiesLampsWithColumnReadout) {
   const auto folder = real_data("luxapose");
   if (folder.empty()) GTEST_SKIP() << "no real captures here";
   const Seen seen = seen_in(folder, "2014-02-27--18-15-03-62.jpg", Readout::columns);

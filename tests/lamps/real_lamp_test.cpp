@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// A real lamp, dim and with a hole, as a rolling-shutter camera saw it.
+/// Real lamp, dim and with a hole, in an image of a rolling-shutter camera.
 #include <gtest/gtest.h>
 
 #include "frontend/image_file.h"
@@ -11,7 +11,7 @@
 namespace vlp {
 namespace {
 
-TEST(RealLamp, HasItsOutlineAndItsStripes) {
+TEST(LightDetectorOnRealLamp, MeasuresPeriodAndRadius) {
   const auto folder = real_data("striped-lamp");
   if (folder.empty()) GTEST_SKIP() << "no real captures here";
   const LightDetector detector({}, {Readout::rows, {}, {}});

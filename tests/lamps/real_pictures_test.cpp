@@ -31,10 +31,10 @@ void expect_no_lamp(const std::filesystem::path& file, Readout readout, double r
   }
 }
 
-TEST(RealPictures, WithoutLampsShowNone) {
+TEST(LightDetectorOnRealImages, ReportsNoLampsInPhotographsWithoutLamps) {
   const auto folder = real_data("apriltag-lattice-phone");
   if (folder.empty()) GTEST_SKIP() << "no real captures here";
-  // Each of them has something that is striped like one of these lamps.
+  // Each image contains an object with stripes like those of one of these lamps.
   for (const auto& [name, readout] : {std::pair("image_10.jpg", Readout::rows),
                                       {"image_4.jpg", Readout::columns},
                                       {"image_9.jpg", Readout::rows}}) {
@@ -42,13 +42,14 @@ TEST(RealPictures, WithoutLampsShowNone) {
   }
 }
 
-TEST(RealPictures, OfABoardShowNoLampWhateverTheRowTime) {
+TEST(LightDetectorOnRealImages, ReportsNoLampsOnBoardsForAnyRowTime) {
   const auto folder = real_data("kalibr-aprilgrid-stereo");
   if (folder.empty()) GTEST_SKIP() << "no real captures here";
   for (const char* camera : {"cam0", "cam1"}) {
     const auto images = list_images(folder / camera);
-    // One of four, for time. Of the others one shows what passes for a lamp along columns, at 8 and
-    // at 12 us: squares and gaps between tags, 2.54 periods in the lines' time.
+    // Uses one image of four, to save time. One of the others has an object that matches a lamp
+    // with column readout, at 8 and at 12 us: squares and gaps between tags, 2.54 periods in phase
+    // along the scanlines.
     for (std::size_t i = 1; i < images.size(); i += 4) {
       for (const Readout readout : {Readout::rows, Readout::columns}) {
         for (const double row_time_s : {5e-6, 8e-6, 20e-6, 50e-6}) {

@@ -1,15 +1,15 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Sources deep in reflectors, seen from 15 to 60 degrees off the vertical: a part of each rim is
+/// Sources deep in reflectors, viewed at 15 to 60 degrees off the vertical: a part of each rim is
 /// below the noise.
 #include "lamps/rendered_captures.h"
 
 namespace vlp {
 namespace {
 
-TEST(RecessedLamps, AreIdentifiedWithTheErrorsThatAreStated) {
-  // Without a rim the centre is that of the lit area, up to a lamp's radius off; lamps are more
-  // than twice as far apart.
+TEST(LightDetector, SigmaMatchesErrorsOfRecessedLamps) {
+  // Without a rim the center is that of the lit area, with an error of up to a lamp's radius. The
+  // distance between lamps is more than twice as large.
   constexpr double max_error_px = 100;
   int lamps = 0, missed = 0, wrong = 0;
   double chi_square = 0;

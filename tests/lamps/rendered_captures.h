@@ -21,20 +21,20 @@
 namespace vlp {
 
 struct Score {
-  /// `wrong` are identified lamps that are farther from their place than Captures::max_error_px, or
-  /// not in view.
+  /// Number of evaluated and missed lamps. `wrong` is the number of identified lamps with an error
+  /// above Captures::max_error_px, or outside the image.
   int lamps = 0, missed = 0, wrong = 0;
   double squares = 0, worst_px = 0, chi_square = 0;
-  /// Of an error to the sigma_px that is stated.
+  /// Maximum ratio of an error to the reported sigma_px.
   double worst_ratio = 0;
-  /// Of those hidden in part.
+  /// Number of partly hidden lamps, and their sum of normalized squared errors.
   int hidden = 0;
   double hidden_chi_square = 0;
 
   double rms_px() const { return std::sqrt(squares / lamps); }
 };
 
-/// Every so many captures of a folder of a scene.
+/// Captures of a folder of a scene, rendered on demand.
 class Captures {
  public:
   explicit Captures(const std::string& scene, const std::string& folder)
@@ -45,7 +45,7 @@ class Captures {
         set_(*std::find_if(scene_.sets.begin(), scene_.sets.end(),
                            [&](const CaptureSet& set) { return set.folder == folder; })) {}
 
-  /// Error of a centre from which on a lamp counts as wrong.
+  /// Error of a center above which a lamp counts as wrong.
   double max_error_px = 5;
 
   LampShot shot(std::size_t index) const { return lamp_shot(scene_, set_, index); }
@@ -63,7 +63,8 @@ class Captures {
   LightDetector detector() const { return {lamps(), detector_camera(calibration())}; }
   std::size_t size() const { return shots_in(set_); }
 
-  /// Of the lamps that count; what is wrong of others counts, too.
+  /// Evaluates every `step`-th capture for the lamps selected by `counts`; wrong identifications
+  /// count for all lamps.
   Score score(
       std::size_t step, const std::function<bool(int)>& counts = [](int) { return true; }) const {
     return score(step, detector(), counts);

@@ -47,7 +47,7 @@ void expect_both(const Touching& touching) {
   EXPECT_EQ(lights.size(), 2U);
 }
 
-TEST(TouchingLamps, AreFoundEach) {
+TEST(LightDetector, SeparatesTouchingLamps) {
   for (const double gap_px : {0.0, 1.0, 2.0}) {
     for (const int degrees : {0, 30, 45, 60, 90, 120, 150, 180, 210, 270}) {
       for (const double radius_ratio : {1.0, 0.8}) {

@@ -18,14 +18,14 @@ namespace {
 
 using testing::HasSubstr;
 
-class Adjust : public testing::Test {
+class VlpAdjust : public testing::Test {
  protected:
   TemporaryFolder folder;
   SyntheticRig rig{synthetic_lamps(), {synthetic_camera(), {}, {}, {}, {}}, {{0, 0, 0}, 0}, {}};
   std::vector<Frame> frames;
   std::string captures = "image,spot,x_m,y_m,z_m,place,place_sd_m\n";
 
-  Adjust() {
+  VlpAdjust() {
     rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.02, 1);
     int spot = 0;
     for (const Eigen::Vector3d& axis_m : {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(0.4, 0.2, 0.2),
@@ -61,7 +61,7 @@ class Adjust : public testing::Test {
   std::string refined() { return "--refine-map " + (folder / "refined.yaml").string(); }
 };
 
-TEST_F(Adjust, RefinesTheMapOfOneRoom) {
+TEST_F(VlpAdjust, RefinesMapOfOneRoom) {
   for (Lamp& lamp : rig.map.lamps) lamp.sd_m = 0.002;
   write_lamp_map(folder / "lamps.yaml", rig.map);
   std::string lamps = TemporaryFolder::content_of(folder / "lamps.yaml");
@@ -75,7 +75,7 @@ TEST_F(Adjust, RefinesTheMapOfOneRoom) {
   EXPECT_EQ(read_lamp_map(folder / "refined.yaml").lamps.size(), rig.map.lamps.size());
 }
 
-TEST_F(Adjust, CalibratesRefinesTheMapAndTellsFixesWhatTheyAreWorth) {
+TEST_F(VlpAdjust, RefinesMapAndReportsUncertaintyOfFixes) {
   const LampMap truth = rig.map;
   Random random(1);
   for (Lamp& lamp : rig.map.lamps) {
@@ -110,7 +110,7 @@ TEST_F(Adjust, CalibratesRefinesTheMapAndTellsFixesWhatTheyAreWorth) {
 }
 
 /// Turns that do not stop for their captures: 60 degrees a second, 9 degrees an image.
-TEST_F(Adjust, TakesTurnsThatDoNotStop) {
+TEST_F(VlpAdjust, AcceptsContinuousRotation) {
   const double rate_rad_per_s = 1;
   BodyRig body{rig.map, rolling_calibration(), {}, {}};
   body.calibration.rotation_center = rig.calibration.rotation_center;
@@ -143,14 +143,14 @@ TEST_F(Adjust, TakesTurnsThatDoNotStop) {
   EXPECT_THAT(refused.errors, HasSubstr("a camera that moves needs row_time_s and readout"));
 }
 
-TEST_F(Adjust, WantsToKnowWhatTheSurveyIsWorth) {
+TEST_F(VlpAdjust, RejectsLampWithoutStandardDeviation) {
   const ProgramResult result = adjust("");
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.errors, HasSubstr("lamps.yaml: lamp 1 has no sd_m"));
   EXPECT_EQ(adjust("--map-sd-m 0.001").exit_code, 0);
 }
 
-TEST_F(Adjust, EstimatesALensThatStatesNothing) {
+TEST_F(VlpAdjust, EstimatesLensWithoutCovariance) {
   const std::vector<double> truth = rig.calibration.camera.intrinsics;
   rig.calibration.camera.intrinsics[0] *= 0.97;
   EXPECT_THAT(adjust("--map-sd-m 0.001").output,
@@ -161,7 +161,7 @@ TEST_F(Adjust, EstimatesALensThatStatesNothing) {
   EXPECT_NEAR(read_calibration(folder / "adjusted.yaml").camera.focal_px().x() / truth[0], 1, 1e-3);
 }
 
-TEST_F(Adjust, RefusesAStatementOfALensThatMakesItsOwn) {
+TEST_F(VlpAdjust, RejectsLensSdForLensWithCovariance) {
   rig.calibration.intrinsics_report.emplace();
   rig.calibration.intrinsics_report->covariance = stated_lens_covariance(rig.calibration.camera, 1);
   const ProgramResult result = adjust("--map-sd-m 0.001 --lens-sd-px 10");
@@ -169,14 +169,14 @@ TEST_F(Adjust, RefusesAStatementOfALensThatMakesItsOwn) {
   EXPECT_THAT(result.errors, HasSubstr("camera.yaml: states the covariance of its lens"));
 }
 
-TEST_F(Adjust, NamesAMovedLamp) {
+TEST_F(VlpAdjust, WarnsOfMovedLamp) {
   rig.map.lamps[1].position_m.y() += 0.03;
   const ProgramResult result = adjust("--map-sd-m 0.001");
   ASSERT_EQ(result.exit_code, 0) << result.errors;
   EXPECT_THAT(result.errors, HasSubstr("lamp 2 hangs 30 mm from where the map has it (x"));
 }
 
-TEST_F(Adjust, RefusesACalibrationThatIsAdjustedAlready) {
+TEST_F(VlpAdjust, RejectsAdjustedCalibration) {
   ASSERT_EQ(adjust("--map-sd-m 0.001").exit_code, 0);
   rig.calibration = read_calibration(folder / "adjusted.yaml");
   const ProgramResult result = adjust("--map-sd-m 0.001");
@@ -184,7 +184,7 @@ TEST_F(Adjust, RefusesACalibrationThatIsAdjustedAlready) {
   EXPECT_THAT(result.errors, HasSubstr("is adjusted already"));
 }
 
-TEST_F(Adjust, SaysWhatWouldDetermineIt) {
+TEST_F(VlpAdjust, ReportsRemedyWhenUndetermined) {
   frames.resize(1);
   frames[0].detections.resize(2);
   captures = "image,spot\n0,s\n";

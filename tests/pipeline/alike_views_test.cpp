@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// vlp-intrinsics on views that tell nothing new: they make no lens good.
+/// vlp-intrinsics on similar views: they add no information and must not make a gate pass.
 #include <gmock/gmock.h>
 
 #include <filesystem>
@@ -21,9 +21,9 @@ using testing::Not;
 
 const std::string kSample = kRig + "/sample-boards/0000.png";
 
-class AlikeViews : public IntrinsicsProgram {
+class VlpIntrinsicsSimilarViews : public VlpIntrinsics {
  protected:
-  AlikeViews() { fs::create_directory(images()); }
+  VlpIntrinsicsSimilarViews() { fs::create_directory(images()); }
   fs::path images() const { return folder / "images"; }
 
   /// Views of the rig, all over the image.
@@ -45,7 +45,7 @@ class AlikeViews : public IntrinsicsProgram {
 };
 
 /// The board far away in a corner of the image, by a hand that trembles.
-TEST_F(AlikeViews, InOneCornerCountAsOne) {
+TEST_F(VlpIntrinsicsSimilarViews, CountAsOneInOneImageCorner) {
   constexpr int count = 30;
   constexpr double size = 0.5, reach_px = 3, noise_dn = 2;
   const cv::Mat sample = cv::imread(kSample, cv::IMREAD_GRAYSCALE);
@@ -69,7 +69,7 @@ TEST_F(AlikeViews, InOneCornerCountAsOne) {
   EXPECT_THAT(result.errors, HasSubstr("1 views with the board: fewer than three"));
 }
 
-TEST_F(AlikeViews, SavedAgainAsJpegCountAsOne) {
+TEST_F(VlpIntrinsicsSimilarViews, CountAsOneWhenSavedAgainAsJpeg) {
   fs::copy(kSample, images() / "0.png");
   cv::imwrite((images() / "1.jpg").string(), cv::imread(kSample, cv::IMREAD_GRAYSCALE),
               {cv::IMWRITE_JPEG_QUALITY, 85});
@@ -80,7 +80,7 @@ TEST_F(AlikeViews, SavedAgainAsJpegCountAsOne) {
   EXPECT_THAT(result.errors, HasSubstr("1 views with the board: fewer than three"));
 }
 
-TEST_F(AlikeViews, LeaveAFailureAFailureWhenEveryFileIsCopied) {
+TEST_F(VlpIntrinsicsSimilarViews, DoNotPassGateByCopiedFiles) {
   render(5);
   const auto once = calibrate_them();
   EXPECT_EQ(once.exit_code, 1);

@@ -13,9 +13,9 @@ namespace fs = std::filesystem;
 using testing::HasSubstr;
 
 /// Four sessions render in about 0.2 s: two captures of a board, four of lamps.
-class SimulateArchive : public SmallSimulation {
+class VlpSimulateArchive : public SmallSimulation {
  protected:
-  SimulateArchive() {
+  VlpSimulateArchive() {
     change_scene("captures:",
                  "archive: {sessions_per_camera: 2, focal_share: 0.01, center_px: 1, "
                  "distortion_share: 0.05, tilt_deg: 1, lever_arm_m: 0.003, map_error_m: 0.001, "
@@ -31,7 +31,7 @@ class SimulateArchive : public SmallSimulation {
   }
 };
 
-TEST_F(SimulateArchive, GrowsWithoutAChangeToWhatIsThere) {
+TEST_F(VlpSimulateArchive, KeepsExistingSessionsWhenExtended) {
   const Files four = archive(4), ten = archive(10);
   for (const auto& [name, content] : four) {
     if (name != "archive.csv") {
@@ -44,7 +44,7 @@ TEST_F(SimulateArchive, GrowsWithoutAChangeToWhatIsThere) {
   EXPECT_TRUE(archive(10, "--threads 3") == ten);
 }
 
-TEST_F(SimulateArchive, GoesOnWhereItWasInterrupted) {
+TEST_F(VlpSimulateArchive, ResumesAfterInterruption) {
   const Files expected = archive(10);
   // As a run leaves it that is killed after it damaged session 6 and before that was in its place.
   for (const char* session : {"camera-00003/session-02", "camera-00001/session-01"}) {
@@ -59,7 +59,7 @@ TEST_F(SimulateArchive, GoesOnWhereItWasInterrupted) {
   EXPECT_TRUE(files_below(output) == expected);
 }
 
-TEST_F(SimulateArchive, DamagesWhatTheTableSays) {
+TEST_F(VlpSimulateArchive, DamagesSessionsAsListedInTable) {
   const Files files = archive(32);
   const CsvTable table(output / "archive.csv");
   ASSERT_EQ(table.rows(), 32U);
@@ -90,7 +90,7 @@ TEST_F(SimulateArchive, DamagesWhatTheTableSays) {
   EXPECT_EQ(kinds.size(), 5U) << "four kinds and none";
 }
 
-TEST_F(SimulateArchive, RefusesASceneWithoutSpreadsAndFoldersAsked) {
+TEST_F(VlpSimulateArchive, RejectsSceneWithoutArchiveAndOptionOnly) {
   EXPECT_THAT(simulate("--archive 2 --only boards").errors, HasSubstr("--only"));
   change_scene("archive: {", "# {");
   const auto result = simulate("--archive 2");

@@ -25,9 +25,9 @@ struct Bad {
 
 void PrintTo(const Bad& bad, std::ostream* out) { *out << bad.name; }
 
-class BadInput : public testing::TestWithParam<Bad> {};
+class BadInputFile : public testing::TestWithParam<Bad> {};
 
-TEST_P(BadInput, EndsWithOneLineAndWritesNothing) {
+TEST_P(BadInputFile, IsReportedInOneLineWithoutOutput) {
   const TemporaryFolder folder;
   for (const std::string name : {"lamps.yaml", "calibration.yaml", "detections.csv"}) {
     std::string content = TemporaryFolder::content_of(kExample + name);
@@ -56,7 +56,7 @@ TEST_P(BadInput, EndsWithOneLineAndWritesNothing) {
 }
 
 INSTANTIATE_TEST_SUITE_P(
-    Files, BadInput,
+    Files, BadInputFile,
     testing::Values(
         Bad{"MissingKey", "lamps.yaml", "position_m: [-0.6, -0.35, 1.6], ", "", ":3: lamps[0]: "},
         Bad{"UnknownKey", "lamps.yaml", "diameter_m", "diameter_mm", ":3: lamps[0]: "},
@@ -74,14 +74,14 @@ INSTANTIATE_TEST_SUITE_P(
             ":3: "}),
     [](const auto& instance) { return instance.param.name; });
 
-TEST(BadInputFiles, AreNamedWhenTheyAreNotThere) {
+TEST(VlpLocateInput, NamesMissingFile) {
   const auto result =
       run_program("vlp-locate no.csv --lamps no.yaml --calibration no.yaml -o a.csv");
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.errors, HasSubstr("no.yaml: cannot be opened: No such file or directory"));
 }
 
-TEST(BadOutput, IsNamed) {
+TEST(VlpLocateOutput, NamesFileThatCannotBeWritten) {
   const auto result = run_program("vlp-locate " + kExample + "detections.csv --lamps " + kExample +
                                   "lamps.yaml --calibration " + kExample +
                                   "calibration.yaml -o /no/such/folder/fixes.csv");
@@ -89,7 +89,7 @@ TEST(BadOutput, IsNamed) {
   EXPECT_THAT(result.errors, HasSubstr("/no/such/folder/fixes.csv: cannot be written"));
 }
 
-TEST(BadUsage, IsToldInOneLine) {
+TEST(VlpLocateUsage, ReportsErrorInOneLine) {
   for (const std::string options : {"", "--nonsense", "a b c", "--correction some"}) {
     const auto result = run_program("vlp-locate " + options);
     EXPECT_EQ(result.exit_code, 2) << options;

@@ -18,12 +18,12 @@ namespace {
 namespace fs = std::filesystem;
 using testing::HasSubstr;
 
-class BoardProgram : public testing::Test {
+class VlpBoard : public testing::Test {
  protected:
   const TemporaryFolder folder;
 };
 
-TEST_F(BoardProgram, MakesWhatItSays) {
+TEST_F(VlpBoard, WritesPdfAsPrinted) {
   const std::string pdf = (folder / "board.pdf").string();
   ASSERT_EQ(run_program("vlp-board --kalibr --tag-mm 30 --paper A3 -o " + pdf).exit_code, 0);
   const std::string bytes = TemporaryFolder::content_of(pdf);
@@ -36,7 +36,7 @@ TEST_F(BoardProgram, MakesWhatItSays) {
   EXPECT_EQ(TemporaryFolder::content_of(pdf), bytes);
 }
 
-TEST_F(BoardProgram, IsTrueToScale) {
+TEST_F(VlpBoard, PrintsTagsToScale) {
   if (run_program("command -v pdftoppm").exit_code != 0) GTEST_SKIP() << "no pdftoppm here";
   const std::string pdf = (folder / "board.pdf").string();
   ASSERT_EQ(run_program("vlp-board -o " + pdf).exit_code, 0);
@@ -54,7 +54,7 @@ TEST_F(BoardProgram, IsTrueToScale) {
   EXPECT_NEAR(width_px / px_per_mm / 1000, tag_field_m(board).x(), 1e-4);
 }
 
-TEST_F(BoardProgram, RefusesWhatDoesNotFit) {
+TEST_F(VlpBoard, RejectsBoardLargerThanPage) {
   const std::string output = " -o " + (folder / "board.pdf").string();
   const auto large = run_program("vlp-board --tag-mm 50" + output);
   EXPECT_EQ(large.exit_code, 2);

@@ -30,7 +30,7 @@ using testing::Not;
 
 const std::string kDatasets = VLP_SOURCE_DIR "/datasets/";
 
-class Calibrate : public testing::Test {
+class VlpCalibrate : public testing::Test {
  protected:
   void SetUp() override {
 #ifdef __SANITIZE_ADDRESS__
@@ -67,10 +67,11 @@ class Calibrate : public testing::Test {
   const TemporaryFolder folder;
 };
 
-class Accuracy : public Calibrate, public testing::WithParamInterface<const char*> {};
+class VlpCalibrateAccuracy : public VlpCalibrate,
+                             public testing::WithParamInterface<const char*> {};
 
 /// The gates are 1.5 times what was measured when they were written.
-TEST_P(Accuracy, KeepsToItsGates) {
+TEST_P(VlpCalibrateAccuracy, PassesGates) {
   const std::string rig = kDatasets + GetParam();
   render(rig + "/scene.yaml", "boards,rotation,dispersion,check");
   fs::copy(rig + "/gates.yaml", folder / "a session/gates.yaml");
@@ -80,10 +81,11 @@ TEST_P(Accuracy, KeepsToItsGates) {
   EXPECT_THAT(result("report.html"), HasSubstr("PASS"));
 }
 
-INSTANTIATE_TEST_SUITE_P(Rigs, Accuracy, testing::Values("paper-rig", "paper-rig-faulty"));
+INSTANTIATE_TEST_SUITE_P(Rigs, VlpCalibrateAccuracy,
+                         testing::Values("paper-rig", "paper-rig-faulty"));
 
 /// The fixes at the dispersion's place reject different lamps, so that no offset explains them.
-TEST_F(Calibrate, NamesAMovedLampInEveryStep) {
+TEST_F(VlpCalibrate, NamesMovedLampInEveryStep) {
   render(kDatasets + "paper-rig/scene.yaml", "rotation,dispersion,check");
   Calibration known;
   known.camera = read_calibration(folder / "a session/true_calibration.yaml").camera;
@@ -108,7 +110,7 @@ TEST_F(Calibrate, NamesAMovedLampInEveryStep) {
 }
 
 // From boards that are seen beyond 90 degrees off the axis.
-TEST_F(Calibrate, FindsALensOf190DegreesAndItsAxis) {
+TEST_F(VlpCalibrate, Calibrates190DegreeLens) {
   std::string scene = TemporaryFolder::content_of(kDatasets + "fisheye/scene.yaml");
   for (const auto& [what, by] : std::vector<std::pair<std::string, std::string>>{
            {"turn: \\{count: 40, jitter_deg: 4\\}", "turn: {count: 12, jitter_deg: 4}"},
@@ -146,10 +148,10 @@ TEST_F(Calibrate, FindsALensOf190DegreesAndItsAxis) {
 }
 
 /// Small images, few captures; a line of the paper's.
-class SmallSession : public Calibrate {
+class VlpCalibrateSmallSession : public VlpCalibrate {
  protected:
   void SetUp() override {
-    Calibrate::SetUp();
+    VlpCalibrate::SetUp();
     if (IsSkipped()) return;
     const std::string scene =
         TemporaryFolder::content_of(kDatasets + "archive/scene.yaml") +
@@ -163,7 +165,7 @@ class SmallSession : public Calibrate {
   }
 };
 
-TEST_F(Calibrate, RunsOnlyWhatIsNotAsBefore) {
+TEST_F(VlpCalibrate, RunsOnlyChangedSteps) {
   // Stripes enough to find the row time; fewer check captures than the scene has.
   std::string scene = TemporaryFolder::content_of(kDatasets + "paper-rig/scene.yaml");
   const std::string grid = "columns: 6, rows: 6}\n    heights_m: [0, 0.1, 0.2, 0.3]";
@@ -197,7 +199,7 @@ TEST_F(Calibrate, RunsOnlyWhatIsNotAsBefore) {
   EXPECT_THAT(result("evaluation.json"), HasSubstr("\"missing\""));
 }
 
-TEST_F(SmallSession, EndsWithTheVerdictOfTheGatesEachTime) {
+TEST_F(VlpCalibrateSmallSession, RepeatsVerdictOfGates) {
   folder.file("a session/gates.yaml",
               "format: vlp-gates/1\ngates:\n  mean_mm: 1e-6\n  tilt_deg: 1e-6\n");
   for (int run = 0; run < 2; ++run) {
@@ -222,7 +224,7 @@ TEST_F(SmallSession, EndsWithTheVerdictOfTheGatesEachTime) {
   EXPECT_THAT(refused.errors, HasSubstr("gates.yaml:3: gates.coverage: should be a share"));
 }
 
-TEST_F(SmallSession, IsTheSameInAProcessThatIsSplitOff) {
+TEST_F(VlpCalibrateSmallSession, GivesSameResultInForkedProcess) {
   ASSERT_EQ(calibrate("--no-report --row-time-s 3e-5 --readout rows").exit_code, 0);
   const nlohmann::json line{{"arguments",
                              {path("a session"), "-o", path("each"), "--no-report", "--row-time-s",
@@ -248,7 +250,7 @@ TEST_F(SmallSession, IsTheSameInAProcessThatIsSplitOff) {
   }
 }
 
-TEST_F(SmallSession, FollowsWhatIsInItsFolder) {
+TEST_F(VlpCalibrateSmallSession, FollowsChangesOfSessionFolder) {
   ASSERT_EQ(calibrate().exit_code, 0);
   const std::string calibration = result("calibration.yaml");
   // Without the dispersion nothing of it is left, and with it again all is as it was.
@@ -291,7 +293,7 @@ TEST_F(SmallSession, FollowsWhatIsInItsFolder) {
   EXPECT_FALSE(fs::exists(folder / "results/report.html"));
 }
 
-TEST_F(SmallSession, TakesTheLensModelThatItsBoardsCallFor) {
+TEST_F(VlpCalibrateSmallSession, SelectsLensModel) {
   const std::string chosen = "--row-time-s 3e-5 --readout rows --lens auto";
   const auto run = calibrate(chosen);
   EXPECT_LE(run.exit_code, 1) << run.errors;
@@ -302,7 +304,7 @@ TEST_F(SmallSession, TakesTheLensModelThatItsBoardsCallFor) {
   EXPECT_THAT(calibrate().output, Not(HasSubstr("lens          as before")));
 }
 
-TEST_F(SmallSession, FailsWithTheLensWhoseGatesAreNotMet) {
+TEST_F(VlpCalibrateSmallSession, FailsWhenGateOfLensFails) {
   std::size_t views = 0;
   for (const auto& image : fs::directory_iterator(folder / "a session/boards")) {
     if (image.path().extension() == ".png" && ++views > 5) fs::remove(image.path());
@@ -313,7 +315,7 @@ TEST_F(SmallSession, FailsWithTheLensWhoseGatesAreNotMet) {
   EXPECT_THAT(result("report.html"), HasSubstr("FAIL"));
 }
 
-TEST_F(SmallSession, EndsWhereAStageCannotGoOn) {
+TEST_F(VlpCalibrateSmallSession, StopsAtFailedStep) {
   ASSERT_EQ(calibrate().exit_code, 0);
   for (const auto& image : fs::directory_iterator(folder / "a session/rotation")) {
     if (image.path().filename() != "0000.png") fs::remove(image.path());
@@ -330,7 +332,7 @@ TEST_F(SmallSession, EndsWhereAStageCannotGoOn) {
 }
 
 /// The same session through the programs of single steps, by hand.
-class ByHand : public SmallSession {
+class SingleStepPrograms : public VlpCalibrateSmallSession {
  protected:
   const std::string how = "--row-time-s 3e-5 --readout rows --camera-id unit";
 
@@ -372,14 +374,14 @@ class ByHand : public SmallSession {
   }
 };
 
-TEST_F(ByHand, GivesTheSame) {
+TEST_F(SingleStepPrograms, MatchVlpCalibrate) {
   ASSERT_EQ(calibrate("--no-report " + how).exit_code, 0);
   run_steps(lens_by_hand(), "truth.csv");
   expect_the_same();
   EXPECT_EQ(by_hand("lens.cameramodel"), result("lens.cameramodel"));
 }
 
-TEST_F(ByHand, GivesTheSameWithAnInclinationSensor) {
+TEST_F(SingleStepPrograms, MatchVlpCalibrateWithInclinationSensor) {
   // One that reads a little, and a table of places without truth.csv.
   std::string captures = "image,x_m,y_m,z_m,roll_rad,pitch_rad\n";
   for (const TruthRow& row : read_truth(folder / "a session/check/truth.csv")) {
@@ -398,20 +400,20 @@ TEST_F(ByHand, GivesTheSameWithAnInclinationSensor) {
   EXPECT_NE(by_hand("fixes.csv"), result("check-fixes.csv"));
 }
 
-TEST_F(ByHand, GivesTheSameWithALensThatIsGiven) {
+TEST_F(SingleStepPrograms, MatchVlpCalibrateWithGivenLens) {
   fs::copy(folder / "a session/true_calibration.yaml", folder / "a session/camera.yaml");
   ASSERT_EQ(calibrate("--no-report").exit_code, 0);
   run_steps("'" + path("a session/camera.yaml'"), "truth.csv");
   expect_the_same();
 }
 
-TEST_F(ByHand, GivesTheSameWithAClassifier) {
+TEST_F(SingleStepPrograms, MatchVlpCalibrateWithClassifier) {
   const std::string in = path("a session");
   const auto trained = run_program("vlp-train '" + in + "/rotation' --lamps '" + in +
                                    "/lamps.yaml' --calibration '" + in +
                                    "/true_calibration.yaml' -o '" + in + "/classifier.yaml'");
   ASSERT_EQ(trained.exit_code, 0) << trained.errors;
-  // It alone tells the lamps apart.
+  // Only the classifier identifies the lamps.
   const std::string map = TemporaryFolder::content_of(folder / "a session/lamps.yaml");
   folder.file("a session/lamps.yaml",
               std::regex_replace(map, std::regex(", frequency_hz: [0-9.e+]+"), ""));
@@ -420,7 +422,7 @@ TEST_F(ByHand, GivesTheSameWithAClassifier) {
   expect_the_same();
 }
 
-TEST_F(SmallSession, RunsAStepAgainThatIsAskedFor) {
+TEST_F(VlpCalibrateSmallSession, RunsStepNamedByRedo) {
   ASSERT_EQ(calibrate().exit_code, 0);
   const std::string session = result("session.json");
   const auto again = calibrate("--row-time-s 3e-5 --readout rows --redo check");
@@ -437,7 +439,7 @@ TEST_F(SmallSession, RunsAStepAgainThatIsAskedFor) {
   EXPECT_THAT(known.errors, HasSubstr("there is no step row-time here: the row time is known"));
 }
 
-TEST_F(SmallSession, GoesOnWhereItWasKilled) {
+TEST_F(VlpCalibrateSmallSession, ResumesAfterKill) {
   ASSERT_EQ(calibrate().exit_code, 0);
   const std::string session = result("session.json"), report = result("report.html");
   int killed_in_time = 0;
@@ -460,7 +462,7 @@ TEST_F(SmallSession, GoesOnWhereItWasKilled) {
   EXPECT_GE(killed_in_time, 1) << "a busy machine may be late for the last moments";
 }
 
-TEST_F(SmallSession, TouchesNothingThatIsNotItsOwn) {
+TEST_F(VlpCalibrateSmallSession, KeepsForeignFiles) {
   fs::create_directory(folder / "mine");
   folder.file("mine/calibration.yaml", "of somebody\n");
   const auto run =
@@ -471,7 +473,7 @@ TEST_F(SmallSession, TouchesNothingThatIsNotItsOwn) {
   EXPECT_FALSE(fs::exists(folder / "mine/steps"));
 }
 
-TEST_F(SmallSession, LeavesNothingOfBeforeBesideAFailure) {
+TEST_F(VlpCalibrateSmallSession, RemovesOldResultsAfterFailure) {
   ASSERT_EQ(calibrate().exit_code, 0);
   const std::string lamps = TemporaryFolder::content_of(folder / "a session/lamps.yaml");
   fs::remove(folder / "a session/lamps.yaml");
@@ -492,7 +494,7 @@ TEST_F(SmallSession, LeavesNothingOfBeforeBesideAFailure) {
   EXPECT_THAT(result("session.json"), HasSubstr("\"verdict\": \"no result\""));
 }
 
-TEST_F(SmallSession, TellsOfImagesThatAreDamaged) {
+TEST_F(VlpCalibrateSmallSession, ReportsDamagedImages) {
   folder.file("a session/rotation/0003.png", "no image");
   fs::resize_file(folder / "a session/check/0001.png", 100);
   const auto run = calibrate("--no-report --row-time-s 3e-5 --readout rows");
@@ -510,7 +512,7 @@ TEST_F(SmallSession, TellsOfImagesThatAreDamaged) {
   expect_documents_as_their_schemas_say();
 }
 
-TEST_F(SmallSession, StatesHowWellTheCalibrationIsKnown) {
+TEST_F(VlpCalibrateSmallSession, ReportsUncertaintyOfCalibration) {
   ASSERT_EQ(calibrate("--no-report --row-time-s 3e-5 --readout rows").exit_code, 0);
   const auto json = nlohmann::json::parse(result("session.json"));
   const auto& figures = json["calibration"];
@@ -531,7 +533,7 @@ TEST_F(SmallSession, StatesHowWellTheCalibrationIsKnown) {
   EXPECT_EQ(lamps, 6);
 }
 
-TEST_F(SmallSession, KeepsTwoSessionsApart) {
+TEST_F(VlpCalibrateSmallSession, RejectsResultsOfAnotherSession) {
   ASSERT_EQ(calibrate("--no-report --row-time-s 3e-5 --readout rows").exit_code, 0);
   fs::copy(folder / "a session", folder / "another", fs::copy_options::recursive);
   const auto other = run_program("vlp-calibrate '" + path("another") + "' -o '" + path("results") +
@@ -545,7 +547,7 @@ TEST_F(SmallSession, KeepsTwoSessionsApart) {
   EXPECT_THAT(inside.errors, HasSubstr("holds captures: results go to a folder of their own"));
 }
 
-TEST_F(Calibrate, SaysWhatIsMissing) {
+TEST_F(VlpCalibrate, NamesMissingInput) {
   EXPECT_EQ(run_program("vlp-calibrate").exit_code, 2);
   const auto nowhere = calibrate();
   EXPECT_EQ(nowhere.exit_code, 2);

@@ -31,7 +31,7 @@ std::string scene_with_chips(const std::string& chips) {
   return scene;
 }
 
-TEST(Chips, LeaveLampsWhereTheyAreFromASceneToItsDetections) {
+TEST(DetectLamps, IsUnbiasedForVisibleLedChips) {
   const TemporaryFolder folder;
   const auto scene =
       folder.file("scene.yaml", scene_with_chips("share: 0.3, pitch_m: 0.03, width_m: 0.02"));

@@ -56,7 +56,7 @@ TEST_F(CiAction, PassesAndComparesWithAcceptedFixes) {
               AllOf(HasSubstr("failures=\"0\" errors=\"0\""), HasSubstr("name=\"worse_mm\"")));
 }
 
-TEST_F(CiAction, NamesTheLampThatIsWrongInTheMap) {
+TEST_F(CiAction, NamesWrongLampOfMap) {
   const std::string lamps = content("session/lamps.yaml"), before = "position_m: [-0.6, -0.3,";
   ASSERT_NE(lamps.find(before), std::string::npos);
   folder.file("session/lamps.yaml", std::string(lamps).replace(lamps.find(before), before.size(),
@@ -68,7 +68,7 @@ TEST_F(CiAction, NamesTheLampThatIsWrongInTheMap) {
   EXPECT_THAT(result.errors, HasSubstr(lamp));
 }
 
-TEST_F(CiAction, FailsByProposedGatesForAFocalLengthThatIsOnePercentOff) {
+TEST_F(CiAction, FailsProposedGatesForFocalLengthErrorOfOnePercent) {
   const auto good = run_action("results=good");
   ASSERT_EQ(good.exit_code, 0) << good.output << good.errors;
   const auto proposed = run_program("cd '" + (folder / "").string() +
@@ -85,7 +85,7 @@ TEST_F(CiAction, FailsByProposedGatesForAFocalLengthThatIsOnePercentOff) {
       testing::ContainsRegex("<failure message=\"[^\"]*focal length[^\"]*height_rms_mm is"));
 }
 
-TEST_F(CiAction, FailsWithAnErrorInTheReportForAWrongRowTime) {
+TEST_F(CiAction, ReportsErrorForWrongRowTime) {
   const auto result = run_action("'options=--row-time-s 1.5e-5 --readout rows'");
   EXPECT_NE(result.exit_code, 0) << result.output;
   EXPECT_THAT(content("results/junit.xml"),

@@ -17,9 +17,9 @@ namespace {
 
 using testing::HasSubstr;
 
-class Convert : public testing::Test {
+class VlpConvert : public testing::Test {
  protected:
-  Convert() {
+  VlpConvert() {
     calibration_.camera = {
         "cam 7",
         {800, 600},
@@ -34,7 +34,7 @@ class Convert : public testing::Test {
     calibration_.camera.intrinsics = std::move(intrinsics);
   }
   std::string path(const std::string& name) const { return (folder_ / name).string(); }
-  /// What it prints.
+  /// Converts a file and returns the printed text.
   std::string convert(const std::string& from, const std::string& to,
                       const std::string& options = "") const {
     const auto result =
@@ -54,7 +54,7 @@ class Convert : public testing::Test {
   Calibration calibration_;
 };
 
-TEST_F(Convert, BringsCamerasBackToTheLastDigit) {
+TEST_F(VlpConvert, RoundTripIsExact) {
   const Camera& camera = calibration_.camera;
   const auto expect_back = [&](const char* format) {
     const Camera back = there_and_back(format).camera;
@@ -68,7 +68,7 @@ TEST_F(Convert, BringsCamerasBackToTheLastDigit) {
   for (const char* format : {"opencv", "ros", "kalibr"}) expect_back(format);
 }
 
-TEST_F(Convert, KeepsWhereTheLensIsKnown) {
+TEST_F(VlpConvert, KeepsCalibratedRegion) {
   IntrinsicsReport report{20, 2000, 3, 0.1, {}, 0.05, {}};
   report.region_px = {{0, 0}, {500.25, 0}, {512, 300.125}, {500, 599}, {0, 599}};
   calibration_.intrinsics_report = report;
@@ -86,8 +86,8 @@ TEST_F(Convert, KeepsWhereTheLensIsKnown) {
   EXPECT_THAT(convert("camera.yaml", "out", "--to ros"), testing::Not(HasSubstr("known")));
 }
 
-/// What is said of a fit, against rays of 1,000 pixels.
-TEST_F(Convert, StatesTheGreatestErrorOfAFit) {
+/// Compares the reported error of a fit with the rays of 1,000 pixels.
+TEST_F(VlpConvert, ReportsLargestErrorOfFit) {
   write_calibration(folder_ / "camera.yaml", calibration_);
   const std::string said =
       convert("camera.yaml", "kalibr.yaml", "--to kalibr --lens OPENCV_FISHEYE");
@@ -119,7 +119,7 @@ TEST_F(Convert, StatesTheGreatestErrorOfAFit) {
   EXPECT_GE(worst_px, 0.95 * stated_px);
 }
 
-TEST_F(Convert, RefusesWhatAFormatLacks) {
+TEST_F(VlpConvert, RejectsUnsupportedLensModel) {
   write_calibration(folder_ / "camera.yaml", calibration_);
   const auto result =
       run_program("vlp-convert " + path("camera.yaml") + " --to kalibr -o " + path("out"));

@@ -21,7 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 using testing::HasSubstr;
 
-class CornerFiles : public IntrinsicsProgram {
+class VlpIntrinsicsCornerFiles : public VlpIntrinsics {
  protected:
   /// The rows of a table of 3 x 3 corners of a chessboard; an image to each place.
   static std::string vnl(std::initializer_list<const char*> names) {
@@ -53,7 +53,7 @@ class CornerFiles : public IntrinsicsProgram {
 
 constexpr const char* kSize = "--imager-px 800 600";
 
-TEST_F(CornerFiles, RefuseOptionsThatAreForImages) {
+TEST_F(VlpIntrinsicsCornerFiles, RejectOptionsForImages) {
   const std::string corners = folder.file("corners.vnl", vnl({"a.png"})).string();
   for (const std::string option : {"--cache", "--threads", "--max-mpx", "--every"}) {
     EXPECT_EQ(
@@ -63,7 +63,7 @@ TEST_F(CornerFiles, RefuseOptionsThatAreForImages) {
 }
 
 /// A slip in a table costs its tag, and neither the view nor the table.
-TEST_F(CornerFiles, MayHoldASlip) {
+TEST_F(VlpIntrinsicsCornerFiles, TolerateOutlier) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   std::vector<BoardView> seen;
   Random random(5);
@@ -95,7 +95,7 @@ TEST_F(CornerFiles, MayHoldASlip) {
 }
 
 /// Before images are looked at, which there are none of here.
-TEST_F(CornerFiles, OfASquareChessboardTellNoBend) {
+TEST_F(VlpIntrinsicsCornerFiles, RejectWarpOfSquareChessboard) {
   const std::string none = (folder / "none.png").string();
   for (const std::string& images : {none, folder.file("corners.vnl", vnl({"a.png"})).string()}) {
     EXPECT_THAT(refusal(images, images == none ? "--warp on" : std::string("--warp on ") + kSize),
@@ -103,7 +103,7 @@ TEST_F(CornerFiles, OfASquareChessboardTellNoBend) {
   }
 }
 
-TEST_F(CornerFiles, GiveTheLensOfTheImagesToTheLastBit) {
+TEST_F(VlpIntrinsicsCornerFiles, GiveLensOfImagesExactly) {
   const std::string rig = (folder / "rig").string(), board = rig + "/board.yaml";
   ASSERT_EQ(run_program("vlp-simulate -q " VLP_SOURCE_DIR
                         "/datasets/paper-rig/scene.yaml --only boards -o " +
@@ -171,7 +171,7 @@ TEST_F(CornerFiles, GiveTheLensOfTheImagesToTheLastBit) {
   EXPECT_LT(over, 1.06);
 }
 
-TEST_F(CornerFiles, AreRefusedInOneTrueLine) {
+TEST_F(VlpIntrinsicsCornerFiles, AreRejectedWithCauseInOneLine) {
   const std::string good = vnl({"0.png", "1.png"});
   const auto with = [&](const std::string& from, const std::string& to) {
     std::string changed = good;
@@ -216,7 +216,7 @@ TEST_F(CornerFiles, AreRefusedInOneTrueLine) {
 }
 
 /// Tables of chessboards whose sizes are miscounted.
-TEST_F(CornerFiles, TellWhatIsWrongWithTheSize) {
+TEST_F(VlpIntrinsicsCornerFiles, ReportMiscountedBoardSize) {
   std::string text = "# filename x y level\n", table = "image,corner,u_px,v_px\n";
   for (int row = 0; row < 5; ++row) {
     for (int col = 0; col < 8; ++col) {

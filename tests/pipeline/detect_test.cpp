@@ -22,7 +22,7 @@ namespace {
 namespace fs = std::filesystem;
 using testing::HasSubstr;
 
-class Detect : public testing::Test {
+class VlpDetect : public testing::Test {
  protected:
   ProgramResult detect(const std::string& images, const std::string& options = "") const {
     return run_program("vlp-detect '" + images + "' --lamps " + kRig +
@@ -38,7 +38,7 @@ class Detect : public testing::Test {
 };
 
 /// A row time that leaves lamps identified, and one with which each is taken for its neighbour.
-TEST_F(Detect, NamesBothRowTimesIfTheStatedOneIsWrong) {
+TEST_F(VlpDetect, ReportsBothRowTimesIfGivenOneIsWrong) {
   const std::string images = kRig + "/sample' --lamps " + kRig + "/lamps.yaml";
   const std::string output = " -o " + (folder / "out.csv").string();
   std::string calibration = TemporaryFolder::content_of(kRig + "/true_calibration.yaml");
@@ -68,7 +68,7 @@ TEST_F(Detect, NamesBothRowTimesIfTheStatedOneIsWrong) {
 }
 
 /// Two rooms with the same frequencies in one map.
-TEST_F(Detect, IdentifiesTheLampsOfTheRoomThatIsNamed) {
+TEST_F(VlpDetect, IdentifiesLampsOfNamedRoom) {
   std::istringstream lines(TemporaryFolder::content_of(kRig + "/lamps.yaml"));
   std::string lamps;
   int id = 0;
@@ -103,7 +103,7 @@ TEST_F(Detect, IdentifiesTheLampsOfTheRoomThatIsNamed) {
   EXPECT_THAT(attic.errors, HasSubstr("has no lamp with 'room: attic'"));
 }
 
-TEST_F(Detect, FindsWhatLocateTurnsIntoTheTruePlace) {
+TEST_F(VlpDetect, YieldsTruePositionWithVlpLocate) {
   ASSERT_EQ(detect(kRig + "/sample").exit_code, 0);
   const auto located = run_program("vlp-locate -q " + (folder / "found.csv").string() +
                                    " --lamps " + kRig + "/lamps.yaml --calibration " + kRig +
@@ -120,7 +120,7 @@ TEST_F(Detect, FindsWhatLocateTurnsIntoTheTruePlace) {
   }
 }
 
-TEST_F(Detect, DrawsWhatItFinds) {
+TEST_F(VlpDetect, WritesAnnotatedImages) {
   const fs::path pictures = folder / "new" / "pictures";
   ASSERT_EQ(detect(kRig + "/sample", "--annotate " + pictures.string()).exit_code, 0);
   for (const char* name : {"0000.png.png", "0001.png.png"}) {
@@ -137,7 +137,7 @@ TEST_F(Detect, DrawsWhatItFinds) {
   EXPECT_THAT(refused.errors, HasSubstr("holds the images"));
 }
 
-TEST_F(Detect, SaysOfEachLightWhatItIsAndWhy) {
+TEST_F(VlpDetect, ReportsClassAndReasonOfEachLight) {
   const std::string clutter = std::string(VLP_SOURCE_DIR) + "/datasets/clutter/rendered";
   const fs::path lights = folder / "lights.csv";
   const auto found =
@@ -162,7 +162,7 @@ TEST_F(Detect, SaysOfEachLightWhatItIsAndWhy) {
   EXPECT_THAT(found.errors, HasSubstr(") lamp 5: its stripes are that lamp's; radius 28.6 px"));
 }
 
-TEST_F(Detect, WritesLightsWhereThereIsNoLamp) {
+TEST_F(VlpDetect, WritesLightsWithoutLamp) {
   const fs::path lights = folder / "lights.csv";
   const auto result = detect(kRig + "/sample-boards", "--lights " + lights.string());
   EXPECT_EQ(result.exit_code, 3);
@@ -175,7 +175,7 @@ TEST_F(Detect, WritesLightsWhereThereIsNoLamp) {
   }
 }
 
-TEST_F(Detect, RefusesToWriteLightsOverOtherFiles) {
+TEST_F(VlpDetect, DoesNotOverwriteOtherFilesWithLights) {
   const auto refused = [&](const fs::path& lights, const std::string& message) {
     const auto result = detect(kRig + "/sample", "--lights " + lights.string());
     EXPECT_EQ(result.exit_code, 2);
@@ -189,7 +189,7 @@ TEST_F(Detect, RefusesToWriteLightsOverOtherFiles) {
   refused(folder / "none" / "lights.csv", "lights.csv");
 }
 
-TEST_F(Detect, NeedsOnlyTheRowTimeOfACamera) {
+TEST_F(VlpDetect, RequiresOnlyRowTimeOfCamera) {
   const std::string call = "vlp-detect '" + kRig + "/sample' --lamps " + kRig + "/lamps.yaml -o " +
                            (folder / "found.csv").string();
   const auto refused = run_program(call);
@@ -207,7 +207,7 @@ TEST_F(Detect, NeedsOnlyTheRowTimeOfACamera) {
   }
 }
 
-TEST_F(Detect, IsPartOfLocateOnAFolderOfImages) {
+TEST_F(VlpDetect, MatchesVlpLocateOnImages) {
   ASSERT_EQ(detect(kRig + "/sample").exit_code, 0);
   const std::string rig = " --lamps " + kRig + "/lamps.yaml --calibration " + kRig +
                           "/true_calibration.yaml -o " + (folder / "fixes").string();
@@ -225,7 +225,7 @@ TEST_F(Detect, IsPartOfLocateOnAFolderOfImages) {
   EXPECT_NE(fixes.text(2, fixes.required("status")), "ok");
 }
 
-TEST_F(Detect, GivesTheSameBytesWhateverTheThreads) {
+TEST_F(VlpDetect, GivesSameBytesForAllThreadCounts) {
   ASSERT_EQ(detect(kRig + "/sample", "--threads 1").exit_code, 0);
   const std::string one = TemporaryFolder::content_of(folder / "found.csv");
   ASSERT_EQ(detect(kRig + "/sample", "--threads 4").exit_code, 0);
@@ -244,7 +244,7 @@ TEST_F(Detect, GivesTheSameBytesWhateverTheThreads) {
   }
 }
 
-TEST_F(Detect, SkipsAndCountsImagesThatItCannotUse) {
+TEST_F(VlpDetect, SkipsAndCountsUnusableImages) {
   const fs::path images = this->images();
   const std::string whole = TemporaryFolder::content_of(images / "0000.png");
   folder.file("images/empty.png", "");
@@ -266,7 +266,7 @@ TEST_F(Detect, SkipsAndCountsImagesThatItCannotUse) {
   EXPECT_EQ(CsvTable(folder / "found.csv").rows(), 12);
 }
 
-TEST_F(Detect, EndsWithOneLineWhereThereIsNothingToDetect) {
+TEST_F(VlpDetect, ReportsMissingImagesInOneLine) {
   const auto refused = [&](const std::string& images, int exit_code, const std::string& message) {
     const auto result = detect(images);
     EXPECT_EQ(result.exit_code, exit_code);
@@ -280,7 +280,7 @@ TEST_F(Detect, EndsWithOneLineWhereThereIsNothingToDetect) {
   refused(kRig + "/sample-boards", 3, "no lamp was identified wholly in view in 1 images");
 }
 
-TEST_F(Detect, PassesOverWhatOnlyHasTheNameOfAnImage) {
+TEST_F(VlpDetect, SkipsNonRegularFiles) {
   const fs::path images = this->images();
   fs::create_symlink(images / "loop.png", images / "loop.png");
   fs::create_directory(images / "folder.png");
@@ -290,7 +290,7 @@ TEST_F(Detect, PassesOverWhatOnlyHasTheNameOfAnImage) {
   EXPECT_THAT(result.output, HasSubstr("images      2\n"));
 }
 
-TEST_F(Detect, KeepsItsImages) {
+TEST_F(VlpDetect, DoesNotOverwriteItsImages) {
   const fs::path images = this->images();
   const auto result = run_program("vlp-detect " + images.string() + " --lamps " + kRig +
                                   "/lamps.yaml --calibration " + kRig +
@@ -299,7 +299,7 @@ TEST_F(Detect, KeepsItsImages) {
   EXPECT_THAT(result.errors, HasSubstr("0001.png: is an input, too"));
 }
 
-TEST_F(Detect, SaysWhenNoImageCanBeUsed) {
+TEST_F(VlpDetect, FailsWhenNoImageIsUsable) {
   fs::create_directory(folder / "bad");
   folder.file("bad/one.png", "no image\n");
   const auto result = detect((folder / "bad").string());
@@ -307,7 +307,7 @@ TEST_F(Detect, SaysWhenNoImageCanBeUsed) {
   EXPECT_THAT(result.errors, HasSubstr("bad: none of its 1 images can be used"));
 }
 
-TEST_F(Detect, AsksForTheRowTimeAndForFrequencies) {
+TEST_F(VlpDetect, RequiresRowTimeAndFrequencies) {
   std::string calibration = TemporaryFolder::content_of(kRig + "/true_calibration.yaml");
   calibration.erase(calibration.find("  row_time_s"), 21);
   const auto without_row_time = run_program(

@@ -15,13 +15,13 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-class DispersionProgram : public testing::Test {
+class VlpDispersion : public testing::Test {
  protected:
   TemporaryFolder folder;
   SyntheticRig rig{synthetic_lamps(), {synthetic_camera(), {}, {}, {}, {}}, {{0, 0, 0}, 0}, {}};
   Calibration believed;
 
-  DispersionProgram() {
+  VlpDispersion() {
     rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.03, 1);
     believed = rig.calibration;
     believed.rotation_center = tilted_by(believed.camera, 0.02, 1.5);
@@ -47,7 +47,7 @@ class DispersionProgram : public testing::Test {
   }
 };
 
-TEST_F(DispersionProgram, MakesFixesExactElsewhere) {
+TEST_F(VlpDispersion, MakesFixesExactAtOtherPositions) {
   const auto result = dispersion(turn(12, 6.28), "--station 0.102 -0.051");
   ASSERT_EQ(result.exit_code, 0) << result.errors;
   EXPECT_THAT(result.output, HasSubstr("captures    12, 12 used, 0 left out"));
@@ -73,7 +73,7 @@ TEST_F(DispersionProgram, MakesFixesExactElsewhere) {
   EXPECT_NEAR(fixes.number(0, fixes.required("z_m")), 0.25, 2e-6);
 }
 
-TEST_F(DispersionProgram, TakesThePlacesFromCapturesCsv) {
+TEST_F(VlpDispersion, ReadsPlacesFromCapturesCsv) {
   const auto frames = turn(6, 6.28);
   std::string table = "image,x_m,y_m\n";
   for (const Frame& frame : frames) table += frame.image + ",0.1,-0.05\n";
@@ -92,7 +92,7 @@ TEST_F(DispersionProgram, TakesThePlacesFromCapturesCsv) {
   EXPECT_THAT(dispersion(frames, "").errors, HasSubstr("where is the station?"));
 }
 
-TEST_F(DispersionProgram, NeedsYawsOrThePapersMethodAndSaysWhatThatSupposes) {
+TEST_F(VlpDispersion, RequiresSeveralYawsOrMethodPaper) {
   const auto refused = dispersion(turn(6, 0), "--station 0.1 -0.05");
   EXPECT_EQ(refused.exit_code, 3);
   EXPECT_THAT(refused.errors, HasSubstr("turn the camera at the station"));
@@ -105,7 +105,7 @@ TEST_F(DispersionProgram, NeedsYawsOrThePapersMethodAndSaysWhatThatSupposes) {
   EXPECT_EQ(dispersion(turn(6, 6.28), "--station 0.1 -0.05 --method paper").exit_code, 3);
 }
 
-TEST_F(DispersionProgram, SaysWhatIsWrong) {
+TEST_F(VlpDispersion, ReportsCauseOfFailure) {
   const auto far = dispersion(turn(6, 6.28), "--station 100 -50");
   EXPECT_EQ(far.exit_code, 2);
   EXPECT_THAT(far.errors, HasSubstr("in the frame of the lamp map?"));
@@ -131,14 +131,14 @@ TEST_F(DispersionProgram, SaysWhatIsWrong) {
   EXPECT_EQ(dispersion(frames, "--station 0.1 -0.05").exit_code, 3);
 }
 
-TEST_F(DispersionProgram, DrawsTheFixes) {
+TEST_F(VlpDispersion, PlotsFixes) {
   const auto result =
       dispersion(turn(12, 6.28), "--station 0.1 -0.05 --plot " + path("picture.svg"));
   ASSERT_EQ(result.exit_code, 0) << result.errors;
   EXPECT_THAT(TemporaryFolder::content_of(folder / "picture.svg"), HasSubstr("<svg"));
 }
 
-TEST_F(DispersionProgram, DropsNothingThatCameBefore) {
+TEST_F(VlpDispersion, KeepsOtherPartsOfCalibration) {
   rig.calibration.rotation_center.reset();
   believed.rotation_center.reset();
   believed.dispersion.reset();
@@ -150,7 +150,7 @@ TEST_F(DispersionProgram, DropsNothingThatCameBefore) {
 }
 
 /// From images: a camera whose tilt is not known at all, at the station of a scene.
-TEST(DispersionOfImages, IsTheCamerasTilt) {
+TEST(VlpDispersionOfRenderedImages, EqualsTiltOfCamera) {
   const TemporaryFolder folder;
   const std::string rendered = (folder / "rendered").string();
   const auto simulated = run_program("vlp-simulate -q " VLP_SOURCE_DIR

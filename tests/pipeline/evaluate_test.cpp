@@ -18,7 +18,7 @@ const std::string kFixes =
     "image,status,x_m,y_m,z_m,yaw_rad,sd_x_m,sd_y_m,sd_z_m,sd_yaw_rad,lamps,residual_px\n";
 
 /// Six captures at two places, off by 1 to 4 mm along x and y; one has no fix.
-class Evaluate : public testing::Test {
+class VlpEvaluate : public testing::Test {
  protected:
   const TemporaryFolder folder;
 
@@ -58,7 +58,7 @@ class Evaluate : public testing::Test {
   }
 };
 
-TEST_F(Evaluate, PrintsWhatAHandComputes) {
+TEST_F(VlpEvaluate, MatchesHandComputedMetrics) {
   const auto result = with_truth();
   ASSERT_EQ(result.exit_code, 0) << result.errors;
   EXPECT_THAT(
@@ -71,7 +71,7 @@ TEST_F(Evaluate, PrintsWhatAHandComputes) {
             HasSubstr("yaw         rms 0.2562 deg")));
 }
 
-TEST_F(Evaluate, EndsWithOneAndAllIsWrittenWhenAGateIsNotMet) {
+TEST_F(VlpEvaluate, ReturnsOneAndWritesAllWhenGateFails) {
   const auto result = with_truth(
       "--gate mean_mm=2.5,p90_mm=3 --gate missing=0 --json evaluation.json --junit junit.xml");
   EXPECT_EQ(result.exit_code, 1);
@@ -86,7 +86,7 @@ TEST_F(Evaluate, EndsWithOneAndAllIsWrittenWhenAGateIsNotMet) {
   EXPECT_EQ(with_truth("--gate mean_mm=2.5 --gate p90_mm=4.5").exit_code, 0);
 }
 
-TEST_F(Evaluate, WritesAnErrorToJUnitWhenNoGateCanBeChecked) {
+TEST_F(VlpEvaluate, WritesErrorToJUnitWhenNoGateIsChecked) {
   const auto unknown = with_truth("--gate mean_mm=1,worse_mm=1 --junit junit.xml");
   EXPECT_EQ(unknown.exit_code, 2);
   EXPECT_THAT(content("junit.xml"),
@@ -98,7 +98,7 @@ TEST_F(Evaluate, WritesAnErrorToJUnitWhenNoGateCanBeChecked) {
   EXPECT_THAT(content("junit.xml"), HasSubstr("<error type=\"undetermined\" message=\""));
 }
 
-TEST_F(Evaluate, ProposesGatesThatTheRunMeets) {
+TEST_F(VlpEvaluate, ProposesGatesThatPass) {
   const auto few = with_truth("--propose-gates gates.yaml");
   EXPECT_EQ(few.exit_code, 3);
   EXPECT_THAT(few.errors, HasSubstr("--propose-gates: too few stations or captures"));
@@ -112,7 +112,7 @@ TEST_F(Evaluate, ProposesGatesThatTheRunMeets) {
   EXPECT_EQ(met.exit_code, 0) << met.errors;
 }
 
-TEST_F(Evaluate, SaysThatNoGateAsksForWhatIsMissing) {
+TEST_F(VlpEvaluate, WarnsOfMissingFixesWithoutGate) {
   const std::string words = "1 of 6 captures has no fix, and no gate 'missing' asks";
   const auto result = with_truth("--gate mean_mm=2.5 --report r.html");
   EXPECT_EQ(result.exit_code, 0);
@@ -122,7 +122,7 @@ TEST_F(Evaluate, SaysThatNoGateAsksForWhatIsMissing) {
   EXPECT_THAT(with_truth("--gate missing=1").errors, testing::Not(HasSubstr(words)));
 }
 
-TEST_F(Evaluate, TakesGatesFromAFileAndMoreFromTheCommandLine) {
+TEST_F(VlpEvaluate, CombinesGatesOfFileAndCommandLine) {
   folder.file("gates.yaml", "format: vlp-gates/1\ngates: {mean_mm: 1, max_mm: 5}\n");
   EXPECT_EQ(with_truth("--gates gates.yaml").exit_code, 1);
   EXPECT_EQ(with_truth("--gates gates.yaml --gate mean_mm=3").exit_code, 0);
@@ -136,7 +136,7 @@ TEST_F(Evaluate, TakesGatesFromAFileAndMoreFromTheCommandLine) {
               HasSubstr("gates.yaml:3: gates.missing: should be a share from 0 to 1, not 50"));
 }
 
-TEST_F(Evaluate, HoldsFixesAgainstAPathAndALine) {
+TEST_F(VlpEvaluate, ComparesFixesWithPathAndLine) {
   folder.file("path.csv", "x_m,y_m,z_m\n0,0,0\n1,0,0\n");
   const auto path = evaluate("--path path.csv");
   ASSERT_EQ(path.exit_code, 0) << path.errors;
@@ -150,7 +150,7 @@ TEST_F(Evaluate, HoldsFixesAgainstAPathAndALine) {
   EXPECT_EQ(problems_by_schema("evaluation", {folder / "line.json"}), "");
 }
 
-TEST_F(Evaluate, SaysWhichOfTwoRunsIsBetter) {
+TEST_F(VlpEvaluate, ReportsBetterOfTwoRuns) {
   std::string good = kFixes, bad = kFixes, truth = "image,x_m,y_m\n";
   for (int i = 0; i < 20; ++i) {
     const std::string name = std::to_string(i);
@@ -167,7 +167,7 @@ TEST_F(Evaluate, SaysWhichOfTwoRunsIsBetter) {
             HasSubstr("20 in both: 20 with a smaller error")));
   EXPECT_THAT(with_truth("--compare fixes.csv --json same.json").output,
               HasSubstr("the same within 0.001 mm"));
-  // All off by 0.17 um more, and surely so: nobody's loss.
+  // All errors are significantly larger by 0.17 um, which is negligible.
   std::string hardly = good;
   for (auto at = hardly.find(".0001,"); at != std::string::npos; at = hardly.find(".0001,", at)) {
     hardly.replace(at, 6, ".00010017,");
@@ -186,7 +186,7 @@ TEST_F(Evaluate, SaysWhichOfTwoRunsIsBetter) {
   EXPECT_EQ(evaluate("--line 0 0 9 0 --compare other.csv").exit_code, 2);
 }
 
-TEST_F(Evaluate, ADocumentThatIsAnotherIsNotAsTheSchemaSays) {
+TEST_F(VlpEvaluate, SchemaRejectsChangedDocuments) {
   with_truth("--json evaluation.json");
   const std::string whole = content("evaluation.json");
   const auto problems_with = [&](const std::string& what, const std::string& other) {
@@ -202,7 +202,7 @@ TEST_F(Evaluate, ADocumentThatIsAnotherIsNotAsTheSchemaSays) {
   EXPECT_THAT(problems_with("vlp-evaluation/1", "vlp-evaluation/2"), HasSubstr("$.format"));
 }
 
-TEST_F(Evaluate, ComparesWithTheLimitOfTheExample) {
+TEST_F(VlpEvaluate, ComparesExampleWithCrlb) {
   // Errors of 36 fixes are within 30 % of the limit of their noise: three standard errors.
   const auto result = evaluate_example("--noise-px 0.05 --gate limit_ratio=1.3,stated_ratio=1.3");
   EXPECT_EQ(result.exit_code, 0) << result.errors;
@@ -210,7 +210,7 @@ TEST_F(Evaluate, ComparesWithTheLimitOfTheExample) {
               AllOf(HasSubstr("limit       0.1"), HasSubstr("error / sd  horizontal")));
 }
 
-TEST_F(Evaluate, SaysThatALimitIsBeatenAndWhatThatMeans) {
+TEST_F(VlpEvaluate, WarnsOfErrorsBelowCrlb) {
   const auto result =
       evaluate_example("--noise-px 0.1 --json '" + path("e.json") + "'");  // 0.05 in truth
   EXPECT_EQ(result.exit_code, 0) << result.errors;
@@ -220,7 +220,7 @@ TEST_F(Evaluate, SaysThatALimitIsBeatenAndWhatThatMeans) {
   EXPECT_EQ(problems_by_schema("evaluation", {folder / "e.json"}), "");
 }
 
-TEST_F(Evaluate, EndsWithThreeWithoutAFix) {
+TEST_F(VlpEvaluate, ReturnsThreeWithoutFix) {
   folder.file("fixes.csv", kFixes + "a.png,degenerate,,,,,,,,,1,\n");
   const auto result = with_truth("--json none.json");
   EXPECT_EQ(result.exit_code, 3);
@@ -228,7 +228,7 @@ TEST_F(Evaluate, EndsWithThreeWithoutAFix) {
   EXPECT_FALSE(std::filesystem::exists(folder / "none.json"));
 }
 
-TEST_F(Evaluate, NamesFileAndLineOfBadInput) {
+TEST_F(VlpEvaluate, NamesFileAndLineOfBadInput) {
   const auto refused = [&](const std::string& rows) {
     folder.file("fixes.csv", rows);
     const auto result = with_truth();
@@ -252,7 +252,7 @@ TEST_F(Evaluate, NamesFileAndLineOfBadInput) {
   EXPECT_THAT(refused(kFixes + good), HasSubstr("truth.csv:3: image: 'a.png' stands twice"));
 }
 
-TEST_F(Evaluate, EndsWithTwoOnBadUsage) {
+TEST_F(VlpEvaluate, ReturnsTwoForBadUsage) {
   for (const char* options :
        {"", "--truth truth.csv --line 0 0 1 0", "--line 0 0 0 0", "--line 0 0 1",
         "--truth truth.csv --gate mean=1", "--truth truth.csv --gate mean_mm=x",
@@ -267,7 +267,7 @@ TEST_F(Evaluate, EndsWithTwoOnBadUsage) {
   EXPECT_THAT(with_truth("--gate mean=1").errors, HasSubstr("the gates are: mean_mm, median_mm"));
 }
 
-TEST_F(Evaluate, GivesTheSameBytesWhateverTheThreads) {
+TEST_F(VlpEvaluate, GivesSameBytesForAllThreadCounts) {
   std::string fixes = kFixes, truth = "image,x_m,y_m\n";
   for (int i = 0; i < 60; ++i) {  // enough for intervals
     const std::string name = std::to_string(i) + ".png,", x_m = std::to_string(i);

@@ -37,7 +37,7 @@ double mean(const std::vector<double>& values) {
   return sum / static_cast<double>(values.size());
 }
 
-TEST(Example, IsWhatItsGeneratorMakes) {
+TEST(Example, MatchesGenerator) {
   const TemporaryFolder folder;
   ASSERT_EQ(run_program(VLP_MAKE_EXAMPLE " '" + (folder / "example").string() + "'").exit_code, 0);
   for (const std::string name : {"lamps.yaml", "calibration.yaml", "detections.csv", "truth.csv",
@@ -48,7 +48,7 @@ TEST(Example, IsWhatItsGeneratorMakes) {
   }
 }
 
-TEST(Example, IsLocatedWithinItsNoise) {
+TEST(Example, IsLocatedWithinNoise) {
   const TemporaryFolder folder;
   const auto fixes = (folder / "fixes.csv").string();
   const auto result = run_program(kLocate + fixes);
@@ -60,14 +60,14 @@ TEST(Example, IsLocatedWithinItsNoise) {
   EXPECT_GT(mean(errors_m), 0.02e-3);
 }
 
-TEST(Example, IsFarOffWithoutTheTilt) {
+TEST(Example, HasLargeErrorsWithoutTiltCorrection) {
   const TemporaryFolder folder;
   const auto fixes = (folder / "fixes.csv").string();
   ASSERT_EQ(run_program(kLocate + fixes + " --correction none").exit_code, 0);
   EXPECT_GT(mean(horizontal_errors_m(fixes)), 20e-3);  // 1.3 degrees at 1.3 to 1.6 m
 }
 
-TEST(Example, GivesTheSameBytesTwice) {
+TEST(Example, GivesSameBytesTwice) {
   const TemporaryFolder folder;
   const auto first = run_program(kLocate + (folder / "a.csv").string());
   const auto second = run_program(kLocate + (folder / "b.csv").string());

@@ -60,7 +60,7 @@ std::vector<std::string> read_build_order() {
 }
 
 /// Two of a name in one namespace are undefined behaviour where both are linked.
-TEST(Headers, NameEachTypeOnce) {
+TEST(Headers, DefineEachTypeNameOnce) {
   const std::regex type("(?:^|\n)(?:struct|class|enum class|enum) (\\w+)[^;{\n]*\\{");
   std::map<std::string, std::set<std::string>> headers;
   for (const auto& entry : fs::recursive_directory_iterator(kLib)) {
@@ -76,7 +76,7 @@ TEST(Headers, NameEachTypeOnce) {
   }
 }
 
-TEST(Headers, IncludeNoFolderThatIsBuiltLater) {
+TEST(Headers, IncludeNoHigherLayer) {
   const std::vector<std::string> order = read_build_order();
   const FolderIncludes includes = read_folder_includes();
   ASSERT_GT(order.size(), 10U);
@@ -95,7 +95,7 @@ TEST(Headers, IncludeNoFolderThatIsBuiltLater) {
 
 /// Folders at the bottom (that include no other) and at the top (that no other includes) are
 /// removed until none is left, or those in a cycle and between cycles.
-TEST(Headers, IncludeSubFoldersWithoutCycle) {
+TEST(Headers, IncludeSubfoldersWithoutCycle) {
   FolderIncludes remaining = read_folder_includes();
   ASSERT_GT(remaining.size(), 20U);
   const auto is_at_an_end = [&](const auto& folder) {

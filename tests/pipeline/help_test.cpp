@@ -54,7 +54,7 @@ std::vector<std::string> subcommands_in(const std::string& help) {
 
 class Help : public testing::TestWithParam<const char*> {};
 
-TEST_P(Help, HasAnExampleThatWorksAsTyped) {
+TEST_P(Help, ExampleRunsAsTyped) {
   const std::string program = GetParam();
   const auto help = run_program(program + " --help");
   ASSERT_EQ(help.exit_code, 0);
@@ -95,7 +95,7 @@ TEST_P(Help, LoadsNoCodecs) {
   }
 }
 
-TEST_P(Help, NamesTheVersion) {
+TEST_P(Help, PrintsVersion) {
   const auto result = run_program(std::string(GetParam()) + " --version");
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_THAT(result.output, HasSubstr(std::string(GetParam()) + " 0."));
@@ -115,7 +115,7 @@ std::vector<std::string> options_in(const std::string& help) {
   return options;
 }
 
-TEST_P(Help, IsInTheManualPage) {
+TEST_P(Help, ManualPageListsAllOptions) {
   const std::string program = GetParam();
   const auto page = run_program(program + " --reference man | sed 's/\\\\-/-/g'");
   ASSERT_EQ(page.exit_code, 0) << page.errors;
@@ -138,7 +138,7 @@ TEST_P(Help, IsInTheManualPage) {
   }
 }
 
-/// What bash offers for the last of these words.
+/// Returns the completions of bash for the last of these words.
 std::vector<std::string> completed(const std::string& program, const std::string& words) {
   std::string function = "_" + program;
   std::replace(function.begin(), function.end(), '-', '_');
@@ -150,7 +150,7 @@ std::vector<std::string> completed(const std::string& program, const std::string
   return lines_of(offered.output);
 }
 
-TEST_P(Help, IsWhatTheShellsComplete) {
+TEST_P(Help, ShellsCompleteAllOptions) {
   const std::string program = GetParam();
   const auto offered = completed(program, "-");
   for (const std::string& option : options_in(run_program(program + " --help").output)) {
@@ -166,14 +166,14 @@ TEST_P(Help, IsWhatTheShellsComplete) {
   }
 }
 
-TEST_P(Help, RefusesAReferenceThatThereIsNot) {
+TEST_P(Help, RejectsUnknownReference) {
   const auto result = run_program(std::string(GetParam()) + " --reference odd");
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_EQ(result.output, "");
   EXPECT_THAT(result.errors, HasSubstr("unknown: --reference"));
 }
 
-TEST(Completion, KnowsChoicesCommandsAndFiles) {
+TEST(BashCompletion, CompletesChoicesCommandsAndFiles) {
   EXPECT_THAT(completed("vlp-locate", "--correction \"\""),
               testing::ElementsAre("none", "rotation", "dispersion", "all"));
   EXPECT_THAT(completed("vlp-board", "--family tag36"), testing::ElementsAre("tag36h11"));
@@ -189,7 +189,7 @@ TEST(Completion, KnowsChoicesCommandsAndFiles) {
 }
 
 /// No program with commands has an option with choices beside them: here is one.
-TEST(Completion, PrefersAnOptionsChoicesToCommands) {
+TEST(BashCompletion, PrefersChoicesToCommands) {
   CLI::App app("Tests.", "vlp-odd");
   std::string kind;
   double size = 0;
@@ -210,7 +210,7 @@ TEST(Completion, PrefersAnOptionsChoicesToCommands) {
 }
 
 /// An option of four numbers takes four words, not one.
-TEST(Completion, LeavesZshAllValuesOfAnOption) {
+TEST(ZshCompletion, AcceptsAllValuesOfOption) {
   const auto zsh = run_program("vlp-limits --reference zsh").output;
   const auto begin = zsh.find("--floor-m");
   const std::string floor = zsh.substr(begin, zsh.find('\n', begin) - begin);
@@ -219,7 +219,7 @@ TEST(Completion, LeavesZshAllValuesOfAnOption) {
 }
 
 /// An option that was renamed would be recorded.
-TEST(HistoryOptions, AreThoseOfPrograms) {
+TEST(OptionsWithoutHistory, ExistInPrograms) {
   std::vector<std::string> options;
   for (const char* program : {"vlp-adjust", "vlp-convert", "vlp-dispersion", "vlp-evaluate",
                               "vlp-intrinsics", "vlp-rotation", "vlp-train"}) {

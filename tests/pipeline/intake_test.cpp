@@ -113,7 +113,7 @@ std::string without_origin(const std::string& calibration) {
   return kept;
 }
 
-TEST_F(Intake, IsTheSameAtTheStationAndInASession) {
+TEST_F(Intake, IsIdenticalAtStationAndInSession) {
   render();
   spoil("boards");
   spoil("rotation");

@@ -12,7 +12,7 @@
 namespace vlp {
 
 /// vlp-intrinsics, in a folder of its own.
-class IntrinsicsProgram : public testing::Test {
+class VlpIntrinsics : public testing::Test {
  protected:
   ProgramResult calibrate(const std::string& images, const std::string& board,
                           const std::string& options = "") const {

@@ -20,7 +20,7 @@ using testing::Not;
 
 const std::string kFaulty = VLP_SOURCE_DIR "/datasets/paper-rig-faulty/rendered";
 
-class IntrinsicsRefusals : public IntrinsicsProgram {
+class VlpIntrinsicsErrors : public VlpIntrinsics {
  protected:
   /// The view of the sample, as many times as there are names.
   std::string copies(const std::vector<std::string>& names) const {
@@ -32,7 +32,7 @@ class IntrinsicsRefusals : public IntrinsicsProgram {
   }
 };
 
-TEST_F(IntrinsicsRefusals, RefusesOneViewAndViewsAllAlike) {
+TEST_F(VlpIntrinsicsErrors, RejectsOneViewAndIdenticalViews) {
   const std::string board = kRig + "/board.yaml";
   const auto one = calibrate(copies({"0.png"}), board);
   EXPECT_EQ(one.exit_code, 3);
@@ -47,7 +47,7 @@ TEST_F(IntrinsicsRefusals, RefusesOneViewAndViewsAllAlike) {
   EXPECT_FALSE(fs::exists(folder / "camera.yaml"));
 }
 
-TEST_F(IntrinsicsRefusals, WritesNoTwoOfItsFilesToOne) {
+TEST_F(VlpIntrinsicsErrors, RejectsTwoOutputsInOneFile) {
   const std::string images = copies({"0.png"}), board = kRig + "/board.yaml";
   const auto refusal_of = [&](const std::string& ros, const std::string& kalibr) {
     const auto result = calibrate(images, board,
@@ -63,7 +63,7 @@ TEST_F(IntrinsicsRefusals, WritesNoTwoOfItsFilesToOne) {
               HasSubstr("--output's .cameramodel and --kalibr name one file"));
 }
 
-TEST_F(IntrinsicsRefusals, SaysWhyThereAreNoTags) {
+TEST_F(VlpIntrinsicsErrors, ReportsCauseOfMissingTags) {
   const std::string board = kRig + "/board.yaml";
   const auto lamps = calibrate(kRig + "/sample", board);
   EXPECT_EQ(lamps.exit_code, 3);
@@ -83,7 +83,7 @@ TEST_F(IntrinsicsRefusals, SaysWhyThereAreNoTags) {
   EXPECT_THAT(mirror.errors, HasSubstr("the image is mirrored"));
 }
 
-TEST_F(IntrinsicsRefusals, NamesWhatIsWrongWithTheBoard) {
+TEST_F(VlpIntrinsicsErrors, ReportsWrongKeyOfBoard) {
   std::string text = TemporaryFolder::content_of(kRig + "/board.yaml");
   const auto with = [&](const std::string& from, const std::string& to) {
     std::string changed = text;
@@ -107,7 +107,7 @@ TEST_F(IntrinsicsRefusals, NamesWhatIsWrongWithTheBoard) {
   EXPECT_THAT(spacing.errors, HasSubstr("tag_spacing is 0.5, but the images show gaps of "));
 }
 
-TEST_F(IntrinsicsRefusals, NamesTheOrderOfASquareKalibrBoard) {
+TEST_F(VlpIntrinsicsErrors, ReportsIdOrderOfSquareKalibrBoard) {
   std::string scene =
       TemporaryFolder::content_of(VLP_SOURCE_DIR "/datasets/paper-rig-faulty/scene.yaml");
   const std::string rows = "rows: 5,";
@@ -130,7 +130,7 @@ TEST_F(IntrinsicsRefusals, NamesTheOrderOfASquareKalibrBoard) {
   }
 }
 
-TEST_F(IntrinsicsRefusals, SkipsImagesOfAnotherSizeAndWhatIsNoImage) {
+TEST_F(VlpIntrinsicsErrors, SkipsInvalidImagesAndOtherSizes) {
   const std::string images = copies({"0.png", "1.png"});
   folder.file("images/2.png", "no image\n");
   const auto bad = calibrate(images, kRig + "/board.yaml");
@@ -147,7 +147,7 @@ TEST_F(IntrinsicsRefusals, SkipsImagesOfAnotherSizeAndWhatIsNoImage) {
               HasSubstr("2.png: is 640 x 480 px, the camera's images are 800 x 600 px; skipped"));
 }
 
-TEST_F(IntrinsicsRefusals, RefusesAFormatWithoutTheLensBeforeItSolves) {
+TEST_F(VlpIntrinsicsErrors, RejectsFormatWithoutLensModelBeforeSolving) {
   const std::string kalibr = (folder / "kalibr.yaml").string();
   const auto result =
       calibrate(kRig + "/sample-boards", kRig + "/board.yaml", "--kalibr " + kalibr);
@@ -157,7 +157,7 @@ TEST_F(IntrinsicsRefusals, RefusesAFormatWithoutTheLensBeforeItSolves) {
   EXPECT_FALSE(fs::exists(kalibr));
 }
 
-TEST_F(IntrinsicsRefusals, SkipsTinyAndHugeImages) {
+TEST_F(VlpIntrinsicsErrors, SkipsTinyAndHugeImages) {
   const std::string images = copies({"0.png"});
   cv::imwrite((folder / "images/1.png").string(), cv::Mat(600, 801, CV_8UC1, cv::Scalar(7)));
   const auto huge = calibrate(images, kRig + "/board.yaml", "--max-mpx 0.4802");
@@ -169,7 +169,7 @@ TEST_F(IntrinsicsRefusals, SkipsTinyAndHugeImages) {
   EXPECT_THAT(tiny.errors, HasSubstr("no tag of tag36h11 is seen in 1 images"));
 }
 
-TEST_F(IntrinsicsRefusals, SaysThatWhatItSeesIsOverexposed) {
+TEST_F(VlpIntrinsicsErrors, ReportsOverexposedTags) {
   cv::Mat image = cv::imread(kFaulty + "/sample-boards/0000.png", cv::IMREAD_GRAYSCALE), white;
   // White runs over all but the middles of what is black.
   cv::dilate(image, white, cv::getStructuringElement(cv::MORPH_ELLIPSE, {5, 5}));
@@ -180,7 +180,7 @@ TEST_F(IntrinsicsRefusals, SaysThatWhatItSeesIsOverexposed) {
   EXPECT_THAT(result.errors, HasSubstr("overexposed"));
 }
 
-TEST_F(IntrinsicsRefusals, SaysThatBurntOutBoardsAreOverexposed) {
+TEST_F(VlpIntrinsicsErrors, ReportsSaturatedBoards) {
   const std::string text =
       TemporaryFolder::content_of(VLP_SOURCE_DIR "/datasets/paper-rig-faulty/scene.yaml");
   const std::string usual = "folder: boards\n    exposure_s: 0.004\n    views: {count: 36,";
@@ -203,7 +203,7 @@ TEST_F(IntrinsicsRefusals, SaysThatBurntOutBoardsAreOverexposed) {
   }
 }
 
-TEST_F(IntrinsicsRefusals, RefusesBadOptions) {
+TEST_F(VlpIntrinsicsErrors, RejectsBadOptions) {
   const std::string images = kRig + "/sample-boards", board = kRig + "/board.yaml";
   EXPECT_EQ(calibrate(images, board, "--gate mean=3").exit_code, 2);
   EXPECT_EQ(calibrate(images, board, "--gate rms_px=no").exit_code, 2);

@@ -16,9 +16,10 @@ namespace {
 namespace fs = std::filesystem;
 using testing::HasSubstr;
 
-class RenderedRig : public IntrinsicsProgram, public testing::WithParamInterface<const char*> {};
+class VlpIntrinsicsRenderedImages : public VlpIntrinsics,
+                                    public testing::WithParamInterface<const char*> {};
 
-TEST_P(RenderedRig, GivesItsLensWhateverTheThreads) {
+TEST_P(VlpIntrinsicsRenderedImages, GiveTrueLensForAllThreadCounts) {
   const std::string scene = std::string(VLP_SOURCE_DIR "/datasets/") + GetParam() + "/scene.yaml";
   const std::string rig = (folder / "rig").string();
   ASSERT_EQ(run_program("vlp-simulate -q " + scene + " --only boards -o " + rig).exit_code, 0);
@@ -85,7 +86,8 @@ TEST_P(RenderedRig, GivesItsLensWhateverTheThreads) {
   EXPECT_FALSE(fs::exists(folder / "camera.yaml"));
 }
 
-INSTANTIATE_TEST_SUITE_P(Scenes, RenderedRig, testing::Values("paper-rig", "paper-rig-faulty"));
+INSTANTIATE_TEST_SUITE_P(Scenes, VlpIntrinsicsRenderedImages,
+                         testing::Values("paper-rig", "paper-rig-faulty"));
 
 /// Through a phone's tone curve and JPEG edges move towards the dark, and where white runs over,
 /// too.
@@ -93,9 +95,10 @@ struct Coded {
   const char *scene, *picture, *exposure_s, *name;
   double mean_px, worst_px;
 };
-class CodedRig : public IntrinsicsProgram, public testing::WithParamInterface<Coded> {};
+class VlpIntrinsicsProcessedImages : public VlpIntrinsics,
+                                     public testing::WithParamInterface<Coded> {};
 
-TEST_P(CodedRig, GivesItsLens) {
+TEST_P(VlpIntrinsicsProcessedImages, GiveTrueLens) {
   std::string scene = TemporaryFolder::content_of(std::string(VLP_SOURCE_DIR "/datasets/") +
                                                   GetParam().scene + "/scene.yaml");
   scene.insert(scene.find("\nmount:"), GetParam().picture);
@@ -123,7 +126,7 @@ constexpr const char* kPhone = "\npicture: {gamma: 2.2, jpeg_quality: 90}\n";
 constexpr const char* kSharp =
     "\npicture: {gamma: 2.2, sharpening: {amount: 1, radius_px: 1}, jpeg_quality: 90}\n";
 INSTANTIATE_TEST_SUITE_P(
-    Scenes, CodedRig,
+    Scenes, VlpIntrinsicsProcessedImages,
     testing::Values(Coded{"paper-rig", kPhone, "0.004", "Plain", 0.02, 0.15},
                     Coded{"paper-rig-faulty", kPhone, "0.004", "Kalibr", 0.05, 0.25},
                     Coded{"paper-rig", kSharp, "0.004", "PlainSharpened", 0.02, 0.1},
@@ -132,7 +135,7 @@ INSTANTIATE_TEST_SUITE_P(
                           0.25}),
     [](const auto& instance) { return std::string(instance.param.name); });
 
-TEST_F(IntrinsicsProgram, SaysThatViewsFromTheFrontDoNotFixTheFocalLength) {
+TEST_F(VlpIntrinsics, ReportsFocalLengthUndeterminedByFrontalViews) {
   const auto real = real_data("kalibr-aprilgrid-stereo");
   if (real.empty()) GTEST_SKIP() << "no real captures here";
   const auto result = calibrate((real / "cam0").string(), (real / "board.yaml").string());
@@ -144,7 +147,7 @@ TEST_F(IntrinsicsProgram, SaysThatViewsFromTheFrontDoNotFixTheFocalLength) {
   EXPECT_LT(report->rms_px, 0.32);  // Kalibr's own, per axis: 0.38 and 0.32
 }
 
-TEST_F(IntrinsicsProgram, FitsAPhonesImagesAsWellAsOthers) {
+TEST_F(VlpIntrinsics, FitsPhoneImagesAsReportedByOthers) {
   const auto real = real_data("apriltag-lattice-phone");
   if (real.empty()) GTEST_SKIP() << "no real captures here";
   const auto result = calibrate(real.string(), (real / "board.yaml").string());
@@ -155,14 +158,14 @@ TEST_F(IntrinsicsProgram, FitsAPhonesImagesAsWellAsOthers) {
   EXPECT_NEAR(found.camera.focal_px().x(), 3196.9, 25);
 }
 
-TEST_F(IntrinsicsProgram, ChoosesTheLensModel) {
+TEST_F(VlpIntrinsics, SelectsLensModel) {
   const auto real = real_data("apriltag-lattice-phone");
   if (real.empty()) GTEST_SKIP() << "no real captures here";
   const auto result = calibrate(real.string(), (real / "board.yaml").string(), "--lens auto");
   const std::string taken(name_of(read_calibration(folder / "camera.yaml").camera.lens_model));
   EXPECT_THAT(result.output, HasSubstr("lens model    " + taken + ", 0."));
-  // Of four coefficients: of views left out OPENCV4 leaves 0.252 px, OPENCV_FISHEYE 0.246, others
-  // more. Eight views of a good lens do not tell these two apart.
+  // Models of four coefficients: RMS residual of held-out views 0.252 px for OPENCV4, 0.246 px for
+  // OPENCV_FISHEYE, more for other models. Eight views cannot distinguish these two.
   EXPECT_THAT(taken, testing::AnyOf("LENSMODEL_OPENCV4", "OPENCV_FISHEYE"));
 }
 

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// vlp-locate on images of cameras that lean as nobody knows.
+/// vlp-locate on images of cameras with unknown tilt.
 #include <fmt/core.h>
 #include <gmock/gmock.h>
 
@@ -60,12 +60,12 @@ struct Errors {
   }
 };
 
-class Leaning : public testing::Test {
+class TiltedCamera : public testing::Test {
  protected:
   TemporaryFolder folder;
   std::string captures;
 
-  /// Captures of a camera that leans by so much, about x or y, and looks at the lamps.
+  /// Adds captures of a camera tilted by `lean_deg` about x or y, with the lamps in view.
   void add_set(int lean_deg) {
     constexpr double below_m = 1.3;
     const double aside_m = below_m * std::tan(lean_deg * std::numbers::pi / 180);
@@ -128,15 +128,15 @@ class Leaning : public testing::Test {
   }
 };
 
-TEST_F(Leaning, IsAsGoodAsItsPixelsAllow) {
+TEST_F(TiltedCamera, HasErrorsAsPredictedFromPixelNoise) {
   for (const int lean_deg : {5, 15, 30, 50}) add_set(lean_deg);
   render();
   for (const int lean_deg : {5, 15, 30, 50})
     check(lean_deg, "--lean-sd-deg 90", fmt::format("deg_{}", lean_deg));
 }
 
-/// A sensor's inclination, in captures.csv, tells in which plane lamps are discs.
-TEST_F(Leaning, IsAsGoodAsItsSensorAllows) {
+/// The inclination in captures.csv determines the plane in which lamps are discs.
+TEST_F(TiltedCamera, HasErrorsAsPredictedFromInclinationSensor) {
   for (const int lean_deg : {5, 15}) add_set(lean_deg);
   render();
   for (const int lean_deg : {5, 15}) {
@@ -155,7 +155,7 @@ TEST_F(Leaning, IsAsGoodAsItsSensorAllows) {
 }
 
 /// A camera of 3 Mpx close to large lamps, which show enough stripes from aside.
-TEST_F(Leaning, IsFoundFromEllipsesUpTo80Degrees) {
+TEST_F(TiltedCamera, IsLocatedFromEllipsesUpTo80Degrees) {
   std::string scene = kScene;
   const auto replace = [&](const std::string& from, const std::string& to) {
     const auto at = scene.find(from);
@@ -197,7 +197,7 @@ TEST_F(Leaning, IsFoundFromEllipsesUpTo80Degrees) {
   }
 }
 
-TEST_F(Leaning, ShowsTheLookThatCounts) {
+TEST_F(TiltedCamera, AnnotatesFinalDetection) {
   add_set(15);
   render();
   const std::string level = (folder / "level").string(), leaning = (folder / "leaning").string();
@@ -211,7 +211,7 @@ TEST_F(Leaning, ShowsTheLookThatCounts) {
 }
 
 /// Neither lean nor motion is known.
-TEST_F(Leaning, AndDrives) {
+TEST_F(TiltedCamera, IsLocatedWhileMoving) {
   captures +=
       "  - {folder: drive, exposure_s: 5.0e-5, drive: {from_m: [-0.2, 0.35], to_m: [0.2, 0.4], "
       "speed_m_per_s: 1}, heights_m: [0.3], yaws_deg: [0], turn_rate_deg_per_s: 30, "

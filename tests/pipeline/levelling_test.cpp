@@ -15,14 +15,14 @@ namespace {
 
 using testing::HasSubstr;
 
-class LevellingProgram : public testing::Test {
+class VlpRotationByLamps : public testing::Test {
  protected:
   TemporaryFolder folder;
   SyntheticRig rig{synthetic_lamps(), {synthetic_camera(), {}, {}, {}, {}}, {{0, 0, 0}, 0}, {}};
   LampMap surveyed = rig.map;
   Random random{1};
 
-  LevellingProgram() {
+  VlpRotationByLamps() {
     rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.06, 1);
   }
   std::string path(const std::string& name) const { return (folder / name).string() + " "; }
@@ -48,7 +48,7 @@ class LevellingProgram : public testing::Test {
   }
 };
 
-TEST_F(LevellingProgram, WritesTheTilt) {
+TEST_F(VlpRotationByLamps, WritesTilt) {
   auto frames = drive(10);
   frames[3].detections.resize(2);
   const auto result = level(frames);
@@ -66,7 +66,7 @@ TEST_F(LevellingProgram, WritesTheTilt) {
             "--lamps lamps.yaml --calibration camera.yaml --method lamps");
 }
 
-TEST_F(LevellingProgram, WritesARefinedMap) {
+TEST_F(VlpRotationByLamps, WritesRefinedMap) {
   for (Lamp& lamp : rig.map.lamps) lamp.position_m.x() += random.uniform(-0.004, 0.004);
   const auto plain = level(drive(20));
   EXPECT_THAT(plain.errors, HasSubstr("--refine-map may help"));
@@ -94,7 +94,7 @@ TEST_F(LevellingProgram, WritesARefinedMap) {
 }
 
 /// One that drives at 1 m/s, by odometry in captures.csv, by its greatest speed, and left out.
-TEST_F(LevellingProgram, TakesCapturesOfACameraThatDrives) {
+TEST_F(VlpRotationByLamps, AcceptsCapturesOfMovingCamera) {
   BodyRig body{rig.map, rolling_calibration(), {}, {}};
   body.calibration.rotation_center = rig.calibration.rotation_center;
   rig.calibration.camera = body.calibration.camera;
@@ -130,7 +130,7 @@ TEST_F(LevellingProgram, TakesCapturesOfACameraThatDrives) {
   }
 }
 
-TEST_F(LevellingProgram, SaysWhatToAddOrWhatIsWrong) {
+TEST_F(VlpRotationByLamps, ReportsRemedyOrCause) {
   const auto one = level(drive(1));
   EXPECT_EQ(one.exit_code, 3);
   EXPECT_THAT(one.errors, HasSubstr("add captures"));
@@ -149,7 +149,7 @@ TEST_F(LevellingProgram, SaysWhatToAddOrWhatIsWrong) {
   EXPECT_THAT(other_map.errors, HasSubstr("lamps.yaml: has none of the lamps"));
 }
 
-TEST_F(LevellingProgram, RefusesOptionsThatDoNotGoTogether) {
+TEST_F(VlpRotationByLamps, RejectsIncompatibleOptions) {
   EXPECT_EQ(level(drive(5), "--refine-map " + path("levelled.yaml")).exit_code, 2);
   EXPECT_EQ(level(drive(5), "--refine-map " + path("lamps.yaml")).exit_code, 2);
   EXPECT_EQ(level(drive(5), "--plot " + path("a.png")).exit_code, 2);

@@ -23,7 +23,7 @@ const std::string kLimits = "vlp-limits --lamps " VLP_SOURCE_DIR
                             "/datasets/example/lamps.yaml --calibration " VLP_SOURCE_DIR
                             "/datasets/example/calibration.yaml --height-m 0 --noise-px 0.1 ";
 
-TEST(Limits, PrintsTheErrorBudget) {
+TEST(VlpLimits, PrintsErrorBudget) {
   const auto result = run_program(kLimits + "--center-px 1 --tilt-deg 0.5 --lamp-map-mm 1");
   ASSERT_EQ(result.exit_code, 0) << result.errors;
   for (const char* row : {"noise", "centre", "tilt", "lamp map", "together"}) {
@@ -31,7 +31,7 @@ TEST(Limits, PrintsTheErrorBudget) {
   }
 }
 
-TEST(Limits, WritesTheMapAsATableAndAPicture) {
+TEST(VlpLimits, WritesMapAsTableAndPlot) {
   const TemporaryFolder folder;
   const auto result =
       run_program(kLimits + "--tilt-deg 1 --floor-m -0.2 0.2 0 0.1 --step-m 0.1 --map " +
@@ -52,7 +52,7 @@ TEST(Limits, WritesTheMapAsATableAndAPicture) {
   EXPECT_THAT(TemporaryFolder::content_of(folder / "map.png"), StartsWith("\x89PNG"));
 }
 
-TEST(Limits, ShowWhatMotionAndLeanCost) {
+TEST(VlpLimits, ReportsEffectOfMotionAndTilt) {
   const TemporaryFolder folder;
   const auto map_of = [&](const std::string& options) {
     const auto result = run_program(kLimits + "--floor-m -0.2 0.2 0 0.1 --step-m 0.1 --map " +
@@ -87,7 +87,7 @@ TEST(Limits, ShowWhatMotionAndLeanCost) {
   EXPECT_GT(with_fix, 0);
 }
 
-TEST(Limits, OfACameraThatDrivesWantItsRowTime) {
+TEST(VlpLimits, RequiresRowTimeOfMovingCamera) {
   const TemporaryFolder folder;
   Calibration calibration{synthetic_camera(), {}, {}, {}, {}};
   write_calibration(folder / "camera.yaml", calibration);
@@ -104,13 +104,13 @@ TEST(Limits, OfACameraThatDrivesWantItsRowTime) {
 }
 
 /// A calibration of the tests' rig that states its zenith, and a map that states its survey.
-class StatedLimits : public testing::Test {
+class VlpLimitsFromCalibration : public testing::Test {
  protected:
   TemporaryFolder folder;
   LampMap lamps = synthetic_lamps();
   Calibration calibration{synthetic_camera(), {}, {}, {}, {}};
 
-  StatedLimits() {
+  VlpLimitsFromCalibration() {
     RotationCenter center = tilted_by(calibration.camera, 0.02, 1);
     center.covariance = 1e-4 * Eigen::Matrix2d::Identity();
     calibration = with_rotation_center(calibration, center, {});
@@ -125,7 +125,7 @@ class StatedLimits : public testing::Test {
   }
 };
 
-TEST_F(StatedLimits, SayWhatToImproveFirst) {
+TEST_F(VlpLimitsFromCalibration, NamesLargestErrorSource) {
   const auto result = run("--stated --map " + (folder / "map.csv").string());
   ASSERT_EQ(result.exit_code, 0) << result.errors;
   EXPECT_THAT(result.output, HasSubstr("improve     lamp map first, 99 % of the horizontal"));
@@ -143,7 +143,7 @@ TEST_F(StatedLimits, SayWhatToImproveFirst) {
   }
 }
 
-TEST_F(StatedLimits, OfACameraFromTheBoardsAloneAreThoseOfItsLens) {
+TEST_F(VlpLimitsFromCalibration, IncludeOnlyLensWithoutRotationCenter) {
   calibration.rotation_center.reset();
   calibration.history.clear();  // it names the centre
   calibration.intrinsics_report = IntrinsicsReport{10, 1000, 0, 0.1, {}, {}};
@@ -156,7 +156,7 @@ TEST_F(StatedLimits, OfACameraFromTheBoardsAloneAreThoseOfItsLens) {
   EXPECT_THAT(result.errors, HasSubstr("zenith, lamp map: the errors are not stated"));
 }
 
-TEST_F(StatedLimits, TellOfLampsThatTheMapHasElsewhere) {
+TEST_F(VlpLimitsFromCalibration, WarnOfLampsAdjustedElsewhere) {
   StatedRig rig;
   rig.adjust(1);
   lamps = rig.map;
@@ -171,7 +171,7 @@ TEST_F(StatedLimits, TellOfLampsThatTheMapHasElsewhere) {
               HasSubstr("1 lamps are elsewhere than in the adjustment of the calibration"));
 }
 
-TEST_F(StatedLimits, WantErrorsThatAreStatedOnce) {
+TEST_F(VlpLimitsFromCalibration, RejectErrorsGivenTwice) {
   EXPECT_EQ(run("--stated --tilt-deg 1").exit_code, 2);
   calibration.rotation_center->covariance.reset();
   for (Lamp& lamp : lamps.lamps) lamp.sd_m.reset();
@@ -180,13 +180,13 @@ TEST_F(StatedLimits, WantErrorsThatAreStatedOnce) {
   EXPECT_THAT(result.errors, HasSubstr("calibration.yaml: states no errors of its own, and"));
 }
 
-TEST(Limits, EndsWithThreeWhereNoTwoLampsAreInView) {
+TEST(VlpLimits, ReturnsThreeWithoutTwoVisibleLamps) {
   const auto result = run_program(kLimits + "--floor-m 50 51 50 51");
   EXPECT_EQ(result.exit_code, 3);
   EXPECT_THAT(result.errors, HasSubstr("two lamps are in view nowhere"));
 }
 
-TEST(Limits, WritesNothingWhenItsPictureCannotBe) {
+TEST(VlpLimits, WritesNothingForInvalidPlotName) {
   const TemporaryFolder folder;
   const auto map = folder / "map.csv";
   const auto result = run_program(kLimits + "--map " + map.string() + " --picture a.jpg");
@@ -195,7 +195,7 @@ TEST(Limits, WritesNothingWhenItsPictureCannotBe) {
   EXPECT_FALSE(std::filesystem::exists(map));
 }
 
-TEST(Limits, OfAFisheyeReachAsFarAsItSees) {
+TEST(VlpLimits, CoverFieldOfViewOfFisheye) {
   const TemporaryFolder folder;
   const auto map_of = [&](const Camera& camera) {
     write_calibration(folder / "camera.yaml", {camera, {}, {}, {}, {}});
@@ -221,7 +221,7 @@ TEST(Limits, OfAFisheyeReachAsFarAsItSees) {
   EXPECT_GT(more, 0);
 }
 
-TEST(Limits, WritesNoTwoResultsToOneFile) {
+TEST(VlpLimits, RejectsTwoOutputsInOneFile) {
   const TemporaryFolder folder;
   const auto result = run_program("cd '" + (folder / "").string() + "' && " + kLimits +
                                   "--map a.svg --picture ./a.svg");
@@ -230,13 +230,13 @@ TEST(Limits, WritesNoTwoResultsToOneFile) {
   EXPECT_FALSE(std::filesystem::exists(folder / "a.svg"));
 }
 
-TEST(Limits, NoticesWhenItsResultsAreLost) {
+TEST(VlpLimits, ReportsFailedWriteToStdout) {
   const auto result = run_program("{ " + kLimits + "; } >/dev/full");
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.errors, HasSubstr("stdout cannot be written"));
 }
 
-TEST(Limits, EndsWithTwoOnBadUsage) {
+TEST(VlpLimits, ReturnsTwoForBadUsage) {
   EXPECT_EQ(run_program(kLimits + "--floor-m 1 0 0 1").exit_code, 2);
   EXPECT_EQ(run_program(kLimits + "--step-m 0").exit_code, 2);
   EXPECT_EQ(run_program(kLimits + "--step-m 1e-9").exit_code, 2);

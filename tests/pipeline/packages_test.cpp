@@ -33,7 +33,7 @@ class Packages : public testing::Test {
       fs::permissions(folder / name, fs::perms::owner_all);
     }
   }
-  /// How cmake was called, in its order.
+  /// Returns the calls of cmake, in their order.
   std::string calls() const {
     const auto result =
         run_program("cd '" + (folder / "").string() +
@@ -44,7 +44,7 @@ class Packages : public testing::Test {
   }
 };
 
-TEST_F(Packages, AreOfTheBuildThatIsThere) {
+TEST_F(Packages, UseExistingBuild) {
   folder.file("build/CMakeCache.txt",
               "CMAKE_INSTALL_PREFIX:PATH=/opt/vlp\nCMAKE_UNITY_BUILD:BOOL=OFF\n");
   EXPECT_THAT(calls(),
@@ -55,7 +55,7 @@ TEST_F(Packages, AreOfTheBuildThatIsThere) {
                     HasSubstr("cmake -DCMAKE_INSTALL_PREFIX=/opt/vlp -UCMAKE_INSTALL_LIBDIR ")));
 }
 
-TEST_F(Packages, AreOfTheReleasePresetWhereThereIsNoBuild) {
+TEST_F(Packages, UseReleasePresetWithoutBuild) {
   const std::string called = calls();
   EXPECT_THAT(called, testing::StartsWith("cmake --preset release -DCMAKE_INSTALL_PREFIX=/usr "));
   EXPECT_THAT(called.substr(0, called.find('\n')), HasSubstr(" -DBUILD_TESTING=OFF"));

@@ -25,7 +25,7 @@ using testing::HasSubstr;
 constexpr double kCeiling_m = 2.46, kFocal_px = 5620;
 
 /// A phone that lay on the floor under five lamps.
-class RealGlowChain : public testing::Test {
+class VlpLocateRealLamps : public testing::Test {
  protected:
   const fs::path luxapose = real_data("luxapose");
   const TemporaryFolder folder;
@@ -73,7 +73,7 @@ class RealGlowChain : public testing::Test {
   }
 };
 
-TEST_F(RealGlowChain, OfFiveLampsEndsAtTheRigsCentre) {
+TEST_F(VlpLocateRealLamps, LocatesRigCenterWithFiveLamps) {
   const auto located = locate("x_0_y_1.27.jpg", 7712, 4352, "rows");
   ASSERT_EQ(located.exit_code, 0) << located.errors;
   const FixRow row = only_fix();
@@ -92,7 +92,7 @@ TEST_F(RealGlowChain, OfFiveLampsEndsAtTheRigsCentre) {
   EXPECT_EQ(evaluate(" --gate max_mm=18").exit_code, 1);
 }
 
-TEST_F(RealGlowChain, OfThreeLampsEndsWhereTheOtherTwoAreOutOfView) {
+TEST_F(VlpLocateRealLamps, LocatesRigWithThreeVisibleLamps) {
   const auto located = locate("2014-02-27--18-15-03-62.jpg", 4352, 7712, "columns");
   ASSERT_EQ(located.exit_code, 0) << located.errors;
   // The lamps have no outline: their sigma_px contains the residuals of a lens that is not known.
@@ -106,7 +106,7 @@ TEST_F(RealGlowChain, OfThreeLampsEndsWhereTheOtherTwoAreOutOfView) {
 }
 
 /// Another phone, calibrated from its own photographs: what it would reach under those lamps.
-TEST_F(IntrinsicsProgram, GivesAPhonesLensAsFarAsItsLimitUnderRealLamps) {
+TEST_F(VlpIntrinsics, YieldsCrlbOfPhoneUnderRealLamps) {
   const auto board = real_data("apriltag-lattice-phone"), luxapose = real_data("luxapose");
   if (board.empty() || luxapose.empty()) GTEST_SKIP() << "no real captures here";
   const auto calibrated = calibrate(board.string(), (board / "board.yaml").string());

@@ -20,7 +20,7 @@ const std::string kCheck = VLP_SOURCE_DIR "/tests/support/browser_check.py";
 constexpr int kNoBrowser = 77;
 
 /// vlp-evaluate on the example, with all there can be in a report.
-class ReportTest : public testing::Test {
+class VlpEvaluateReport : public testing::Test {
  protected:
   TemporaryFolder folder;
 
@@ -64,7 +64,7 @@ class ReportTest : public testing::Test {
   }
 };
 
-TEST_F(ReportTest, OpensInABrowserPrintsOnA4AndLeavesNothingToComplainOf) {
+TEST_F(VlpEvaluateReport, PassesBrowserCheck) {
   const auto [code, output, errors] = evaluate(all());
   ASSERT_EQ(code, 0) << errors;
   const auto check = run_program("python3 " + kCheck + in("report.html"));
@@ -79,7 +79,7 @@ TEST_F(ReportTest, OpensInABrowserPrintsOnA4AndLeavesNothingToComplainOf) {
   }
 }
 
-TEST_F(ReportTest, IsTheSameTwiceAndWrittenWhenAGateIsNotMet) {
+TEST_F(VlpEvaluateReport, IsReproducibleAndWrittenWhenGateFails) {
   ASSERT_EQ(evaluate(all()).exit_code, 0);
   const std::string first = TemporaryFolder::content_of(folder / "report.html");
   EXPECT_THAT(first, Not(HasSubstr((folder / "").string()))) << "paths of a machine";
@@ -90,7 +90,7 @@ TEST_F(ReportTest, IsTheSameTwiceAndWrittenWhenAGateIsNotMet) {
               HasSubstr("FAIL</strong>1 of 2"));
 }
 
-TEST_F(ReportTest, RefusesWhatItCannotShow) {
+TEST_F(VlpEvaluateReport, RejectsInvalidContent) {
   const auto refusal = [&](const std::string& more) {
     const auto [code, output, errors] = evaluate(more);
     EXPECT_EQ(code, 2) << more;
@@ -113,7 +113,7 @@ std::string good_page() {
   return report_html(report);
 }
 
-TEST(BrowserCheck, SeesWhatIsWrong) {
+TEST(BrowserCheck, DetectsFaults) {
   const struct {
     const char *name, *from, *to, *complaint;
   } faults[] = {

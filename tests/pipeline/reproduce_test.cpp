@@ -23,7 +23,7 @@ const std::string kFewCaptures = R"(captures:
   - {folder: check, exposure_s: 5.0e-5, grid: {x_m: [-0.6, 0.6], y_m: [-0.35, 0.35], columns: 3, rows: 2}, heights_m: [0, 0.3], turn: {count: 2, jitter_deg: 60}, interval_s: 0.5}
 )";
 
-class Reproduce : public testing::Test {
+class ReproducePaper : public testing::Test {
  protected:
   TemporaryFolder folder;
   const std::filesystem::path out = folder / "out";
@@ -56,7 +56,7 @@ std::vector<double> row(const std::string& table, const std::string& label, int 
   return numbers;
 }
 
-TEST_F(Reproduce, PrintsThePapersTableBesideOursAndWhatTheDifferencesComeFrom) {
+TEST_F(ReproducePaper, ComparesWithTableOfPaper) {
   const auto result = reproduce();
   ASSERT_EQ(result.exit_code, 0) << result.errors;
   EXPECT_EQ(result.errors, "");

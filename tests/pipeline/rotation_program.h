@@ -17,7 +17,7 @@
 namespace vlp {
 
 /// Tests of vlp-rotation on the turn of the example, as it is or changed.
-class Rotation : public testing::Test {
+class VlpRotation : public testing::Test {
  protected:
   ProgramResult rotation(const std::string& captures, const std::string& options = "") const {
     return run_program("vlp-rotation '" + captures + "' --lamps " + kExample +

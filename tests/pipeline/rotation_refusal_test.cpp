@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// What vlp-rotation refuses, by whatever method.
+/// Inputs that vlp-rotation rejects with all methods.
 #include <gmock/gmock.h>
 
 #include <utility>
@@ -12,7 +12,7 @@
 namespace vlp {
 namespace {
 
-class RotationRefusal : public Rotation {
+class VlpRotationErrors : public VlpRotation {
  protected:
   /// With `lamps` as the map, by each method.
   void expect_refusals(const std::string& message) {
@@ -28,17 +28,17 @@ class RotationRefusal : public Rotation {
   LampMap lamps = read_lamp_map(kExample + "lamps.yaml");
 };
 
-TEST_F(RotationRefusal, SaysThatAMapIsMirrored) {
+TEST_F(VlpRotationErrors, ReportsMirroredMap) {
   for (Lamp& lamp : lamps.lamps) lamp.position_m.x() *= -1;
   expect_refusals("the lamp map looks mirrored");
 }
 
-TEST_F(RotationRefusal, SaysThatTwoLampsAreSwapped) {
+TEST_F(VlpRotationErrors, ReportsSwappedLamps) {
   std::swap(lamps.lamps[0].position_m, lamps.lamps[1].position_m);
   expect_refusals("lamps 1 and 2 look swapped");
 }
 
-TEST_F(RotationRefusal, RefusesWhatDoesNotDetermineIt) {
+TEST_F(VlpRotationErrors, RejectsInsufficientCaptures) {
   expect_refusal(rotation(captures([](std::size_t i) { return i < 1; })), 3, "add captures");
   expect_refusal(rotation(captures([](std::size_t i) { return i < 3; })), 3,
                  "less than 90 degrees: add captures");
@@ -51,7 +51,7 @@ TEST_F(RotationRefusal, RefusesWhatDoesNotDetermineIt) {
 }
 
 /// Captures that differ by their noise alone, at two yaws of the turn or at three.
-TEST_F(RotationRefusal, RefusesCirclesAtTwoOppositeYaws) {
+TEST_F(VlpRotationErrors, RejectsCirclesAtTwoOppositeYaws) {
   const auto turn = read_detections(kExample + "turning.csv");
   // The turn is at two heights, one after the other.
   const std::size_t half = turn.size() / 4, quarter = turn.size() / 8;
@@ -69,7 +69,7 @@ TEST_F(RotationRefusal, RefusesCirclesAtTwoOppositeYaws) {
             0);
 }
 
-TEST_F(RotationRefusal, RefusesTheMapOfAnotherRoom) {
+TEST_F(VlpRotationErrors, RejectsMapOfAnotherRoom) {
   const std::string map = "format: vlp-lamps/1\nlamps:\n";
   const auto other = [&](const std::string& places) {
     return run_program("vlp-rotation " + kExample + "turning.csv --lamps " +
@@ -85,7 +85,7 @@ TEST_F(RotationRefusal, RefusesTheMapOfAnotherRoom) {
                  2, "is it the map of this room?");
 }
 
-TEST_F(RotationRefusal, RefusesToWriteOverAnInput) {
+TEST_F(VlpRotationErrors, DoesNotOverwriteInput) {
   const std::string input = kExample + "lamps.yaml";
   EXPECT_EQ(rotation(kExample + "turning.csv", "--plot " + input).exit_code, 2);
 }

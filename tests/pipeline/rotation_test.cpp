@@ -20,7 +20,7 @@ double angle_between_deg(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return deg_from_rad(std::atan2(a.cross(b).norm(), a.dot(b)));
 }
 
-TEST_F(Rotation, FindsTiltAndLeverArmOfTheExample) {
+TEST_F(VlpRotation, EstimatesTiltAndLeverArmOfExample) {
   const auto result = rotation(kExample + "turning.csv");
   ASSERT_EQ(result.exit_code, 0) << result.errors;
   EXPECT_EQ(result.errors, "");
@@ -34,7 +34,7 @@ TEST_F(Rotation, FindsTiltAndLeverArmOfTheExample) {
   }
 }
 
-TEST_F(Rotation, KeepsTheCameraAndReplacesItsOwnPart) {
+TEST_F(VlpRotation, KeepsCameraAndReplacesRotationCenter) {
   ASSERT_EQ(rotation(kExample + "turning.csv").exit_code, 0);
   ASSERT_EQ(run_program("vlp-rotation -q " + kExample + "turning.csv --lamps " + kExample +
                         "lamps.yaml --calibration " + output.string() + " -o " +
@@ -50,7 +50,7 @@ TEST_F(Rotation, KeepsTheCameraAndReplacesItsOwnPart) {
   EXPECT_THAT(again.rotation_center->center_px, IsNear(found().center_px, 1e-6));
 }
 
-TEST_F(Rotation, GivesTheSameBytesTwice) {
+TEST_F(VlpRotation, GivesSameBytesTwice) {
   const auto first = rotation(kExample + "turning.csv", "--plot " + (folder / "a.png").string());
   const std::string calibration = TemporaryFolder::content_of(output);
   const auto second = rotation(kExample + "turning.csv", "--plot " + (folder / "b.png").string());
@@ -61,8 +61,8 @@ TEST_F(Rotation, GivesTheSameBytesTwice) {
   EXPECT_EQ(TemporaryFolder::content_of(folder / "b.png"), picture);
 }
 
-/// Lamps at 2.4 to 2.6 m, the camera at one height: rendered, so that nobody made up the noise.
-TEST_F(Rotation, FindsTheLeverArmAtOneHeightUnderLampsAtSeveral) {
+/// Lamps at 2.4 to 2.6 m, camera at one height. Rendered images give realistic noise.
+TEST_F(VlpRotation, EstimatesLeverArmFromLampsAtSeveralHeights) {
   const std::string rendered = (folder / "wide").string();
   ASSERT_EQ(run_program("vlp-simulate -q " VLP_SOURCE_DIR
                         "/datasets/wide/scene.yaml --only rotation -o " +
@@ -84,7 +84,7 @@ TEST_F(Rotation, FindsTheLeverArmAtOneHeightUnderLampsAtSeveral) {
   EXPECT_THAT(*found().lever_arm_m, IsNear(Eigen::Vector2d(0.01, 0.005), 1e-3));
 }
 
-TEST_F(Rotation, SaysAtOneHeightWhatItAssumes) {
+TEST_F(VlpRotation, ReportsAssumedLeverArmAtOneHeight) {
   auto frames = read_detections(kExample + "turning.csv");
   frames.resize(12);
   for (Frame& frame : frames) {  // without the only lamp that hangs lower
@@ -98,14 +98,14 @@ TEST_F(Rotation, SaysAtOneHeightWhatItAssumes) {
   EXPECT_FALSE(found().lever_arm_m);
 }
 
-/// On a camera that leans no centre in the image is exact, and the residuals tell.
-TEST_F(Rotation, SaysWhenTheNoiseDoesNotExplainTheResiduals) {
+/// For a tilted camera a fixed center in the image is inexact, which increases the residuals.
+TEST_F(VlpRotation, WarnsOfResidualsAboveNoise) {
   const auto result = rotation(kExample + "turning.csv", "--method joint");
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_THAT(result.errors, HasSubstr("px of noise, 0.05 px are stated"));
 }
 
-TEST_F(Rotation, HasTheOtherMethods) {
+TEST_F(VlpRotation, SupportsMethodsJointAndCircle) {
   for (const std::string method : {"joint", "circle"}) {
     ASSERT_EQ(rotation(kExample + "turning.csv", "--method " + method).exit_code, 0);
     EXPECT_EQ(found().model, RotationModel::shift);
@@ -116,7 +116,7 @@ TEST_F(Rotation, HasTheOtherMethods) {
   EXPECT_EQ(rotation(kExample + "turning.csv", "--method guess").exit_code, 2);
 }
 
-TEST_F(Rotation, SaysThatThreePointsOfACircleLeaveNoStandardDeviation) {
+TEST_F(VlpRotation, WarnsOfMissingSdForThreePointsOfCircle) {
   const auto result =
       rotation(captures([](std::size_t i) { return i % 4 == 0; }), "--method circle");
   ASSERT_EQ(result.exit_code, 0) << result.errors;
@@ -128,7 +128,7 @@ TEST_F(Rotation, SaysThatThreePointsOfACircleLeaveNoStandardDeviation) {
   EXPECT_THAT(full.errors, testing::Not(HasSubstr("no standard deviation")));
 }
 
-TEST_F(Rotation, NamesAMisidentifiedLamp) {
+TEST_F(VlpRotation, NamesMisidentifiedLamp) {
   auto frames = read_detections(kExample + "turning.csv");
   std::swap(frames[5].detections[0].pixel, frames[5].detections[1].pixel);
   const auto result = rotation(written(frames));
@@ -141,7 +141,7 @@ TEST_F(Rotation, NamesAMisidentifiedLamp) {
 }
 
 /// From rendered images, with the lens known: the whole way from pixels.
-TEST(RotationRendered, FindsTheZenith) {
+TEST(VlpRotationOfRenderedImages, EstimatesZenith) {
   for (const std::string rig : {"paper-rig", "paper-rig-faulty"}) {
     SCOPED_TRACE(rig);
     const TemporaryFolder folder;

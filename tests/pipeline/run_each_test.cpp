@@ -23,7 +23,7 @@ class RunEach : public testing::Test {
     std::ofstream(folder / "lines") << lines;
     return run_program(fmt::format("vlp-calibrate --each <'{}'", (folder / "lines").string()));
   }
-  /// Of a session, its results beside it.
+  /// Returns the request for a session, with results next to it.
   std::string line(const std::string& session, int limit_s = 100) const {
     const std::string at = (folder / session).string();
     return json{{"arguments", {at, "-o", at + "-results"}}, {"limit_s", limit_s}}.dump() + "\n";
@@ -43,7 +43,7 @@ class RunEach : public testing::Test {
   TemporaryFolder folder;
 };
 
-TEST_F(RunEach, AnswersEachAsVlpCalibrateAlone) {
+TEST_F(RunEach, MatchesSeparateRunsOfVlpCalibrate) {
   const auto [code, output, errors] = run(line("nowhere's") + line("\n"));
   EXPECT_EQ(code, 0);
   EXPECT_EQ(errors, "");
@@ -57,7 +57,7 @@ TEST_F(RunEach, AnswersEachAsVlpCalibrateAlone) {
   EXPECT_GT(all[1].at("cpu_s"), 0);
 }
 
-TEST_F(RunEach, KillsAtTheLimitAndGoesOn) {
+TEST_F(RunEach, ContinuesAfterTimeLimit) {
   // Images of 200 million pixels, which take no room on the disk.
   const auto session = folder / "endless";
   std::filesystem::create_directories(session / "rotation");
@@ -79,7 +79,7 @@ TEST_F(RunEach, KillsAtTheLimitAndGoesOn) {
   EXPECT_EQ(all[1].at("exit_code"), 2);
 }
 
-TEST_F(RunEach, EndsAtALineThatIsNone) {
+TEST_F(RunEach, RejectsInvalidLine) {
   for (const std::string bad :
        {"x", "{}", R"({"arguments": "a", "limit_s": 1})", R"({"arguments": ["a"], "limit_s": "b"})",
         R"({"arguments": ["a"], "limit_s": 0})", R"({"arguments": ["a"], "limit_s": -1})",

@@ -27,13 +27,13 @@ std::string test_name(std::string scene) {
   return scene;
 }
 
-class Samples : public testing::TestWithParam<const char*> {
+class RenderedSamples : public testing::TestWithParam<const char*> {
  protected:
   const fs::path dataset = fs::path(VLP_SOURCE_DIR "/datasets") / GetParam();
   const TemporaryFolder folder;
 };
 
-class SamplesOfDiscs : public testing::TestWithParam<Sample> {
+class RenderedSamplesOfDiscs : public testing::TestWithParam<Sample> {
  protected:
   const fs::path dataset = fs::path(VLP_SOURCE_DIR "/datasets") / GetParam().scene;
   const TemporaryFolder folder;
@@ -52,7 +52,7 @@ void expect_same_picture(const fs::path& committed, const fs::path& rendered) {
   EXPECT_LT(rms, 0.01 * brightest) << committed;
 }
 
-TEST_P(Samples, AreWhatTheSceneGives) {
+TEST_P(RenderedSamples, MatchScene) {
   std::string only;
   for (const fs::directory_entry& entry : fs::directory_iterator(dataset / "rendered")) {
     if (entry.is_directory()) only += (only.empty() ? "" : ",") + entry.path().filename().string();
@@ -76,7 +76,7 @@ TEST_P(Samples, AreWhatTheSceneGives) {
 }
 
 /// As committed: what another system renders is not asked here.
-TEST_P(SamplesOfDiscs, AreLocated) {
+TEST_P(RenderedSamplesOfDiscs, AreLocated) {
   const std::string rendered = (dataset / "rendered").string();
   const std::string fixes = (folder / "fixes.csv").string();
   const auto located =
@@ -89,12 +89,12 @@ TEST_P(SamplesOfDiscs, AreLocated) {
   EXPECT_EQ(result.exit_code, 0) << result.output << result.errors;
 }
 
-INSTANTIATE_TEST_SUITE_P(Scenes, Samples,
+INSTANTIATE_TEST_SUITE_P(Scenes, RenderedSamples,
                          testing::Values("paper-rig", "paper-rig-faulty", "clutter", "wide",
                                          "downlights"),
                          [](const auto& instance) { return test_name(instance.param); });
 
-INSTANTIATE_TEST_SUITE_P(Scenes, SamplesOfDiscs,
+INSTANTIATE_TEST_SUITE_P(Scenes, RenderedSamplesOfDiscs,
                          testing::Values(Sample{"paper-rig", 0.038},
                                          Sample{"paper-rig-faulty", 0.28}, Sample{"clutter", 0.03},
                                          Sample{"wide", 0.048}),

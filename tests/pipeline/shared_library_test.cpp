@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// What a robot carries.
+/// Shared positioning library for robots: exported symbols, layout of types, dependencies.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -52,7 +52,7 @@ std::vector<std::string> names_in(const std::string& symbol) {
   return names;
 }
 
-TEST(SharedLibrary, ShowsWhatItsHeadersDeclareAndNothingElse) {
+TEST(SharedLibrary, ExportsOnlyDeclaredSymbols) {
   const auto shown = run_program("nm -D --defined-only --demangle '" VLP_SHARED_LIBRARY "'");
   ASSERT_EQ(shown.exit_code, 0) << shown.errors;
   const std::set<std::string> words = words_of_headers();
@@ -83,7 +83,7 @@ TEST(SharedLibrary, ShowsWhatItsHeadersDeclareAndNothingElse) {
   }
 }
 
-TEST(SharedLibrary, ShowsEveryFunctionOfTheCHeader) {
+TEST(SharedLibrary, ExportsAllFunctionsOfCHeader) {
   const auto shown = run_program("nm -D --defined-only '" VLP_SHARED_LIBRARY "'");
   const std::string text = text_of("positioning/vlp.h");
   const std::regex function(
@@ -97,9 +97,9 @@ TEST(SharedLibrary, ShowsEveryFunctionOfTheCHeader) {
   EXPECT_EQ(functions, 9U);
 }
 
-/// What is vectorised widest is aligned widest: Eigen's matrices of 32 bytes, or a multiple, have
-/// another alignment with AVX, and of 64 with AVX-512.
-TEST(SharedLibrary, HasNoTypeWhoseLayoutChangesWithTheProcessor) {
+/// Alignment of Eigen's matrices follows the widest vector instructions: matrices of a multiple of
+/// 32 bytes change with AVX, of 64 bytes with AVX-512.
+TEST(SharedLibrary, HasProcessorIndependentLayout) {
   const std::regex matrix("Eigen::(?:Matrix<double, ([0-9]+), ([0-9]+)>|(Matrix|Vector)([24])d)");
   for (const std::string& header : headers()) {
     const std::string text = text_of(header);
@@ -142,7 +142,7 @@ TEST(SharedLibrary, HasNoTypeWhoseLayoutChangesWithTheProcessor) {
   }
 }
 
-TEST(SharedLibrary, NeedsNoneOfTheToolboxsLibraries) {
+TEST(SharedLibrary, LinksNoOtherToolboxLibrary) {
   auto result = run_program("ldd '" VLP_SHARED_LIBRARY "'");
   ASSERT_EQ(result.exit_code, 0) << result.errors;
   std::string& needed = result.output;

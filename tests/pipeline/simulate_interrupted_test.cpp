@@ -11,7 +11,7 @@
 namespace vlp {
 namespace {
 
-using SimulateInterrupted = SmallSimulation;
+using VlpSimulateInterrupted = SmallSimulation;
 
 ino_t file_number(const std::filesystem::path& file) {
   struct stat status {};
@@ -19,7 +19,7 @@ ino_t file_number(const std::filesystem::path& file) {
   return status.st_ino;
 }
 
-TEST_F(SimulateInterrupted, RendersWhatIsNotThereAndKeepsTheRest) {
+TEST_F(VlpSimulateInterrupted, RendersOnlyMissingFiles) {
   const Files expected = undisturbed();
   ASSERT_EQ(simulate().exit_code, 0);
   for (const char* name : {"lamps/0003.png", "lamps/0015.png", "boards/0000.png",
@@ -41,27 +41,27 @@ TEST_F(SimulateInterrupted, RendersWhatIsNotThereAndKeepsTheRest) {
   }
 }
 
-TEST_F(SimulateInterrupted, FindsAllThereWhenNothingIsMissing) {
+TEST_F(VlpSimulateInterrupted, RendersNothingWhenComplete) {
   ASSERT_EQ(simulate().exit_code, 0);
   const Files before = files_below(output);
   EXPECT_EQ(simulate().output, "rendered 0 captures, 24 were there; in " + output.string() + "\n");
   EXPECT_TRUE(files_below(output) == before);
 }
 
-TEST_F(SimulateInterrupted, BeginsInAnEmptyFolder) {
+TEST_F(VlpSimulateInterrupted, StartsInEmptyFolder) {
   ASSERT_TRUE(std::filesystem::create_directory(output));
   EXPECT_EQ(simulate("--only boards").exit_code, 0);
 }
 
 // That is how it is left when the program is killed as it writes there first; see WholeFile.
-TEST_F(SimulateInterrupted, BeginsInAFolderWithAnUnfinishedFile) {
+TEST_F(VlpSimulateInterrupted, StartsInFolderWithTemporaryFile) {
   ASSERT_TRUE(std::filesystem::create_directory(output));
   folder.file("output/.scene.yaml.tmp-123-0", "# vlp-sim");
   const auto result = simulate("--only boards");
   EXPECT_EQ(result.exit_code, 0) << result.errors;
 }
 
-TEST_F(SimulateInterrupted, LeavesWholeImagesWhereverItIsKilled) {
+TEST_F(VlpSimulateInterrupted, LeavesCompleteImagesAfterKill) {
   const Files expected = undisturbed();
   const auto begin = std::chrono::steady_clock::now();
   ASSERT_EQ(simulate("--threads 2").exit_code, 0);

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// What vlp-simulate cannot do: one line that says so, exit code 2, and no file touched.
+/// Invalid input of vlp-simulate: an error in one line, exit code 2, and no changed file.
 #include <algorithm>
 
 #include "small_simulation.h"
@@ -10,7 +10,7 @@ namespace {
 
 using testing::HasSubstr;
 
-class SimulateRefusals : public SmallSimulation {
+class VlpSimulateErrors : public SmallSimulation {
  protected:
   void expect_refused(const std::string& options, const std::string& message) const {
     const auto result = simulate(options);
@@ -26,7 +26,7 @@ class SimulateRefusals : public SmallSimulation {
   }
 };
 
-TEST_F(SimulateRefusals, KeepAFolderOfAnotherSeedOrScene) {
+TEST_F(VlpSimulateErrors, KeepFolderOfOtherSeedOrScene) {
   ASSERT_EQ(simulate("--only boards").exit_code, 0);
   std::filesystem::remove(output / "boards/0000.png");
   const Files before = files_below(output);
@@ -41,7 +41,7 @@ TEST_F(SimulateRefusals, KeepAFolderOfAnotherSeedOrScene) {
   EXPECT_EQ(simulate("--only boards").exit_code, 0) << "it is the same scene again";
 }
 
-TEST_F(SimulateRefusals, KeepAFolderOfSomethingElse) {
+TEST_F(VlpSimulateErrors, KeepFolderOfOtherFiles) {
   for (const std::string name : {"notes.txt", "boards/0000.png", "lamps.yaml"}) {
     std::filesystem::create_directories(output / "boards");
     folder.file("output/" + name, "mine\n");
@@ -51,18 +51,18 @@ TEST_F(SimulateRefusals, KeepAFolderOfSomethingElse) {
   }
 }
 
-TEST_F(SimulateRefusals, KeepTheSceneItself) {
+TEST_F(VlpSimulateErrors, KeepSceneFile) {
   output = folder / "";
   expect_refused("", "scene.yaml: is an input, too, and would be overwritten");
   EXPECT_EQ(files_below(output).at("scene.yaml"), kSmallScene);
 }
 
-TEST_F(SimulateRefusals, NameTheFolderThatTheSceneDoesNotHave) {
+TEST_F(VlpSimulateErrors, NameFolderMissingInScene) {
   expect_refused_and_nothing_made("--only nothing", "the scene has no captures called 'nothing'");
   expect_refused_and_nothing_made("--only boards,../boards", "no captures called '../boards'");
 }
 
-TEST_F(SimulateRefusals, NameTheOutputThatCannotBeMade) {
+TEST_F(VlpSimulateErrors, NameOutputThatCannotBeCreated) {
   output = folder.file("file", "mine\n");
   expect_refused("", output.string() + ": cannot be made: Not a directory");
   output = output / "below";
@@ -70,24 +70,24 @@ TEST_F(SimulateRefusals, NameTheOutputThatCannotBeMade) {
   EXPECT_EQ(TemporaryFolder::content_of(folder / "file"), "mine\n");
 }
 
-TEST_F(SimulateRefusals, NameLineAndKeyOfAMistakeInTheScene) {
+TEST_F(VlpSimulateErrors, NameLineAndKeyOfInvalidScene) {
   change_scene("bits: 8", "bits: 12");
   expect_refused_and_nothing_made("", scene.string() + ":12: sensor.bits: should be 8 or 16");
   expect_refused_and_nothing_made("--quiet", scene.string() + ":12: sensor.bits: ");
 }
 
-TEST_F(SimulateRefusals, NameTheSceneThatIsNotThere) {
+TEST_F(VlpSimulateErrors, NameMissingScene) {
   scene = folder / "no.yaml";
   expect_refused_and_nothing_made("", scene.string() + ": cannot be opened: No such file");
 }
 
-TEST_F(SimulateRefusals, AskForUsableNumbers) {
+TEST_F(VlpSimulateErrors, RejectInvalidNumbers) {
   for (const std::string options : {"--threads 0", "--threads two", "--seed -1", "--seed 1.5"}) {
     expect_refused_and_nothing_made(options, "see vlp-simulate --help");
   }
 }
 
-TEST_F(SimulateRefusals, NameTheTagThatTheFamilyDoesNotHave) {
+TEST_F(VlpSimulateErrors, NameTagMissingInFamily) {
   const std::string message = "scene.yaml:21: board.print: tag36h11 has no tag 587, only 0 to 586";
   change_scene("first_id: 0", "first_id: 581");
   EXPECT_EQ(run_program(command("--only boards")).exit_code, 0) << "the last six";
@@ -100,7 +100,7 @@ TEST_F(SimulateRefusals, NameTheTagThatTheFamilyDoesNotHave) {
   expect_refused_and_nothing_made("", message);
 }
 
-TEST_F(SimulateRefusals, NameTheFamilyThatHasNoBorderOfTwoBits) {
+TEST_F(VlpSimulateErrors, NameFamilyWithoutTwoBitBorder) {
   change_scene("border_bits: 1", "border_bits: 2");
   EXPECT_EQ(run_program(command("--only boards")).exit_code, 0);
   std::filesystem::remove_all(output);
@@ -109,7 +109,7 @@ TEST_F(SimulateRefusals, NameTheFamilyThatHasNoBorderOfTwoBits) {
       "", "board.print: tags of tagStandard41h12 have no border of two black bits");
 }
 
-TEST_F(SimulateRefusals, NameTheFamilyWhoseTagsWouldOverlap) {
+TEST_F(VlpSimulateErrors, NameFamilyWithOverlappingTags) {
   change_scene("family: tag36h11", "family: tagStandard41h12");
   EXPECT_EQ(run_program(command("--only boards")).exit_code, 0);
   std::filesystem::remove_all(output);

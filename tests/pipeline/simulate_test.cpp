@@ -14,9 +14,9 @@ using testing::HasSubstr;
 using testing::Not;
 using testing::UnorderedElementsAre;
 
-using Simulate = SmallSimulation;
+using VlpSimulate = SmallSimulation;
 
-TEST_F(Simulate, WritesTheCapturesWithTheirTruth) {
+TEST_F(VlpSimulate, WritesCapturesWithGroundTruth) {
   const auto result = simulate();
   ASSERT_EQ(result.exit_code, 0) << result.errors;
   EXPECT_EQ(result.output, "rendered 24 captures, 0 were there; in " + output.string() + "\n");
@@ -34,7 +34,7 @@ TEST_F(Simulate, WritesTheCapturesWithTheirTruth) {
   EXPECT_NE(files.at("lamps.yaml"), files.at("true_lamps.yaml")) << "lamp 1 is off in the map";
 }
 
-TEST_F(Simulate, GivesTheSameBytesHoweverManyThreads) {
+TEST_F(VlpSimulate, GivesSameBytesForAllThreadCounts) {
   const Files expected = undisturbed("--threads 1");
   EXPECT_EQ(std::set<std::string>({expected.at("lamps/0000.png"), expected.at("lamps/0001.png"),
                                    expected.at("lamps/0002.png"), expected.at("lamps/0003.png")})
@@ -47,7 +47,7 @@ TEST_F(Simulate, GivesTheSameBytesHoweverManyThreads) {
   }
 }
 
-TEST_F(Simulate, GivesOtherImagesOfTheSameRigWithAnotherSeed) {
+TEST_F(VlpSimulate, ChangesImagesButNotRigWithSeed) {
   const Files first = undisturbed();
   EXPECT_TRUE(undisturbed("--seed 1") == first) << "the scene's own";
   const Files other = undisturbed("--seed 2");
@@ -59,7 +59,7 @@ TEST_F(Simulate, GivesOtherImagesOfTheSameRigWithAnotherSeed) {
   EXPECT_NE(first.at("boards/true_boards.csv"), other.at("boards/true_boards.csv"));
 }
 
-TEST_F(Simulate, RendersAFolderAloneAsItDoesWithTheOthers) {
+TEST_F(VlpSimulate, RendersSingleFolderIdentically) {
   const Files all = undisturbed();
   const auto result = simulate("--only boards");
   EXPECT_EQ(result.output, "rendered 8 captures, 0 were there; in " + output.string() + "\n");
@@ -71,7 +71,7 @@ TEST_F(Simulate, RendersAFolderAloneAsItDoesWithTheOthers) {
   EXPECT_TRUE(files_below(output) == all);
 }
 
-TEST_F(Simulate, IsRepeatedFromTheSceneThatItLeaves) {
+TEST_F(VlpSimulate, IsReproducibleFromWrittenScene) {
   ASSERT_EQ(simulate("--seed 5").exit_code, 0);
   const auto first = files_below(output);
   EXPECT_EQ(first.at("scene.yaml").substr(0, 15), "# vlp-simulate ");
@@ -81,7 +81,7 @@ TEST_F(Simulate, IsRepeatedFromTheSceneThatItLeaves) {
   EXPECT_EQ(files_below(folder / "again"), first);
 }
 
-TEST_F(Simulate, WarnsOfCapturesThatAreOfNoUse) {
+TEST_F(VlpSimulate, WarnsOfUnusableCaptures) {
   const auto warnings_with = [&](const std::string& from, const std::string& to) {
     change_scene(from, to);
     const auto result = simulate("");
@@ -105,7 +105,7 @@ TEST_F(Simulate, WarnsOfCapturesThatAreOfNoUse) {
               HasSubstr("boards: nothing is in view in "));
 }
 
-TEST_F(Simulate, SaysNothingWhenQuiet) {
+TEST_F(VlpSimulate, PrintsNothingWhenQuiet) {
   const auto result = simulate("--quiet");
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_EQ(result.output, "");
@@ -145,7 +145,7 @@ Differences located_against_truth(const std::filesystem::path& output) {
 }
 
 // Pixels are written to 1e-6 px, which are 2e-8 m here.
-TEST_F(Simulate, HasATruthThatLocateFinds) {
+TEST_F(VlpSimulate, GroundTruthMatchesVlpLocate) {
   ASSERT_EQ(simulate("--only lamps").exit_code, 0);
   const Differences differences = located_against_truth(output);
   EXPECT_EQ(differences.fixes, 16U);

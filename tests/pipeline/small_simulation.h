@@ -39,7 +39,7 @@ class SmallSimulation : public testing::Test {
   ProgramResult simulate(const std::string& options = "") const {
     return run_program(command(options));
   }
-  /// What an undisturbed run into another folder writes.
+  /// Returns the files of an undisturbed run into another folder.
   Files undisturbed(const std::string& options = "") const;
 };
 

@@ -43,7 +43,7 @@ class SmallStation : public testing::Test {
   ProgramResult records(const std::string& command) const {
     return run_program("vlp-station " + command + " --station " + station.string());
   }
-  /// Where the images of a camera arrive.
+  /// Returns the folder where the images of a camera arrive.
   std::filesystem::path captures(const std::string& camera) const {
     return folder / "station/captures" / camera;
   }

@@ -19,7 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 using testing::HasSubstr;
 
-class SquareBoards : public IntrinsicsProgram {
+class VlpIntrinsicsSquareBoards : public VlpIntrinsics {
  protected:
   /// The camera of paper-rig, before a board of this print.
   void render(const std::string& print, const std::string& views) const {
@@ -52,7 +52,7 @@ class SquareBoards : public IntrinsicsProgram {
   const std::string boards = rig + "/boards", board = rig + "/board.yaml";
 };
 
-TEST_F(SquareBoards, AChessboardGivesTheLens) {
+TEST_F(VlpIntrinsicsSquareBoards, GiveLensFromChessboard) {
   render("{kind: chessboard, cols: 10, rows: 7, square_size_m: 0.015}",
          "{count: 24, distance_m: [0.15, 0.25], tilt_deg: 45, roll_deg: 180, spread: 0.7}");
   const std::string cache = " --cache " + (folder / "cache").string();
@@ -80,7 +80,7 @@ TEST_F(SquareBoards, AChessboardGivesTheLens) {
                         "rows count squares, not the corners between them"));
 }
 
-TEST_F(SquareBoards, ACharucoBoardGivesTheLens) {
+TEST_F(VlpIntrinsicsSquareBoards, GiveLensFromCharucoBoard) {
   render(
       "{kind: charuco, cols: 10, rows: 8, square_size_m: 0.02, marker_size_m: 0.015, "
       "dictionary: DICT_5X5_100, top_left: white}",
@@ -111,7 +111,7 @@ TEST_F(SquareBoards, ACharucoBoardGivesTheLens) {
               HasSubstr("a square is 2 markers wide by board.yaml, but 1.3"));
 }
 
-TEST_F(SquareBoards, ArePrintedTrueToScale) {
+TEST_F(VlpIntrinsicsSquareBoards, ArePrintedToScale) {
   const std::string pdf = (folder / "board.pdf").string();
   const auto made = run_program("vlp-board --charuco --dictionary DICT_4X4_50 -o " + pdf);
   ASSERT_EQ(made.exit_code, 0) << made.errors;

@@ -23,7 +23,7 @@ int number_of(const char* variable, int otherwise) {
   return text == nullptr ? otherwise : std::atoi(text);
 }
 
-class StationKilled : public SmallStation {
+class VlpStationKilled : public SmallStation {
  protected:
   /// Puts `count` more images of the unit where they arrive, in the order of the steps; other
   /// images once a run has ended.
@@ -41,7 +41,7 @@ class StationKilled : public SmallStation {
       }
     }
   }
-  /// What the records say of the camera's runs, with calibration and images.
+  /// Returns the records of the runs of the camera, with calibration and images.
   nlohmann::json kept() const {
     const auto file = folder / "kept.json";
     const auto exported = records("export --camera-id b -o " + file.string());
@@ -52,7 +52,7 @@ class StationKilled : public SmallStation {
   void expect_all_there() const;
 };
 
-void StationKilled::kill_again_and_again(int kills) const {
+void VlpStationKilled::kill_again_and_again(int kills) const {
   Random random(static_cast<unsigned>(number_of("VLP_STATION_SEED", 1)));
   for (int i = 0; i < kills; ++i) {
     arrive(static_cast<std::size_t>(random.uniform(0, 60)));
@@ -66,7 +66,7 @@ void StationKilled::kill_again_and_again(int kills) const {
 }
 
 /// Every unit that came to its end has its record, its files, and all of its images, as they were.
-void StationKilled::expect_all_there() const {
+void VlpStationKilled::expect_all_there() const {
   const auto runs = kept();
   std::size_t put_away = 0;
   for (const auto& entry : fs::directory_iterator(folder / "station/captures")) {
@@ -96,13 +96,13 @@ void StationKilled::expect_all_there() const {
 }
 
 // As often as VLP_STATION_KILLS says.
-TEST_F(StationKilled, GoesOnWhereItWas) {
+TEST_F(VlpStationKilled, ResumesUnit) {
   render();
   kill_again_and_again(number_of("VLP_STATION_KILLS", 4));
   expect_all_there();
 }
 
-TEST_F(StationKilled, GoesOnWhereItWasWithPostgres) {
+TEST_F(VlpStationKilled, ResumesUnitWithPostgres) {
   if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
   const PostgresServer server;
   ASSERT_NE(server.uri(), "");
@@ -114,7 +114,7 @@ TEST_F(StationKilled, GoesOnWhereItWasWithPostgres) {
 
 /// Killed between record and end: the same command says what the verdict was, and nothing is done
 /// twice.
-TEST_F(StationKilled, AfterItsVerdictItSaysItAgain) {
+TEST_F(VlpStationKilled, RepeatsVerdictAfterKill) {
   prepare("b");
   const auto ended = run_program(run("b", "-q --idle-s 0.2"));
   EXPECT_EQ(ended.exit_code, 3);
@@ -134,7 +134,7 @@ TEST_F(StationKilled, AfterItsVerdictItSaysItAgain) {
 }
 
 /// The same while the records, which have the run, are away: it is not judged again.
-TEST_F(StationKilled, AfterItsVerdictItWaitsForTheRecords) {
+TEST_F(VlpStationKilled, KeepsVerdictWhileRecordsAreUnavailable) {
   change("station.yaml", "records: records.db", "records: share/records.db");
   const auto share = folder / "station/share", unmounted = folder / "station/unmounted";
   fs::create_directory(share);
@@ -157,7 +157,7 @@ TEST_F(StationKilled, AfterItsVerdictItWaitsForTheRecords) {
 }
 
 /// A hook that was not run to its end is known as such, though its run ended.
-TEST_F(StationKilled, InItsHookItKnows) {
+TEST_F(VlpStationKilled, ReportsUnfinishedHook) {
   change("station.yaml", "records: records.db",
          "records: records.db\nhook: {command: [sh, hook.sh]}");
   folder.file("station/hook.sh", "echo $$ >pid.new; mv pid.new pid; exec sleep 100\n");
@@ -175,7 +175,7 @@ TEST_F(StationKilled, InItsHookItKnows) {
   EXPECT_THAT(records("list").output, testing::Not(HasSubstr("hook")));
 }
 
-TEST_F(StationKilled, SurvivesAFullDisk) {
+TEST_F(VlpStationKilled, SurvivesFullDisk) {
   change("scene.yaml", "count: 16", "count: 8");
   change("station.yaml", "board_views: 16", "board_views: 8");
   render("boards");  // the unit fails, and has a record as long

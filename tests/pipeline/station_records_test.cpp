@@ -17,10 +17,10 @@ using testing::ContainsRegex;
 using testing::HasSubstr;
 using testing::Not;
 
-class StationRecords : public SmallStation {};
+class VlpStationRecords : public SmallStation {};
 
-/// The images of a run go when they are old enough; its record, which tells of it, stays.
-TEST_F(StationRecords, DeletesWhatIsKeptNoLonger) {
+/// Expired images of a run are deleted; its record, with an event for it, is kept.
+TEST_F(VlpStationRecords, CleanDeletesExpiredFolders) {
   prepare("0001");
   ASSERT_EQ(run_program(run("0001", "--idle-s 0.1")).exit_code, 3);
   EXPECT_EQ(records("clean").exit_code, 2);
@@ -54,7 +54,7 @@ TEST_F(StationRecords, DeletesWhatIsKeptNoLonger) {
 }
 
 /// Stations that share their records.
-TEST_F(StationRecords, ListsTheRunsOfItsStationOnly) {
+TEST_F(VlpStationRecords, ListsOnlyRunsOfItsStation) {
   ASSERT_EQ(run_program(run("0001", "--idle-s 0.1")).exit_code, 3);
   change("station.yaml", "station: station-1", "station: station-2");
   ASSERT_EQ(run_program(run("0002", "--idle-s 0.1")).exit_code, 3);
@@ -72,8 +72,8 @@ TEST_F(StationRecords, ListsTheRunsOfItsStationOnly) {
   EXPECT_THAT(run_program("vlp-station list --records " + database).output, HasSubstr("2 runs"));
 }
 
-/// What somebody changes in the database is found.
-TEST_F(StationRecords, FindsWhatWasChangedInItsRecords) {
+/// Manual changes of the database are detected.
+TEST_F(VlpStationRecords, VerifyDetectsChangedRecords) {
   prepare("0001");
   ASSERT_EQ(run_program(run("0001", "--idle-s 0.1")).exit_code, 3);
   const auto kept = records("verify-records");
@@ -101,8 +101,8 @@ TEST_F(StationRecords, FindsWhatWasChangedInItsRecords) {
                                             "20[^ ]+ was changed, and 1 more\n"));
 }
 
-/// What should not count, by whom and why.
-TEST_F(StationRecords, VoidsARun) {
+/// A voided run, with operator and reason.
+TEST_F(VlpStationRecords, VoidsRun) {
   prepare("0001");
   ASSERT_EQ(run_program(run("0001", "--idle-s 0.1")).exit_code, 3);
   const std::string listed = records("list").output;
@@ -127,8 +127,8 @@ TEST_F(StationRecords, VoidsARun) {
   EXPECT_THAT(records("verify-records").output, HasSubstr("1 runs, 2 entries in the trail\n"));
 }
 
-/// The recipe of apps/README.md, with SQLite and with PostgreSQL.
-TEST_F(StationRecords, IsRestoredFromABackup) {
+/// The recipe of apps/vlp-station.md, "Backup", with SQLite and with PostgreSQL.
+TEST_F(VlpStationRecords, AreRestoredFromBackup) {
   const std::string backup = (folder / "backup").string(), here = (folder / "station").string();
   fs::create_directory(backup);
   prepare("0001");
@@ -169,7 +169,7 @@ TEST_F(StationRecords, IsRestoredFromABackup) {
 }
 
 /// A station that is watched: exit code 1 for an alarm, of what can be compared.
-TEST_F(StationRecords, WatchesATrend) {
+TEST_F(VlpStationRecords, TrendReportsAlarm) {
   render_four_boards();
   ASSERT_EQ(run_program(batch()).exit_code, 3);  // makes the tables
   const auto add = [&](int first, const std::string& of, const std::string& kind,

@@ -16,7 +16,7 @@ using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
 
-class StationSource : public SmallStation {};
+class VlpStationSource : public SmallStation {};
 
 /// Writes images, the first two several times: what a camera sees that rests for a while.
 bool write_video(const fs::path& file, const std::vector<fs::path>& images) {
@@ -30,7 +30,7 @@ bool write_video(const fs::path& file, const std::vector<fs::path>& images) {
   return true;
 }
 
-TEST_F(StationSource, TakesAVideo) {
+TEST_F(VlpStationSource, AcceptsVideo) {
   render();
   prepare("a");
   const std::string video = (folder / "boards.avi").string();
@@ -44,8 +44,8 @@ TEST_F(StationSource, TakesAVideo) {
   EXPECT_THAT(records("show").output, HasSubstr("images     48, 48 used"));
 }
 
-/// All its frames are refused, and none is kept: the record still tells why.
-TEST_F(StationSource, NamesTheCauseOfAVideoThatCannotBeUsed) {
+/// All frames are rejected and none is kept: the record has the reason.
+TEST_F(VlpStationSource, ReportsCauseOfUnusableVideo) {
   change("scene.yaml", "blur_px: 0.7", "blur_px: 2.5");
   change("scene.yaml", "count: 16", "count: 6");
   render("boards");
@@ -58,7 +58,7 @@ TEST_F(StationSource, NamesTheCauseOfAVideoThatCannotBeUsed) {
   EXPECT_THAT(records("show").output, HasSubstr("images     10, 0 used"));
 }
 
-TEST_F(StationSource, ThatIsNotThereLeavesNothingBehind) {
+TEST_F(VlpStationSource, LeavesNoFilesWhenMissing) {
   const auto camera = run_program(run("0001", "--source boards=/dev/video99"));
   EXPECT_EQ(camera.exit_code, 2);
   EXPECT_EQ(camera.errors,
@@ -71,7 +71,7 @@ TEST_F(StationSource, ThatIsNotThereLeavesNothingBehind) {
 }
 
 /// Frames that had room are kept whole, and the same command goes on with them once there is room.
-TEST_F(StationSource, SurvivesAFullDisk) {
+TEST_F(VlpStationSource, SurvivesFullDisk) {
   change("scene.yaml", "count: 16", "count: 8");
   change("station.yaml", "board_views: 16", "board_views: 8");
   render("boards");

@@ -38,7 +38,7 @@ class Tmux {
   void resize(const char* size) const { run_program(tmux() + "resize-window " + size); }
   void type(const std::string& keys) const { run_program(tmux() + "send-keys " + keys); }
 
-  /// What it shows, without empty lines at the end; `escapes`: with colours.
+  /// Returns the screen without empty lines at the end; `escapes`: with colors.
   std::string screen(const char* escapes = "") const {
     std::string text = run_program(tmux() + "capture-pane -p " + escapes).output;
     while (text.ends_with("\n\n")) text.pop_back();
@@ -72,7 +72,7 @@ std::string without_figures(const std::string& screen) {
   return std::regex_replace(screen, std::regex(" +[0-9.e-]+ +([<>]=)"), "  N $1");
 }
 
-class StationTerminal : public SmallStation {
+class VlpStationTerminal : public SmallStation {
  protected:
   void drop(const std::string& step, std::size_t first, std::size_t end) const {
     const auto all = images(step);
@@ -84,7 +84,7 @@ class StationTerminal : public SmallStation {
   }
 };
 
-TEST_F(StationTerminal, GuidesThroughAUnit) {
+TEST_F(VlpStationTerminal, GuidesOperatorThroughUnit) {
   if (run_program("tmux -V").exit_code != 0) GTEST_SKIP() << "tmux is not installed";
   change("station.yaml", "same_pose_share: 0.01", "same_pose_share: 0.02");
   render();
@@ -127,7 +127,7 @@ TEST_F(StationTerminal, GuidesThroughAUnit) {
   EXPECT_THAT(TemporaryFolder::content_of(folder / "log"), Not(HasSubstr("error")));
 }
 
-TEST_F(StationTerminal, ShowsColourAndStopsOnAKey) {
+TEST_F(VlpStationTerminal, UsesColorAndStopsOnKey) {
   if (run_program("tmux -V").exit_code != 0) GTEST_SKIP() << "tmux is not installed";
   const Tmux tmux("PATH='" VLP_PROGRAMS_DIR "':$PATH " + run("0001", "") + " 2>/dev/null");
   tmux.screen_with("Ctrl-C");
@@ -139,7 +139,7 @@ TEST_F(StationTerminal, ShowsColourAndStopsOnAKey) {
 }
 
 /// A shift: who measures, then unit after unit by a scanner, which types.
-TEST_F(StationTerminal, TakesAShift) {
+TEST_F(VlpStationTerminal, RunsShift) {
   if (run_program("tmux -V").exit_code != 0) GTEST_SKIP() << "tmux is not installed";
   change("station.yaml", "records: records.db",
          "records: records.db\nserial_pattern: 'SN-[0-9]{4}'");
@@ -172,7 +172,7 @@ TEST_F(StationTerminal, TakesAShift) {
 }
 
 /// The operator need not take the rest of the unit.
-TEST_F(StationTerminal, SaysThatAUnitWillFailAsSoonAsItIsKnown) {
+TEST_F(VlpStationTerminal, ReportsCertainFailureEarly) {
   if (run_program("tmux -V").exit_code != 0) GTEST_SKIP() << "tmux is not installed";
   change("scene.yaml", "402.3, 297.4", "418.3, 285.4");
   change("scene.yaml", "count: 16", "count: 12");
@@ -194,7 +194,7 @@ int lines_with(const std::string& screen, const std::string& text) {
   return count;
 }
 
-TEST_F(StationTerminal, IsNotConfusedByTheTerminalsSize) {
+TEST_F(VlpStationTerminal, AdaptsToTerminalSize) {
   if (run_program("tmux -V").exit_code != 0) GTEST_SKIP() << "tmux is not installed";
   const Tmux tmux("PATH='" VLP_PROGRAMS_DIR "':$PATH " + run("0001", "") + " 2>/dev/null",
                   "-x 80 -y 24");

@@ -17,7 +17,7 @@ using testing::ContainsRegex;
 using testing::HasSubstr;
 using testing::Not;
 
-class Station : public SmallStation {
+class VlpStation : public SmallStation {
  protected:
   /// The folder with the results of the one run of a camera.
   fs::path only_results(const std::string& camera) const {
@@ -32,7 +32,7 @@ class Station : public SmallStation {
   }
 };
 
-TEST_F(Station, PassesAGoodUnitAndKeepsItsRecord) {
+TEST_F(VlpStation, PassesGoodUnitAndKeepsRecord) {
   render();
   const auto result = run_program(batch());
   EXPECT_EQ(result.exit_code, 0) << result.errors;
@@ -109,8 +109,8 @@ TEST_F(Station, PassesAGoodUnitAndKeepsItsRecord) {
   EXPECT_THAT(records("verify").errors, HasSubstr("check"));
 }
 
-/// What is measured from the same images counts once, whatever the verdict was.
-TEST_F(Station, CountsTheSameImagesOnce) {
+/// Runs on the same images count once, independently of the verdict.
+TEST_F(VlpStation, CountsSameImagesOnce) {
   render();
   ASSERT_EQ(run_program(batch()).exit_code, 0);
   const std::string first = only_results("0001").filename().string();
@@ -128,7 +128,7 @@ TEST_F(Station, CountsTheSameImagesOnce) {
 }
 
 /// The station feeds images one by one to the steps that vlp-calibrate takes a folder through.
-TEST_F(Station, GivesWhatVlpCalibrateGives) {
+TEST_F(VlpStation, MatchesVlpCalibrate) {
   render();
   folder.file("unit/check/captures.csv", with_inclinations("check"));
   ASSERT_EQ(run_program(batch()).exit_code, 0);
@@ -173,7 +173,7 @@ TEST_F(Station, GivesWhatVlpCalibrateGives) {
   EXPECT_NEAR(of_station("check_mean_mm"), horizontal.at("mean_mm").get<double>(), 1e-6);
 }
 
-TEST_F(Station, NamesWhatIsWrongWithLampsAndBoard) {
+TEST_F(VlpStation, NamesFaultOfLampsAndBoard) {
   render();
   const auto lamps = TemporaryFolder::content_of(folder / "station/lamps.yaml");
   change("lamps.yaml", "[0, 0.28, 1.6]", "[0.05, 0.27, 1.6]");
@@ -205,8 +205,8 @@ TEST_F(Station, NamesWhatIsWrongWithLampsAndBoard) {
   EXPECT_THAT(records("trend rms_px").errors, HasSubstr("0 of the runs have rms_px"));
 }
 
-/// What the operator or the station does wrong is no unit's fault.
-TEST_F(Station, JudgesNoUnitForWhatIsNotItsFault) {
+/// Faults of the operator or the station do not fail a unit.
+TEST_F(VlpStation, DoesNotFailUnitForStationFault) {
   render();
   const auto table = folder / "unit/check/captures.csv", truth = folder / "unit/check/truth.csv";
   fs::rename(table, folder / "captures.csv");
@@ -250,7 +250,7 @@ TEST_F(Station, JudgesNoUnitForWhatIsNotItsFault) {
 
 /// Row times with which lamps are still identified, with which none is, and with which each is
 /// taken for its neighbour.
-TEST_F(Station, NamesAWrongRowTimeOfTheType) {
+TEST_F(VlpStation, ReportsWrongRowTime) {
   render();
   std::string stated = "row_time_s: 3.0e-05";
   for (const char* wrong_us : {"28.5", "33", "37.5"}) {
@@ -268,7 +268,7 @@ TEST_F(Station, NamesAWrongRowTimeOfTheType) {
   EXPECT_THAT(records("show").output, HasSubstr("row_time_sd_us"));
 }
 
-TEST_F(Station, NamesAWrongRowTimeOfTheGoldenUnit) {
+TEST_F(VlpStation, ReportsWrongRowTimeOfGoldenUnit) {
   render("check");
   const std::string right = TemporaryFolder::content_of(folder / "unit/true_calibration.yaml");
   const std::string stated = "row_time_s: 0.00003";
@@ -290,7 +290,7 @@ TEST_F(Station, NamesAWrongRowTimeOfTheGoldenUnit) {
 }
 
 /// One unit's images, as another's.
-TEST_F(Station, TakesNoImagesOfAnotherUnit) {
+TEST_F(VlpStation, RejectsImagesOfAnotherUnit) {
   render_four_boards();
   EXPECT_EQ(run_program(batch("0001")).exit_code, 3);
   EXPECT_EQ(run_program(batch("0001")).exit_code, 3);  // its own, again
@@ -304,7 +304,7 @@ TEST_F(Station, TakesNoImagesOfAnotherUnit) {
 }
 
 /// The way out that is named after images went under a wrong serial.
-TEST_F(Station, FreesTheImagesOfAVoidedRun) {
+TEST_F(VlpStation, ReleasesImagesOfVoidedRun) {
   render_four_boards();
   EXPECT_EQ(run_program(batch("MIX")).exit_code, 3);
   const std::string errors = run_program(batch("0002")).errors;
@@ -315,7 +315,7 @@ TEST_F(Station, FreesTheImagesOfAVoidedRun) {
 }
 
 /// Before the first image is looked at.
-TEST_F(Station, NoticesAtOnceThatResultsCannotBeWritten) {
+TEST_F(VlpStation, ReportsUnwritableResultsBeforeFirstImage) {
   folder.file("station/results", "a file");
   const auto result = run_program(run("0001", "--idle-s 60"));
   EXPECT_EQ(result.exit_code, 2);
@@ -323,7 +323,7 @@ TEST_F(Station, NoticesAtOnceThatResultsCannotBeWritten) {
 }
 
 /// Whatever cannot be written, the verdict is on the screen, in the record, and can be restored.
-TEST_F(Station, LosesNoVerdictWhenItsFilesCannotBeWritten) {
+TEST_F(VlpStation, KeepsVerdictWhenFilesCannotBeWritten) {
   render_four_boards();
   fs::create_directories(captures("0001"));
   fs::copy(folder / "unit/boards", captures("0001") / "boards");
@@ -350,8 +350,8 @@ TEST_F(Station, LosesNoVerdictWhenItsFilesCannotBeWritten) {
   EXPECT_THAT(certified.errors, HasSubstr("was not judged (boards"));
 }
 
-/// Whether a judged unit is a repetition is in the records.
-TEST_F(Station, SaysThatRepetitionsWereNotCheckedWhileTheRecordsAreAway) {
+/// Repetitions of evaluated units are found in the records.
+TEST_F(VlpStation, ReportsUncheckedRepetitionsWhileRecordsAreUnavailable) {
   change("station.yaml", "records: records.db", "records: share/records.db");
   render();
   const auto passed = run_program(batch());
@@ -363,7 +363,7 @@ TEST_F(Station, SaysThatRepetitionsWereNotCheckedWhileTheRecordsAreAway) {
 }
 
 /// Records away: units get their verdicts all the same, and nothing is lost.
-TEST_F(Station, KeepsRunsHereWhileTheRecordsAreAway) {
+TEST_F(VlpStation, SpoolsRunsWhileRecordsAreUnavailable) {
   change("station.yaml", "records: records.db", "records: share/records.db");
   render_four_boards();
   const auto first = run_program(batch("0001"));
@@ -405,8 +405,8 @@ TEST_F(Station, KeepsRunsHereWhileTheRecordsAreAway) {
   EXPECT_TRUE(fs::is_empty(folder / "station/spool"));
 }
 
-/// What is at full scale hides edges and stripes.
-TEST_F(Station, NamesOverexposure) {
+/// Saturation hides edges and stripes.
+TEST_F(VlpStation, ReportsOverexposure) {
   change("scene.yaml", "white_e_per_s: 2.4e+6", "white_e_per_s: 2.4e+8");
   render_four_boards();
   const auto boards = run_program(batch("0001"));
@@ -414,8 +414,8 @@ TEST_F(Station, NamesOverexposure) {
   EXPECT_THAT(boards.output, HasSubstr("images refused: 4 overexposed"));
 }
 
-/// Lamps that cannot be told from the noise, and a ceiling that is white all over.
-TEST_F(Station, NamesLampImagesOfTheWrongExposure) {
+/// Lamps below the noise, and a saturated ceiling.
+TEST_F(VlpStation, ReportsWrongExposureOfLampImages) {
   render("boards");
   change("scene.yaml", "ambient_e_per_s: 1.0e+6", "ambient_e_per_s: 1.0e+10");
   render_after_the_boards("rotation");
@@ -431,7 +431,7 @@ TEST_F(Station, NamesLampImagesOfTheWrongExposure) {
 }
 
 /// The lamps do not turn about one axis, and the fixes scatter: because of that.
-TEST_F(Station, NamesLampsThatAnotherCameraTook) {
+TEST_F(VlpStation, ReportsLampImagesOfAnotherCamera) {
   render("boards");
   change("scene.yaml", "[520, 520.6, 402.3, 297.4", "[508, 508.4, 407.3, 304.4");
   render_after_the_boards("rotation,dispersion,check");
@@ -444,7 +444,7 @@ TEST_F(Station, NamesLampsThatAnotherCameraTook) {
 }
 
 /// Images of another unit among those of the boards.
-TEST_F(Station, NamesBoardImagesOfAnotherUnit) {
+TEST_F(VlpStation, ReportsBoardImagesOfAnotherUnit) {
   render("boards");
   fs::rename(folder / "unit", folder / "first");
   change("scene.yaml", "[520, 520.6, 402.3, 297.4", "[508, 508.4, 407.3, 304.4");
@@ -471,7 +471,7 @@ TEST_F(Station, NamesBoardImagesOfAnotherUnit) {
 }
 
 /// Images of another unit among those of the check, or all of them.
-TEST_F(Station, NamesCheckImagesOfAnotherUnit) {
+TEST_F(VlpStation, ReportsCheckImagesOfAnotherUnit) {
   render();
   fs::rename(folder / "unit", folder / "first");
   change("scene.yaml", "[520, 520.6, 402.3, 297.4", "[516, 516.5, 399.1, 301.0");
@@ -504,7 +504,7 @@ TEST_F(Station, NamesCheckImagesOfAnotherUnit) {
 }
 
 /// Images of another unit that the fits reject as outliers.
-TEST_F(Station, NamesLampImagesOfAnotherUnit) {
+TEST_F(VlpStation, ReportsLampImagesOfAnotherUnit) {
   render();
   fs::rename(folder / "unit", folder / "first");
   change("scene.yaml", "[520, 520.6, 402.3, 297.4", "[508, 508.4, 407.3, 304.4");
@@ -527,7 +527,7 @@ TEST_F(Station, NamesLampImagesOfAnotherUnit) {
 }
 
 /// A camera that tilts in its housing after the turn.
-TEST_F(Station, FailsAUnitThatIsLoose) {
+TEST_F(VlpStation, FailsLooseUnit) {
   render();
   fs::rename(folder / "unit/check", folder / "check");
   fs::rename(folder / "unit", folder / "first");
@@ -550,9 +550,9 @@ struct LensFault {
 
   friend void PrintTo(const LensFault& fault, std::ostream* out) { *out << fault.name; }
 };
-class FaultyLens : public SmallStation, public testing::WithParamInterface<LensFault> {};
+class VlpStationFaultyLens : public SmallStation, public testing::WithParamInterface<LensFault> {};
 
-TEST_P(FaultyLens, IsNamedAsTheCause) {
+TEST_P(VlpStationFaultyLens, IsNamedAsCause) {
   change("scene.yaml", GetParam().from, GetParam().to);
   change("scene.yaml", "count: 16", "count: 12");
   change("station.yaml", "board_views: 16", "board_views: 12");
@@ -571,7 +571,7 @@ TEST_P(FaultyLens, IsNamedAsTheCause) {
 }
 
 INSTANTIATE_TEST_SUITE_P(
-    Station, FaultyLens,
+    VlpStation, VlpStationFaultyLens,
     testing::Values(LensFault{"decentred", "402.3, 297.4", "418.3, 285.4", "the lens is decentred"},
                     LensFault{"blurred", "blur_px: 0.7", "blur_px: 2.5", "the lens is blurred"},
                     LensFault{"wrong", "[520, 520.6", "[480, 480.5", "wrong lens"},
@@ -585,7 +585,7 @@ INSTANTIATE_TEST_SUITE_P(
                               "boards (0/12): 12 of 12 images refused: 12 too dark"}),
     [](const auto& instance) { return instance.param.name; });
 
-TEST_F(Station, NamesAnUnknownCommand) {
+TEST_F(VlpStation, NamesUnknownCommand) {
   for (const char* words : {"diff", "diff --operator Ann", "diff run-1 run-2"}) {
     const auto refused = run_program(std::string("vlp-station ") + words);
     EXPECT_EQ(refused.exit_code, 2) << words;
@@ -600,7 +600,7 @@ TEST_F(Station, NamesAnUnknownCommand) {
   EXPECT_THAT(run_program("vlp-station --oprator Ann").errors, HasSubstr("unknown: --oprator"));
 }
 
-TEST_F(Station, RefusesWhatItCannotUse) {
+TEST_F(VlpStation, RejectsInvalidInput) {
   EXPECT_EQ(run_program(batch()).exit_code, 2);  // no folders
   EXPECT_EQ(run_program(run("../up", "--batch " + folder.file("a", "").string())).exit_code, 2);
   EXPECT_THAT(records("show").errors, HasSubstr("no such run"));

@@ -13,9 +13,9 @@ namespace fs = std::filesystem;
 using testing::AllOf;
 using testing::HasSubstr;
 
-class WatchedStation : public SmallStation {};
+class VlpStationWatched : public SmallStation {};
 
-TEST_F(WatchedStation, ComesToTheSameAsFromFullFoldersAndPutsTheImagesAway) {
+TEST_F(VlpStationWatched, MatchesBatchRunAndArchivesImages) {
   render();
   ASSERT_EQ(run_program(batch("a")).exit_code, 0);
   take_again();
@@ -34,7 +34,7 @@ TEST_F(WatchedStation, ComesToTheSameAsFromFullFoldersAndPutsTheImagesAway) {
   EXPECT_EQ(kept, 48);
 }
 
-TEST_F(WatchedStation, SaysWhyAnImageIsRefused) {
+TEST_F(VlpStationWatched, ReportsReasonOfRejectedImage) {
   const auto at = captures("a") / "boards";
   fs::create_directories(at);
   const std::string view = VLP_SOURCE_DIR "/datasets/paper-rig/rendered/sample-boards/0000.png";
@@ -53,7 +53,7 @@ TEST_F(WatchedStation, SaysWhyAnImageIsRefused) {
 }
 
 /// All that is there when a run goes on comes at once: its order is no order.
-TEST_F(WatchedStation, CountsNoRefusalsInTheOrderOfNames) {
+TEST_F(VlpStationWatched, IgnoresOrderOfExistingRejectedImages) {
   const auto at = captures("a") / "boards";
   fs::create_directories(at);
   for (int i = 0; i < 13; ++i) std::ofstream(at / ("bad-" + std::to_string(i) + ".png")) << "none";
@@ -66,7 +66,7 @@ TEST_F(WatchedStation, CountsNoRefusalsInTheOrderOfNames) {
 }
 
 /// A name cannot speak to the terminal.
-TEST_F(WatchedStation, ObeysNoNames) {
+TEST_F(VlpStationWatched, EscapesControlCharactersInNames) {
   const auto at = captures("a") / "boards";
   fs::create_directories(at);
   std::ofstream(at / "\x1b[2Jgone.png") << "none";
@@ -79,7 +79,7 @@ TEST_F(WatchedStation, ObeysNoNames) {
 }
 
 /// A captures.csv that comes last, and in parts, is read when it is whole.
-TEST_F(WatchedStation, WaitsForTheTablesOfPlaces) {
+TEST_F(VlpStationWatched, WaitsForTablesOfPlaces) {
   render();
   prepare("a");
   const auto table = captures("a") / "check/captures.csv";
@@ -92,9 +92,9 @@ TEST_F(WatchedStation, WaitsForTheTablesOfPlaces) {
   EXPECT_EQ(result.exit_code, 0) << result.errors;
 }
 
-/// Inclinations that come after the images: these are looked at again in the planes that are level
-/// by them, as those are that were told beforehand.
-TEST_F(WatchedStation, LooksAgainWhenItIsToldOfInclinations) {
+/// Inclinations that arrive after the images: lamps are detected again in the planes that are level
+/// by them, as for inclinations that arrive before.
+TEST_F(VlpStationWatched, RedetectsLampsAfterNewInclinations) {
   render();
   const std::string told = with_inclinations("dispersion");
   ASSERT_EQ(run_program(batch("untold")).exit_code, 0);

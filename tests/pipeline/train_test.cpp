@@ -21,7 +21,7 @@ using testing::HasSubstr;
 const std::string kLamps = " --lamps " + kRig + "/lamps.yaml";
 const std::string kCalibration = " --calibration " + kRig + "/true_calibration.yaml";
 
-class Train : public testing::Test {
+class VlpTrain : public testing::Test {
  protected:
   /// Three places, turning, of the paper's rig; about 0.3 s.
   std::string captures(const std::string& name = "rotation") {
@@ -44,7 +44,7 @@ class Train : public testing::Test {
   const fs::path output = folder / "trained.yaml";
 };
 
-TEST_F(Train, MakesAClassifierThatDetectAndLocateUse) {
+TEST_F(VlpTrain, MakesClassifierForVlpDetectAndVlpLocate) {
   const auto trained = train(captures() + kLamps + kCalibration);
   ASSERT_EQ(trained.exit_code, 0) << trained.errors;
   EXPECT_THAT(trained.output, HasSubstr("right       100.00 %\n  wrong     0\n  unknown   0\n"));
@@ -80,7 +80,7 @@ TEST_F(Train, MakesAClassifierThatDetectAndLocateUse) {
   EXPECT_THAT(located.output, HasSubstr("fixes       2\n"));
 }
 
-TEST_F(Train, GivesTheSameBytesWhateverTheThreads) {
+TEST_F(VlpTrain, GivesSameBytesForAllThreadCounts) {
   const std::string options = captures() + kLamps + kCalibration;
   ASSERT_EQ(train(options + " --threads 1").exit_code, 0);
   const std::string one = TemporaryFolder::content_of(output);
@@ -88,7 +88,7 @@ TEST_F(Train, GivesTheSameBytesWhateverTheThreads) {
   EXPECT_EQ(TemporaryFolder::content_of(output), one);
 }
 
-TEST_F(Train, NamesLampsWithTooFewLights) {
+TEST_F(VlpTrain, NamesLampsWithTooFewLights) {
   const auto result = train(kRig + "/sample" + kLamps);
   EXPECT_EQ(result.exit_code, 3);
   EXPECT_THAT(result.errors, HasSubstr("too few labelled lights of lamps 1 (has 2), 2 (has 2)"));
@@ -96,7 +96,7 @@ TEST_F(Train, NamesLampsWithTooFewLights) {
   EXPECT_FALSE(fs::exists(output));
 }
 
-TEST_F(Train, AsksForLabels) {
+TEST_F(VlpTrain, RequiresLabels) {
   fs::create_directory(folder / "bare");
   fs::copy(kRig + "/sample/0000.png", folder / "bare/0000.png");
   const auto result = train((folder / "bare").string() + kLamps);
@@ -110,7 +110,7 @@ TEST_F(Train, AsksForLabels) {
   EXPECT_EQ(run_program("vlp-train " + kRig + "/sample" + kLamps).exit_code, 2) << "no output";
 }
 
-TEST_F(Train, FindsTheRowTimeAndTheReadOut) {
+TEST_F(VlpTrain, EstimatesRowTimeAndReadoutDirection) {
   // Nothing but the images is there.
   fs::create_directory(folder / "images");
   for (const auto& entry : fs::directory_iterator(captures())) {
@@ -136,7 +136,7 @@ TEST_F(Train, FindsTheRowTimeAndTheReadOut) {
 
 /// Without its first lamp, which shows too few stripes, the frequencies of this scene fit two row
 /// times.
-TEST_F(Train, FindsTheRowTimeByThePlacesOfTheLamps) {
+TEST_F(VlpTrain, EstimatesRowTimeFromLampPositions) {
   const fs::path set = folder / "archive";
   const auto simulated = run_program("vlp-simulate " VLP_SOURCE_DIR
                                      "/datasets/archive/scene.yaml -q --only rotation -o " +
@@ -161,8 +161,8 @@ TEST_F(Train, FindsTheRowTimeByThePlacesOfTheLamps) {
   EXPECT_THAT(swapped.errors, HasSubstr("neither the duties nor the places of the lamps decide"));
 }
 
-/// A classifier is trained all the same: it identifies lamps without the row time.
-TEST_F(Train, NamesBothRowTimesIfTheStatedOneIsWrong) {
+/// The classifier is still trained, because it identifies lamps without the row time.
+TEST_F(VlpTrain, ReportsBothRowTimesIfGivenOneIsWrong) {
   const std::string images = captures();
   const std::string right = TemporaryFolder::content_of(kRig + "/true_calibration.yaml");
   const std::string stated = "row_time_s: 0.00003";
@@ -190,7 +190,7 @@ TEST_F(Train, NamesBothRowTimesIfTheStatedOneIsWrong) {
   EXPECT_THAT(train(images + kLamps + kCalibration).errors, testing::Not(HasSubstr("row time")));
 }
 
-TEST_F(Train, DoesNotGuessTheRowTime) {
+TEST_F(VlpTrain, ReportsAmbiguousRowTime) {
   std::string map = "format: vlp-lamps/1\nlamps:\n";
   for (int id = 1; id <= 9; ++id) {
     map += "  - {id: " + std::to_string(id) + ", position_m: [" + std::to_string(id) +
@@ -209,7 +209,7 @@ TEST_F(Train, DoesNotGuessTheRowTime) {
   EXPECT_THAT(nowhere.errors, HasSubstr("needs --calibration"));
 }
 
-TEST_F(Train, FindsAReadOutAlongColumnsForDetect) {
+TEST_F(VlpTrain, EstimatesColumnReadoutForVlpDetect) {
   const std::string wide = VLP_SOURCE_DIR "/datasets/wide/rendered";
   std::string calibration = TemporaryFolder::content_of(wide + "/true_calibration.yaml");
   calibration.erase(calibration.find("  readout: columns\n"), 19);
@@ -227,7 +227,7 @@ TEST_F(Train, FindsAReadOutAlongColumnsForDetect) {
   EXPECT_EQ(run_program(command + " --readout diagonal").exit_code, 2);
 }
 
-TEST_F(Train, ItsClassifierHasToFitLampsAndCamera) {
+TEST_F(VlpTrain, ClassifierMustMatchLampsAndCamera) {
   ASSERT_EQ(train(captures() + kLamps + kCalibration).exit_code, 0);
   const auto refusal = [&](const std::string& lamps, const std::string& calibration) {
     const auto result =
@@ -252,7 +252,7 @@ TEST_F(Train, ItsClassifierHasToFitLampsAndCamera) {
   EXPECT_THAT(table.errors, HasSubstr("is no folder of images"));
 }
 
-TEST_F(Train, IsNotNeededToWarnOfLampsThatAreAlike) {
+TEST_F(VlpTrain, IsNotRequiredForWarningOfInseparableLamps) {
   std::string map = TemporaryFolder::content_of(kRig + "/lamps.yaml");
   map.replace(map.find("2000"), 4, "1620");
   const std::string command = "vlp-detect " + kRig + "/sample" + kCalibration + " --lamps " +

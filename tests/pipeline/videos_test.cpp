@@ -22,7 +22,7 @@ using testing::HasSubstr;
 using testing::Not;
 using testing::StartsWith;
 
-/// A video of the images in a folder, each so many times.
+/// Writes a video of the images in a folder, each repeated `times` times. Returns false on failure.
 bool film_of(const fs::path& file, const fs::path& folder, int times, const char* codec = "FFV1") {
   std::vector<cv::Mat> frames;
   for (const auto& image : list_images(folder)) {
@@ -39,7 +39,7 @@ std::string with(std::string text, const std::string& from, const std::string& t
   return text;
 }
 
-class FilmOfLamps : public testing::Test {
+class VlpDetectVideo : public testing::Test {
  protected:
   ProgramResult detect(const std::string& images, const std::string& output,
                        const std::string& options = "") const {
@@ -50,7 +50,7 @@ class FilmOfLamps : public testing::Test {
   const TemporaryFolder folder;
 };
 
-TEST_F(FilmOfLamps, ShowsWhatItsImagesShow) {
+TEST_F(VlpDetectVideo, YieldsSameDetectionsAsImages) {
   const std::string film = (folder / "drive.avi").string();
   if (!film_of(film, kRig + "/sample", 1)) GTEST_SKIP() << "OpenCV writes no FFV1";
   ASSERT_EQ(detect(kRig + "/sample", "images.csv").exit_code, 0);
@@ -78,7 +78,7 @@ TEST_F(FilmOfLamps, ShowsWhatItsImagesShow) {
               Not(HasSubstr("drive.avi#000001")));
 }
 
-TEST_F(FilmOfLamps, IsRefusedInALine) {
+TEST_F(VlpDetectVideo, ReportsErrorInOneLine) {
   const auto refused = [&](const std::string& images, const std::string& options,
                            const std::string& message) {
     const auto result = detect(images, "found.csv", options);
@@ -109,9 +109,9 @@ TEST_F(FilmOfLamps, IsRefusedInALine) {
   EXPECT_THAT(result.errors, HasSubstr(" of its 12 frames can be decoded; is it cut short"));
 }
 
-class FilmOfABoard : public IntrinsicsProgram {};
+class BoardVideo : public VlpIntrinsics {};
 
-TEST_F(FilmOfABoard, GivesTheLensOfItsImages) {
+TEST_F(BoardVideo, YieldsSameCornersAsImages) {
   const std::string rig = (folder / "rig").string(), board = rig + "/board.yaml";
   std::string scene = TemporaryFolder::content_of(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml");
   scene = with(scene, "views: {count: 36", "views: {count: 12");

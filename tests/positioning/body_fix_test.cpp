@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Bodies that drive, turn and lean: without noise the fix is the truth, whatever is estimated;
-/// with noise it scatters as it says.
+/// Bodies that move, rotate and are tilted. Without noise the fix equals the truth for all
+/// combinations of estimated states; with noise the scatter matches the reported covariance.
 #include "positioning/body_fix.h"
 
 #include <gtest/gtest.h>
@@ -16,7 +16,7 @@ namespace vlp {
 namespace {
 
 constexpr double kExactBody = 1e-9;
-/// So wide that it has no weight.
+/// Standard deviation with negligible weight.
 constexpr double kUnknown = 1e3;
 constexpr double kTinyNoise_px = 1e-3;
 
@@ -50,7 +50,7 @@ BodyState random_state(Random& random, double lean_rad) {
   return state;
 }
 
-/// What is not estimated is as it is; what is, nothing is known of.
+/// States that are not estimated are exact; estimated states are unknown.
 Sensors sensors_for(const BodyState& state, const Estimated& estimated) {
   Sensors sensors;
   KnownMotion motion;
@@ -88,7 +88,7 @@ void expect_state(const Fix& fix, const BodyState& state, double tolerance) {
   EXPECT_NEAR(wrapped_rad(fix.body->inclination.pitch_rad - lean.pitch_rad), 0, tolerance);
 }
 
-class ExactBody : public testing::TestWithParam<Estimated> {
+class PositionerNoiselessBody : public testing::TestWithParam<Estimated> {
  protected:
   Random random{41};
 
@@ -103,21 +103,21 @@ class ExactBody : public testing::TestWithParam<Estimated> {
   int fixes = 0;
 };
 
-TEST_P(ExactBody, UnderLampsAtOneHeight) {
+TEST_P(PositionerNoiselessBody, MatchesTruthForLampsAtOneHeight) {
   for (int i = 0; i < 60; ++i) {
     expect_exact({{}, rolling_calibration(), random_state(random, 0.1), {}}, 7, true, 0.4);
   }
   EXPECT_GT(fixes, 40);
 }
 
-TEST_P(ExactBody, UnderLampsAtManyHeights) {
+TEST_P(PositionerNoiselessBody, MatchesTruthForLampsAtManyHeights) {
   for (int i = 0; i < 60; ++i) {
     expect_exact({{}, rolling_calibration(), random_state(random, 0.1), {}}, 7, false, 0.4);
   }
   EXPECT_GT(fixes, 40);
 }
 
-TEST_P(ExactBody, ReadInColumnsOverACalibratedTilt) {
+TEST_P(PositionerNoiselessBody, MatchesTruthWithColumnReadoutAndCalibratedTilt) {
   for (int i = 0; i < 40; ++i) {
     BodyRig rig{{}, rolling_calibration(), random_state(random, 0.1), {}};
     rig.calibration.camera.readout = Readout::columns;
@@ -127,7 +127,7 @@ TEST_P(ExactBody, ReadInColumnsOverACalibratedTilt) {
   EXPECT_GT(fixes, 25);
 }
 
-TEST_P(ExactBody, OfARobot) {
+TEST_P(PositionerNoiselessBody, MatchesTruthOfRobot) {
   for (int i = 0; i < 40; ++i) {
     BodyRig rig{{}, rolling_calibration(), random_state(random, 0.1), {}};
     rig.mount = CameraMount{{0.3, -0.1, 0.2}, 0.1 * i};
@@ -136,7 +136,7 @@ TEST_P(ExactBody, OfARobot) {
   EXPECT_GT(fixes, 25);
 }
 
-TEST_P(ExactBody, ThatLeansByUpTo80Degrees) {
+TEST_P(PositionerNoiselessBody, MatchesTruthForTiltUpTo80Degrees) {
   for (int i = 0; i < 80; ++i) {
     BodyRig rig{{}, rolling_calibration(), random_state(random, 0), {}};
     rig.body.motion.inclination.roll_rad = rad_from_deg(random.uniform(-80, 80));
@@ -147,8 +147,8 @@ TEST_P(ExactBody, ThatLeansByUpTo80Degrees) {
   EXPECT_GT(fixes, 40);
 }
 
-/// What is known beforehand, and right, moves nothing, however little the lamps tell.
-TEST_P(ExactBody, OfWhichTheTruthIsExpected) {
+/// A correct prior does not change the fix, even if the lamps hardly determine the state.
+TEST_P(PositionerNoiselessBody, MatchesTruthWhenPriorMeanIsTrue) {
   for (int i = 0; i < 60; ++i) {
     BodyRig rig{{}, rolling_calibration(), random_state(random, 0.1), {}};
     const std::size_t lamps = 2 + random.index(3);
@@ -165,10 +165,10 @@ TEST_P(ExactBody, OfWhichTheTruthIsExpected) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Estimates, ExactBody, testing::ValuesIn(kCombinations),
+INSTANTIATE_TEST_SUITE_P(Estimates, PositionerNoiselessBody, testing::ValuesIn(kCombinations),
                          name_of_combination);
 
-TEST(BodyFix, DerivativesAgreeWithDifferences) {
+TEST(EvaluatedState, DerivativesMatchFiniteDifferences) {
   // Central differences: step^2 and rounding / step, times a second at most.
   constexpr double step = 1e-6, tolerance = 1e-8;
   Random random(5);
@@ -196,7 +196,7 @@ TEST(BodyFix, DerivativesAgreeWithDifferences) {
   }
 }
 
-TEST(BodyFix, PixelOfARayAgreesWithTheLens) {
+TEST(WhitenedPixelFromRay, MatchesLens) {
   const Camera camera = synthetic_camera();
   const Lens lens(camera.lens_model, camera.intrinsics);
   constexpr double step_px = 1e-3, sigma_px = 0.25;
@@ -213,7 +213,7 @@ TEST(BodyFix, PixelOfARayAgreesWithTheLens) {
   }
 }
 
-TEST(ThreeLampPoses, HoldTheTruth) {
+TEST(ComputeThreeLampPoses, ContainsTruth) {
   Random random(6);
   int exact = 0;
   constexpr int draws = 5000;
@@ -236,11 +236,11 @@ TEST(ThreeLampPoses, HoldTheTruth) {
     }
     exact += nearest < 1e-7;
   }
-  // A few are where two solutions meet.
+  // A few draws have two nearly equal solutions.
   EXPECT_GE(exact, draws - 5);
 }
 
-TEST(ThreeLampPoses, HaveNoneOfLampsOnOneLine) {
+TEST(ComputeThreeLampPoses, ReturnsNoneForCollinearLamps) {
   const std::array<Eigen::Vector3d, 3> lamps_m{
       Eigen::Vector3d(-1, 0.2, 2), {0, 0.2, 2}, {1, 0.2, 2}};
   std::array<Eigen::Vector3d, 3> rays;
@@ -248,8 +248,8 @@ TEST(ThreeLampPoses, HaveNoneOfLampsOnOneLine) {
   EXPECT_EQ(three_lamp_poses(lamps_m, rays).count, 0);
 }
 
-/// A lamp that is as far from both others, and seen so: one of the conics is a pair of lines.
-TEST(ThreeLampPoses, HoldTheTruthOfLampsThatAreSeenAlike) {
+/// A lamp with equal distances and angles to both others: one of the conics is a pair of lines.
+TEST(ComputeThreeLampPoses, ContainsTruthForSymmetricLamps) {
   for (const double up_m : {-2.0, -1.5}) {
     for (const double aside_m : {0.0, 0.3}) {
       const Eigen::Vector3d camera_m(0, aside_m, up_m);
@@ -268,7 +268,7 @@ TEST(ThreeLampPoses, HoldTheTruthOfLampsThatAreSeenAlike) {
   }
 }
 
-/// The states found over many draws against the covariance that is stated.
+/// Compares the scatter of the states over many draws with the reported covariance.
 class BodyScatter {
  public:
   using Vector = Eigen::Matrix<double, kBodyStates, 1>;
@@ -286,7 +286,7 @@ class BodyScatter {
     squares_ += error * error.transpose();
     ++count_;
   }
-  /// Of covariance over stated covariance, per state that has one.
+  /// Checks the ratio of found to reported standard deviation of each estimated state.
   void expect(const BodyCovariance& stated, double tolerance) const {
     const Vector mean = sum_ / count_;
     const BodyCovariance found = squares_ / count_ - mean * mean.transpose();
@@ -311,11 +311,11 @@ class BodyScatter {
   double count_ = 0;
 };
 
-/// 4,000 draws know a standard deviation within 1.1 %.
+/// 4,000 draws determine a standard deviation to 1.1 %.
 constexpr int kBodyDraws = 4000;
 constexpr double kBodyScatterTolerance = 0.05;
 
-class BodyCovarianceOf : public testing::TestWithParam<Estimated> {
+class BodyFixCovariance : public testing::TestWithParam<Estimated> {
  protected:
   BodyRig rig{synthetic_lamps(), rolling_calibration(), {}, {}};
 
@@ -324,7 +324,7 @@ class BodyCovarianceOf : public testing::TestWithParam<Estimated> {
   }
 };
 
-TEST_P(BodyCovarianceOf, LampsAloneIsTheScatter) {
+TEST_P(BodyFixCovariance, MatchesScatterWithLampsAlone) {
   const auto exact = seen_from(rig, 0.05);
   ASSERT_EQ(exact.size(), 8);
   const Positioner positioner = rig.positioner();
@@ -342,8 +342,8 @@ TEST_P(BodyCovarianceOf, LampsAloneIsTheScatter) {
   scatter.expect(stated.body->covariance, kBodyScatterTolerance);
 }
 
-/// Odometry and an inclination sensor that err as they say.
-TEST_P(BodyCovarianceOf, LampsAndSensorsIsTheScatter) {
+/// Odometry and inclination sensor with errors of the reported size.
+TEST_P(BodyFixCovariance, MatchesScatterWithLampsAndSensors) {
   rig.mount = CameraMount{{0.2, -0.1, 0.3}, 0.5};
   auto exact = seen_from(rig, 0.05);
   exact.resize(4);
@@ -374,10 +374,10 @@ TEST_P(BodyCovarianceOf, LampsAndSensorsIsTheScatter) {
   scatter.expect(stated.body->covariance, kBodyScatterTolerance);
 }
 
-INSTANTIATE_TEST_SUITE_P(Estimates, BodyCovarianceOf, testing::ValuesIn(kCombinations),
+INSTANTIATE_TEST_SUITE_P(Estimates, BodyFixCovariance, testing::ValuesIn(kCombinations),
                          name_of_combination);
 
-TEST(BodyFix, RedundancyIsTheMeanOfThePixelsResiduals) {
+TEST(BodyFix, RedundancyMatchesMeanOfPixelResiduals) {
   BodyRig rig{synthetic_lamps(), rolling_calibration(), {}, {}};
   rig.body = {{{0.1, -0.05, 0.05}, 0.7}, {{0.8, -0.5}, 0.6, {0.03, -0.05}}};
   const auto exact = seen_from(rig, 0.05);

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// What a body that may drive, turn or lean is refused, and wrong identities under it.
+/// Fixes that are rejected for bodies that may move or be tilted, and wrong identities of lamps.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -12,10 +12,10 @@ namespace vlp {
 namespace {
 
 constexpr double kBodyNoise_px = 0.1;
-/// The lean of a camera that is held in a hand.
+/// Standard deviation of roll and pitch of a hand-held camera.
 constexpr double kAny_rad = 1.6;
 
-class BodyFrames : public testing::Test {
+class PositionerLocateBody : public testing::Test {
  protected:
   BodyRig rig{synthetic_lamps(),
               rolling_calibration(),
@@ -45,7 +45,7 @@ class BodyFrames : public testing::Test {
   Fix locate(const std::vector<Detection>& detections, const Sensors& sensors) const {
     return rig.positioner().locate(detections, sensors);
   }
-  /// Within five of its standard deviations.
+  /// Expects errors below five reported standard deviations.
   void expect_truth(const Fix& fix) const {
     ASSERT_TRUE(fix.ok()) << name_of(fix.status);
     for (int i = 0; i < 3; ++i) {
@@ -55,7 +55,7 @@ class BodyFrames : public testing::Test {
   }
 };
 
-TEST_F(BodyFrames, StandingIsTheFixOfAStandingCameraToTheBit) {
+TEST_F(PositionerLocateBody, MatchesStandingFixExactlyWithoutMotion) {
   stand();
   Sensors standing;
   standing.motion = KnownMotion();
@@ -67,7 +67,7 @@ TEST_F(BodyFrames, StandingIsTheFixOfAStandingCameraToTheBit) {
   EXPECT_FALSE(with.body.has_value());
 }
 
-TEST_F(BodyFrames, MotionNeedsARowTime) {
+TEST_F(PositionerLocateBody, ReturnsRowTimeUnknownWithoutRowTime) {
   auto detections = seen();
   rig.calibration.camera.row_time_s.reset();
   EXPECT_EQ(locate(detections, driving()).status, FixStatus::row_time_unknown);
@@ -77,7 +77,7 @@ TEST_F(BodyFrames, MotionNeedsARowTime) {
   EXPECT_TRUE(locate(detections, leaning()).ok());
 }
 
-TEST_F(BodyFrames, TimeIsPassedOn) {
+TEST_F(PositionerLocateBody, ReturnsTimeOfSensors) {
   Sensors sensors = driving();
   sensors.time_s = 17.25;
   EXPECT_EQ(locate(seen(), sensors).time_s, 17.25);
@@ -86,7 +86,7 @@ TEST_F(BodyFrames, TimeIsPassedOn) {
   EXPECT_EQ(locate(seen(), sensors).time_s, 17.25);
 }
 
-TEST_F(BodyFrames, WithBadSensorsAreRefused) {
+TEST_F(PositionerLocateBody, ReturnsNotFiniteForInvalidSensors) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   for (int which = 0; which < 6; ++which) {
     Sensors sensors = driving();
@@ -100,9 +100,8 @@ TEST_F(BodyFrames, WithBadSensorsAreRefused) {
   }
 }
 
-/// Two lamps do not tell how a camera leans; what they do not tell of a velocity is in the
-/// covariance.
-TEST_F(BodyFrames, OfTwoLamps) {
+/// Two lamps do not determine roll and pitch. The covariance includes the unknown velocity.
+TEST_F(PositionerLocateBody, ReturnsUndeterminedForTwoLampsWithFreeTilt) {
   auto detections = seen();
   detections.resize(2);
   EXPECT_EQ(locate(detections, leaning()).status, FixStatus::undetermined);
@@ -112,7 +111,7 @@ TEST_F(BodyFrames, OfTwoLamps) {
   EXPECT_GT(std::sqrt(fix.estimate.covariance(2, 2)), 0.003);
 }
 
-TEST_F(BodyFrames, OfThreeLampsOnOneLineWithAFreeLean) {
+TEST_F(PositionerLocateBody, ReturnsUndeterminedForCollinearLampsWithFreeTilt) {
   rig.map = lamp_map_of({{-0.7, 0.1, 1.6}, {0, 0.1, 1.6}, {0.7, 0.1, 1.6}});
   stand();
   EXPECT_EQ(locate(seen(), leaning()).status, FixStatus::undetermined);
@@ -121,8 +120,8 @@ TEST_F(BodyFrames, OfThreeLampsOnOneLineWithAFreeLean) {
   expect_truth(locate(seen(), nearly_level));
 }
 
-/// Three lamps fit several poses of a camera that leans by any angle; a known height tells.
-TEST_F(BodyFrames, OfThreeLampsWithAFreeLean) {
+/// Three lamps fit several poses of a camera with unknown tilt; a known height selects one.
+TEST_F(PositionerLocateBody, ResolvesAmbiguityOfThreeLampsByHeight) {
   int ambiguous = 0, told = 0;
   for (int i = 0; i < 200; ++i) {
     rig.body.pose.position_m = {random.uniform(-0.3, 0.3), random.uniform(-0.3, 0.3), 0};
@@ -144,7 +143,7 @@ TEST_F(BodyFrames, OfThreeLampsWithAFreeLean) {
   EXPECT_GT(told, ambiguous / 2);
 }
 
-TEST_F(BodyFrames, LeaveOutOneMisidentifiedLamp) {
+TEST_F(PositionerLocateBody, RejectsMisidentifiedLamp) {
   for (const bool leans : {false, true}) {
     if (leans) lean();
     for (std::size_t wrong = 0; wrong < 5; ++wrong) {
@@ -166,7 +165,7 @@ TEST_F(BodyFrames, LeaveOutOneMisidentifiedLamp) {
   }
 }
 
-TEST_F(BodyFrames, RefuseLampsThatAllContradict) {
+TEST_F(PositionerLocateBody, ReturnsNoFixWhenAllLampsContradict) {
   for (const Sensors& sensors : {driving(), leaning(), held()}) {
     auto detections = seen();
     ASSERT_EQ(detections.size(), 8);
@@ -175,7 +174,7 @@ TEST_F(BodyFrames, RefuseLampsThatAllContradict) {
   }
 }
 
-TEST_F(BodyFrames, TellAMirroredMap) {
+TEST_F(PositionerLocateBody, DetectsMirroredMap) {
   const auto mirrored = [](LampMap map) {
     for (Lamp& lamp : map.lamps) lamp.position_m.y() *= -1;
     return map;
@@ -189,8 +188,8 @@ TEST_F(BodyFrames, TellAMirroredMap) {
   EXPECT_EQ(locate(in_hand, leaning()).status, FixStatus::mirrored_map);
 }
 
-/// A lamp that hangs 36 mm beside its place in the map.
-TEST_F(BodyFrames, LeaveOutAMovedLamp) {
+/// A lamp 36 mm away from its position in the map.
+TEST_F(PositionerLocateBody, RejectsMovedLamp) {
   for (const bool leans : {false, true}) {
     if (leans) lean();
     const LampMap map = rig.map;
@@ -203,16 +202,16 @@ TEST_F(BodyFrames, LeaveOutAMovedLamp) {
   }
 }
 
-/// Faster than it can be: something else is wrong.
-TEST_F(BodyFrames, RefuseAMotionThatCannotBe) {
+/// A velocity above the maximum indicates another error.
+TEST_F(PositionerLocateBody, ReturnsInconsistentForImpossibleMotion) {
   rig.body.motion.velocity_m_per_s = {3, 0};
   Sensors slow;
   slow.motion = KnownMotion::up_to(0.2, 3);
   EXPECT_EQ(locate(seen(), slow).status, FixStatus::inconsistent);
 }
 
-/// A camera that leans and is said to be level contradicts itself; the lean that is free explains.
-TEST_F(BodyFrames, ALeanThatIsNotKnownIsInconsistentUntilItIsFree) {
+/// A tilted camera with a level prior is inconsistent; with free roll and pitch it is located.
+TEST_F(PositionerLocateBody, ReturnsInconsistentForUnmodeledTilt) {
   rig.body.motion = {{0, 0}, 0, {0.7, -0.5}};
   rig.map = lamps_in_view(rig, 6, true, 0.3, random);
   EXPECT_EQ(locate(seen(), {}).status, FixStatus::inconsistent);
@@ -220,7 +219,7 @@ TEST_F(BodyFrames, ALeanThatIsNotKnownIsInconsistentUntilItIsFree) {
   expect_truth(locate(seen(), leaning()));
 }
 
-TEST_F(BodyFrames, InNationalCoordinates) {
+TEST_F(PositionerLocateBody, MatchesTruthInNationalCoordinates) {
   const Eigen::Vector3d origin_m(4.5e5, 5e6, 120);
   for (Lamp& lamp : rig.map.lamps) lamp.position_m += origin_m;
   rig.body.pose.position_m += origin_m;

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Fixes of bodies against what their pixels allow (Cramer-Rao), by chance at many places.
+/// Compares errors of body fixes at random positions with the Cramer-Rao lower bound.
 #include "positioning/body_limit.h"
 
 #include <gtest/gtest.h>
@@ -14,8 +14,7 @@ namespace {
 
 constexpr double kLimitNoise_px = 0.05;
 
-/// Squared errors of X, Y, Z, yaw over the variances that are the least possible, and over those
-/// that the fixes state.
+/// Squared errors of X, Y, Z, yaw over the Cramer-Rao bound, and over the reported variances.
 struct OverLimit {
   Eigen::Array4d over_limit = Eigen::Array4d::Zero(), over_stated = Eigen::Array4d::Zero();
   int fixes = 0, refused = 0;
@@ -36,16 +35,16 @@ struct OverLimit {
   Eigen::Array4d stated_ratio() const { return (over_stated / fixes).sqrt(); }
 };
 
-/// Of the fix of exact sightings, which has the covariance of the limit.
+/// Returns the covariance of the fix of exact observations, which equals the bound.
 std::optional<Matrix4> limit_of(const BodyRig& rig, const Sensors& sensors) {
   const Fix exact = rig.positioner().locate(seen_from(rig, kLimitNoise_px), sensors);
   if (!exact.ok()) return std::nullopt;
   return exact.noise_covariance;
 }
 
-/// Four or five lamps of a ceiling of which nothing but the image says how the camera leans, by up
-/// to 80 degrees: no more than 1.5 times the limit of six states.
-TEST(BodyLimit, IsReachedWhateverTheLean) {
+/// Four or five lamps of a ceiling, tilt of up to 80 degrees known from the image alone: errors at
+/// most 1.5 times the bound of six states.
+TEST(BodyLimit, FixErrorsStayNearBoundForAnyTilt) {
   Random random(81);
   Sensors in_hand;
   in_hand.inclination_sigma_rad = 1.6;
@@ -79,9 +78,9 @@ TEST(BodyLimit, IsReachedWhateverTheLean) {
   }
 }
 
-/// One that stands and was told that it may drive at 2 m/s pays what it states: its errors are 0.9
-/// to 1.1 of that, from four lamps and from eight.
-TEST(BodyLimit, OfOneThatStandsAndMightDriveIsWhatItPays) {
+/// A camera at rest with a prior of up to 2 m/s: its errors are 0.9 to 1.1 of the reported standard
+/// deviations, with four lamps and with eight.
+TEST(BodyLimit, FixErrorsMatchReportedWithFreeMotion) {
   Random random(82);
   Sensors might_drive;
   might_drive.motion = KnownMotion::up_to(2, rad_from_deg(180));

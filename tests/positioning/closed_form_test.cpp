@@ -26,7 +26,7 @@ void expect_pose(const Pose& pose, const Pose& truth) {
   EXPECT_NEAR(wrapped_rad(pose.yaw_rad - truth.yaw_rad), 0, 1e-9);
 }
 
-TEST(TwoLampFix, IsTheOnlyPoseAtEqualHeights) {
+TEST(ComputeTwoLampPoses, ReturnsOnlyPoseForEqualHeights) {
   Random random(3);
   for (int i = 0; i < 200; ++i) {
     const Pose truth = random_pose(random);
@@ -36,7 +36,7 @@ TEST(TwoLampFix, IsTheOnlyPoseAtEqualHeights) {
   }
 }
 
-TEST(TwoLampFix, ListsTheTruthAtDifferentHeights) {
+TEST(ComputeTwoLampPoses, ContainsTruthForDifferentHeights) {
   Random random(4);
   int doubles = 0;
   for (int i = 0; i < 500; ++i) {
@@ -47,7 +47,7 @@ TEST(TwoLampFix, ListsTheTruthAtDifferentHeights) {
     ASSERT_GE(fix.count, 1);
     const bool first = (fix.poses[0].position_m - truth.position_m).norm() < 1e-6;
     if (fix.count == 2) ++doubles;
-    // Near a double root the solution is as sharp as the root of the rounding.
+    // Near a double root the error is the square root of the rounding error.
     const Pose& nearest = fix.poses[first ? 0 : static_cast<std::size_t>(fix.count - 1)];
     EXPECT_LT((nearest.position_m - truth.position_m).norm(), 1e-6);
     for (int k = 0; k < fix.count; ++k) {
@@ -59,14 +59,14 @@ TEST(TwoLampFix, ListsTheTruthAtDifferentHeights) {
   EXPECT_GT(doubles, 10) << "the ambiguous case was not met";
 }
 
-TEST(TwoLampFix, HasNoPoseForLampsSeenAsOne) {
+TEST(ComputeTwoLampPoses, ReturnsNoneForCoincidentLamps) {
   const Pose pose{{0, 0, 0}, 0};
   Sighting a = seen({0, 0, 2}, pose), b = seen({1, 0, 2}, pose);
   b.z = a.z;
   EXPECT_EQ(fix_two_lamps(a, b).count, 0);
 }
 
-TEST(TwoLampFix, SaysWhenALampWouldHangBelowTheCamera) {
+TEST(ComputeTwoLampPoses, ReportsLampBelowCamera) {
   // The only pose has the second lamp, 2 m below the first, at the camera's own height.
   const Sighting a{{0, 0, 3}, {-1, 0}, Matrix2::Identity(), 1};
   const Sighting b{{2, 0, 1}, {1, 0}, Matrix2::Identity(), 1};
@@ -75,7 +75,7 @@ TEST(TwoLampFix, SaysWhenALampWouldHangBelowTheCamera) {
   EXPECT_TRUE(fix.lamp_below_camera);
 }
 
-TEST(CoplanarFix, IsExactForThreeLampsAndMore) {
+TEST(ComputeCoplanarPose, MatchesTruthForThreeLampsOrMore) {
   Random random(5);
   for (int i = 0; i < 200; ++i) {
     const Pose truth = random_pose(random);
@@ -89,7 +89,7 @@ TEST(CoplanarFix, IsExactForThreeLampsAndMore) {
   }
 }
 
-TEST(OneLampFix, IsExactWhenHeightAndYawAreKnown) {
+TEST(ComputeOneLampPose, MatchesTruthWithKnownHeightAndYaw) {
   Random random(6);
   for (int i = 0; i < 100; ++i) {
     const Pose truth = random_pose(random);
@@ -100,7 +100,7 @@ TEST(OneLampFix, IsExactWhenHeightAndYawAreKnown) {
   }
 }
 
-TEST(OneLampFix, NeedsTheLampAboveTheCamera) {
+TEST(ComputeOneLampPose, ReturnsNulloptWhenLampIsNotAboveCamera) {
   const Sighting sighting = seen({0, 0, 2}, {{0, 0, 0}, 0});
   EXPECT_FALSE(fix_one_lamp(sighting, {2, 0}));
   EXPECT_FALSE(fix_one_lamp(sighting, {2.5, 0}));

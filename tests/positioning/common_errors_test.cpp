@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// The part of a fix's covariance that calibration and lamp map make, against fixes made again with
-/// each of them a little off; lamps that this does not explain.
+/// Compares the covariance from calibration and lamp map with finite differences of fixes. Rejects
+/// lamps that these errors do not explain.
 #include "positioning/common_errors.h"
 
 #include <gtest/gtest.h>
@@ -16,11 +16,11 @@
 namespace vlp {
 namespace {
 
-class CommonToFixes : public testing::Test {
+class CommonErrorsTest : public testing::Test {
  protected:
   StatedRig rig;
 
-  /// Of a body that is not estimated, X, Y, Z and yaw, and otherwise none.
+  /// States of a fix; without a body estimate only X, Y, Z and yaw, and zeros.
   using States = Eigen::Vector<double, kBodyStates>;
   static States states_of(const Fix& fix) {
     States states = States::Zero();
@@ -41,7 +41,7 @@ class CommonToFixes : public testing::Test {
     if (!fix.body) return;
     EXPECT_EQ(fix.estimate.covariance, Matrix4(fix.body->covariance.topLeftCorner<4, 4>()));
     EXPECT_EQ(fix.noise_covariance, Matrix4(fix.body->noise_covariance.topLeftCorner<4, 4>()));
-    // Each state in its own standard deviation; of those that are given there is none.
+    // Each state in its standard deviation, which given states lack.
     const Eigen::VectorXd sd = expected.diagonal().cwiseSqrt();
     const Eigen::VectorXd inverse_sd =
         (sd.array() > 0).select(sd.cwiseInverse(), Eigen::VectorXd::Ones(kBodyStates));
@@ -52,18 +52,18 @@ class CommonToFixes : public testing::Test {
   }
 };
 
-/// G by differences of whole fixes: nothing is shared with the formula.
-class OfFixes : public CommonToFixes,
-                public testing::WithParamInterface<std::tuple<RotationModel, Sensors>> {};
+/// Computes G by differences of fixes, independently of the formula.
+class CommonErrorsOfFix : public CommonErrorsTest,
+                          public testing::WithParamInterface<std::tuple<RotationModel, Sensors>> {};
 
-TEST_P(OfFixes, IsThatOfThoseMadeWithEachParameterALittleOff) {
+TEST_P(CommonErrorsOfFix, MatchesFiniteDifferencesOfFix) {
   const Sensors& known = std::get<Sensors>(GetParam());
   rig.calibration.rotation_center->model = std::get<RotationModel>(GetParam());
   rig.adjust(1);
   rig.calibration.camera.row_time_s = 3e-5;
   rig.calibration.camera.readout = Readout::rows;
   const Adjustment adjustment = *rig.calibration.adjustment;
-  // A mount's yaw turns the body against the camera.
+  // The yaw of a mount rotates the body relative to the camera.
   PositionerOptions options;
   if (known.motion) options.mount = CameraMount{{0, 0, 0}, 0.5};
   const auto detections = seen_from(rig, 0.1);
@@ -102,7 +102,7 @@ Sensors sensors(double inclination_sigma_rad, const std::optional<KnownMotion>& 
   return sensors;
 }
 
-std::string name_of_body(const testing::TestParamInfo<OfFixes::ParamType>& body) {
+std::string name_of_body(const testing::TestParamInfo<CommonErrorsOfFix::ParamType>& body) {
   const Sensors& known = std::get<Sensors>(body.param);
   std::string name = known.motion ? "Driving" : "Standing";
   if (known.inclination_sigma_rad > 0) name += "AndLeaning";
@@ -111,14 +111,14 @@ std::string name_of_body(const testing::TestParamInfo<OfFixes::ParamType>& body)
 }
 
 INSTANTIATE_TEST_SUITE_P(
-    Bodies, OfFixes,
+    Bodies, CommonErrorsOfFix,
     testing::Combine(testing::Values(RotationModel::tilt, RotationModel::shift),
                      testing::Values(sensors(0, {}), sensors(0, KnownMotion::up_to(1, 1)),
                                      sensors(0.1, {}), sensors(0.1, KnownMotion::up_to(1, 1)))),
     name_of_body);
 
-/// As vlp-intrinsics leaves a calibration: nothing was made with the lens yet that leans on it.
-TEST_F(CommonToFixes, OfALensAloneAreThoseOfFixesMadeWithItALittleOff) {
+/// A calibration as by vlp-intrinsics: no other part depends on the lens.
+TEST_F(CommonErrorsTest, MatchesFiniteDifferencesForLensAlone) {
   rig.calibrate_in_a_row();
   rig.calibration.rotation_center.reset();
   rig.calibration.dispersion.reset();
@@ -141,8 +141,8 @@ TEST_F(CommonToFixes, OfALensAloneAreThoseOfFixesMadeWithItALittleOff) {
   expect_common(fix, by_parameters, covariance);
 }
 
-/// What was calibrated with the lens and does not say how it leans on it hides its errors.
-TEST_F(CommonToFixes, OfALensCountOnce) {
+/// A part without derivatives by the lens hides the errors of the lens.
+TEST_F(CommonErrorsTest, StatedReportsLensOnlyWithDerivatives) {
   const auto stated = [&](Correction correction) {
     return CommonErrors(rig.map.lamps, rig.calibration, correction).stated(CommonPart::lens);
   };
@@ -159,16 +159,16 @@ TEST_F(CommonToFixes, OfALensCountOnce) {
   EXPECT_TRUE(stated(Correction::none));
 }
 
-TEST_F(CommonToFixes, OfASurveyIsItsStandardDeviationThroughTheFix) {
+TEST_F(CommonErrorsTest, PropagatesStandardDeviationOfSurvey) {
   for (Lamp& lamp : rig.map.lamps) lamp.sd_m = 0.002;
   const Fix fix = Positioner(rig.map, rig.calibration).locate(seen_from(rig, 0.1));
   const Matrix4 common = fix.estimate.covariance - fix.noise_covariance;
-  // Eight lamps of 2 mm around the camera: 2 / sqrt(8) and a little more.
+  // Eight lamps of 2 mm around the camera: slightly more than 2 / sqrt(8).
   EXPECT_NEAR(std::sqrt(common(0, 0)), 0.00075, 0.00008);
 }
 
 /// Lamps of a dispersion have rows in the joint covariance; a derivative of 0 adds no error to it.
-TEST_F(CommonToFixes, OfASurveyAreTheSameWithAndWithoutRows) {
+TEST_F(CommonErrorsTest, MatchesWithAndWithoutRowsOfLamps) {
   rig.calibrate_in_a_row();
   for (Lamp& lamp : rig.map.lamps) lamp.sd_m = 0.002;
   rig.calibration.dispersion->by_lamps.clear();
@@ -189,7 +189,7 @@ TEST_F(CommonToFixes, OfASurveyAreTheSameWithAndWithoutRows) {
   EXPECT_TRUE(small.stated() && small.only(CommonPart::lamps).stated());
 }
 
-TEST_F(CommonToFixes, NamesALampThatNothingUncertainExplains) {
+TEST_F(CommonErrorsTest, RejectsLampThatNoErrorExplains) {
   rig.adjust(0.3);
   Random random(8);
   for (const double off_m : {0.01, 0.03}) {
@@ -206,7 +206,7 @@ TEST_F(CommonToFixes, NamesALampThatNothingUncertainExplains) {
   }
 }
 
-TEST_F(CommonToFixes, LeavesLampsAloneThatTheSurveyExplains) {
+TEST_F(CommonErrorsTest, KeepsLampsThatSurveyErrorsExplain) {
   rig.adjust(3);
   Random random(9);
   for (std::size_t moved = 0; moved < 8; ++moved) {

@@ -17,32 +17,32 @@ Eigen::Vector2d seen_at(const Eigen::Matrix3d& level_from_camera, const Eigen::V
   return (level_from_camera * z.homogeneous()).eval().hnormalized();
 }
 
-class CorrectionTest : public testing::Test {
+class LevelFromCamera : public testing::Test {
  protected:
   Calibration calibration{synthetic_camera(), {}, {}, {}, {}};
   Eigen::Vector2d focal_px = calibration.camera.focal_px();
   Eigen::Vector2d z{0.3, -0.2};
 };
 
-TEST_F(CorrectionTest, IsIdentityWithoutParts) {
+TEST_F(LevelFromCamera, ReturnsIdentityWithoutParts) {
   for (const Correction correction : {Correction::none, Correction::all}) {
     EXPECT_EQ(level_from_camera(calibration, correction), Eigen::Matrix3d::Identity());
   }
 }
 
-TEST_F(CorrectionTest, RefusesAPartThatIsNotThere) {
+TEST_F(LevelFromCamera, ThrowsWhenPartIsMissing) {
   EXPECT_THROW(level_from_camera(calibration, Correction::rotation), std::invalid_argument);
   EXPECT_THROW(level_from_camera(calibration, Correction::dispersion), std::invalid_argument);
 }
 
-TEST_F(CorrectionTest, TiltTakesTheZenithToTheOrigin) {
+TEST_F(LevelFromCamera, TiltMapsZenithToOrigin) {
   calibration.rotation_center = tilted_by(calibration.camera, 0.05, 2);
   const Eigen::Vector3d& zenith = calibration.rotation_center->zenith_in_camera;
   const auto matrix = level_from_camera(calibration, Correction::rotation);
   EXPECT_THAT(seen_at(matrix, zenith.hnormalized()), IsNear(Eigen::Vector2d(0, 0), 1e-15));
 }
 
-TEST_F(CorrectionTest, ShiftSubtractsTheCentreInTheUndistortedPlane) {
+TEST_F(LevelFromCamera, ShiftSubtractsCenterInUndistortedPlane) {
   const Eigen::Vector2d principal = calibration.camera.center_px();
   calibration.rotation_center = {
       RotationModel::shift, principal + Eigen::Vector2d(9, -4), {0, 0, 1}, {}};
@@ -50,7 +50,7 @@ TEST_F(CorrectionTest, ShiftSubtractsTheCentreInTheUndistortedPlane) {
   EXPECT_THAT(moved, IsNear(z - Eigen::Vector2d(9, -4).cwiseQuotient(focal_px), 1e-15));
 }
 
-TEST_F(CorrectionTest, DispersionIsSubtractedAlone) {
+TEST_F(LevelFromCamera, DispersionIsSubtractedWithoutRotationCenter) {
   calibration.dispersion = {{3, 5}, 0.01, {0, 0}, 12};
   const Eigen::Vector2d expected = z - Eigen::Vector2d(3, 5).cwiseQuotient(focal_px);
   EXPECT_THAT(seen_at(level_from_camera(calibration, Correction::dispersion), z),
@@ -59,7 +59,7 @@ TEST_F(CorrectionTest, DispersionIsSubtractedAlone) {
   EXPECT_THROW(level_from_camera(calibration, Correction::rotation), std::invalid_argument);
 }
 
-TEST_F(CorrectionTest, DispersionAfterATiltIsATilt) {
+TEST_F(LevelFromCamera, DispersionAfterTiltIsRotation) {
   calibration.rotation_center = tilted_by(calibration.camera, 0.05, 2);
   calibration.dispersion = {{3, 5}, 0.01, {0, 0}, 12};
   const Eigen::Matrix3d matrix = level_from_camera(calibration, Correction::all);

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Monte Carlo: the scatter of the fixes is the theoretical limit, and what they report of
-/// themselves. 20,000 draws know a standard deviation within 0.5 %: 3 % is six of those, and a
-/// share of 5 % within 0.15 %.
+/// Monte Carlo: the scatter of the fixes equals the Cramer-Rao bound and the reported covariance.
+/// 20,000 draws determine a standard deviation to 0.5 %, one sixth of the tolerance of 3 %, and a
+/// fraction of 5 % to 0.15 %.
 #include <gtest/gtest.h>
 
 #include "positioning/error_budget.h"
@@ -41,7 +41,7 @@ void expect_efficient(const Scatter& scatter) {
       << scatter.excess().transpose();
 }
 
-class Covariance : public testing::TestWithParam<std::size_t> {
+class FixCovariance : public testing::TestWithParam<std::size_t> {
  protected:
   SyntheticRig rig = rig_of(GetParam());
   Random random{11};
@@ -63,16 +63,16 @@ class Covariance : public testing::TestWithParam<std::size_t> {
   }
 };
 
-TEST_P(Covariance, IsTheTheoreticalLimit) {
+TEST_P(FixCovariance, EqualsCramerRaoBound) {
   const double sigma_px = 0.2;
   const Fix fix = Positioner(rig.map, rig.calibration).locate(seen_from(rig, sigma_px));
   const Eigen::Matrix4d limit = limit_of(rig, sigma_px);
   EXPECT_LT((fix.estimate.covariance - limit).norm(), 1e-6 * limit.norm());
 }
 
-TEST_P(Covariance, IsTheScatterOfALevelCamera) { expect_consistent(0.2); }
+TEST_P(FixCovariance, MatchesScatterOfLevelCamera) { expect_consistent(0.2); }
 
-TEST_P(Covariance, IsTheScatterOfATiltedCameraUnderLampsOfManyHeights) {
+TEST_P(FixCovariance, MatchesScatterWithTiltAndManyHeights) {
   for (std::size_t i = 0; i < rig.map.lamps.size(); ++i) {
     rig.map.lamps[i].position_m.z() += i % 2 ? 0.3 : -0.2;
   }
@@ -80,9 +80,9 @@ TEST_P(Covariance, IsTheScatterOfATiltedCameraUnderLampsOfManyHeights) {
   expect_consistent(0.2);
 }
 
-INSTANTIATE_TEST_SUITE_P(Lamps, Covariance, testing::Values(2, 3, 4, 8));
+INSTANTIATE_TEST_SUITE_P(Lamps, FixCovariance, testing::Values(2, 3, 4, 8));
 
-TEST(Covariance, OfLampsWithDifferentNoiseIsTheScatter) {
+TEST(FixCovariance, MatchesScatterWithDifferentNoise) {
   const SyntheticRig rig = rig_of(4);
   const Positioner positioner(rig.map, rig.calibration);
   auto exact = seen_from(rig, 0.1);
@@ -96,7 +96,7 @@ TEST(Covariance, OfLampsWithDifferentNoiseIsTheScatter) {
   expect_efficient(scatter);
 }
 
-TEST(Covariance, HoldsTheInclinationSensorsNoise) {
+TEST(FixCovariance, IncludesNoiseOfInclinationSensor) {
   SyntheticRig rig = rig_of(4);
   rig.inclination = {0.03, -0.02};
   const Positioner positioner(rig.map, rig.calibration);
@@ -114,7 +114,7 @@ TEST(Covariance, HoldsTheInclinationSensorsNoise) {
   EXPECT_NEAR(scatter.share_beyond_95(), 0.05, kShareTolerance);
 }
 
-TEST(Covariance, OfTheRobotsCentreIsTheScatter) {
+TEST(FixCovariance, MatchesScatterOfRobotCenter) {
   const SyntheticRig rig = rig_of(3);
   PositionerOptions options;
   options.mount = CameraMount{{0.4, -0.3, 0.2}, 0.5};
@@ -130,7 +130,7 @@ TEST(Covariance, OfTheRobotsCentreIsTheScatter) {
   EXPECT_NEAR(scatter.share_beyond_95(), 0.05, kShareTolerance);
 }
 
-TEST(Covariance, OfARobotsCentreHoldsTheInclinationOfTheMountsArm) {
+TEST(FixCovariance, IncludesInclinationOfMountArm) {
   const SyntheticRig rig = rig_of(4);
   PositionerOptions options;
   options.mount = CameraMount{{0.3, -0.2, 1.0}, 0.8};
@@ -147,7 +147,7 @@ TEST(Covariance, OfARobotsCentreHoldsTheInclinationOfTheMountsArm) {
   expect_efficient(scatter);
 }
 
-TEST(Covariance, OfOneLampHoldsTheInclination) {
+TEST(FixCovariance, IncludesInclinationForOneLamp) {
   const SyntheticRig rig = rig_of(1);
   const Positioner positioner(rig.map, rig.calibration);
   const double sigma_rad = 0.005;
@@ -166,7 +166,7 @@ TEST(Covariance, OfOneLampHoldsTheInclination) {
   EXPECT_LT(scatter.excess().head<2>().cwiseAbs().maxCoeff(), kScatterTolerance);
 }
 
-TEST(Covariance, UnderAStereographicLensIsTheScatter) {
+TEST(FixCovariance, MatchesScatterWithStereographicLens) {
   SyntheticRig rig = rig_of(4);
   rig.calibration.camera.lens_model = LensModel::stereographic;
   rig.calibration.camera.intrinsics = {300, 300, 400, 300};
@@ -181,7 +181,7 @@ TEST(Covariance, UnderAStereographicLensIsTheScatter) {
   expect_efficient(scatter);
 }
 
-TEST(Covariance, OfOneLampIsTheScatter) {
+TEST(FixCovariance, MatchesScatterForOneLamp) {
   const SyntheticRig rig = rig_of(1);
   const Positioner positioner(rig.map, rig.calibration);
   const Sensors known{{}, 0, HeightAndYaw{rig.camera.position_m.z(), rig.camera.yaw_rad}};
@@ -229,7 +229,7 @@ TEST(OneLampSensorCovariance, MatchesScatter) {
   expect_efficient(scatter);
 }
 
-TEST(PositionerLocate, RefusesOneMovingLampWithoutRowTime) {
+TEST(PositionerLocate, ReturnsRowTimeUnknownForOneMovingLamp) {
   const SyntheticRig rig = rig_of(1);
   Sensors sensors;
   sensors.height_and_yaw = HeightAndYaw{0.1, 0.9};
@@ -238,7 +238,7 @@ TEST(PositionerLocate, RefusesOneMovingLampWithoutRowTime) {
             FixStatus::row_time_unknown);
 }
 
-TEST(FixOneLamp, IsExactForRotatingRobot) {
+TEST(ComputeOneLampPose, MatchesTruthForRotatingRobot) {
   BodyRig rig{synthetic_lamps(), rolling_calibration(), {{{0.15, -0.1, 0.1}, 0.9}, {}}, {}};
   rig.mount = CameraMount{{0.3, -0.2, 0.5}, 0.7};
   rig.body.motion = {{0.5, 0.2}, 1.5, {0, 0}};
@@ -253,8 +253,9 @@ TEST(FixOneLamp, IsExactForRotatingRobot) {
   EXPECT_LT((fix.estimate.pose.position_m - rig.body.pose.position_m).norm(), 1e-9);
 }
 
-/// Under a pinhole lens all pixels weigh alike, and the closed forms are the least-squares fix.
-TEST(Covariance, ClosedFormsReachTheLimitUnderAPinhole) {
+/// With a pinhole lens all pixels have equal weights, and the closed forms are the least-squares
+/// fix.
+TEST(FixCovariance, ClosedFormsReachCramerRaoBoundWithPinhole) {
   for (const std::size_t lamps : {2u, 3u}) {
     SyntheticRig rig = rig_of(lamps);
     rig.calibration.camera.lens_model = LensModel::pinhole;

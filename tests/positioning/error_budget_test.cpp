@@ -21,7 +21,7 @@ std::vector<Eigen::Vector3d> positions_of(const LampMap& map) {
   return positions_m;
 }
 
-TEST(ErrorBudget, IsTheFormulaOfTheTheoryForLampsAtOneHeightUnderAPinhole) {
+TEST(ComputeErrorBudget, MatchesFormulaForPinholeAndEqualHeights) {
   const double focal_px = 520, sigma_px = 0.3;
   const Lens lens(LensModel::pinhole, std::array{focal_px, focal_px, 400.0, 300.0});
   for (const std::size_t n : {2u, 3u, 5u, 8u}) {
@@ -45,8 +45,8 @@ TEST(ErrorBudget, IsTheFormulaOfTheTheoryForLampsAtOneHeightUnderAPinhole) {
   }
 }
 
-/// Draws each source's error alone and fixes with it: the fix scatters as the budget says.
-class BudgetTerm : public testing::Test {
+/// Draws the errors of each source alone: the scatter of the fixes matches the budget.
+class ErrorBudgetTerm : public testing::Test {
  protected:
   SyntheticRig rig{
       synthetic_lamps(), {synthetic_camera(), {}, {}, {}, {}}, {{0.1, 0.2, 0}, 0.5}, {}};
@@ -69,10 +69,10 @@ class BudgetTerm : public testing::Test {
   }
 };
 
-TEST_F(BudgetTerm, OfTheCentreIsTheScatter) {
+TEST_F(ErrorBudgetTerm, CenterMatchesScatter) {
   rig.map.lamps.resize(3);
   const Positioner positioner(rig.map, rig.calibration);
-  // The four-parameter covariance of two causes is singular; yaw and height hardly move.
+  // The covariance of four states from two errors is singular; yaw and height barely change.
   Eigen::Matrix4d covariance = budget({1, 0.5, 0, 0}).center;
   const auto exact = seen_from(rig);
   Eigen::Matrix4d sum = Eigen::Matrix4d::Zero();
@@ -88,7 +88,7 @@ TEST_F(BudgetTerm, OfTheCentreIsTheScatter) {
   EXPECT_LT((sum / kDraws - covariance).norm(), 0.05 * covariance.norm());
 }
 
-TEST_F(BudgetTerm, OfTheTiltIsTheScatter) {
+TEST_F(ErrorBudgetTerm, TiltMatchesScatter) {
   const Positioner positioner(rig.map, rig.calibration);
   const Eigen::Matrix4d covariance = budget({1, 0, 0.003, 0}).tilt;
   const auto exact = seen_from(rig);
@@ -103,7 +103,7 @@ TEST_F(BudgetTerm, OfTheTiltIsTheScatter) {
   EXPECT_LT((sum / kDraws - covariance).norm(), 0.05 * covariance.norm());
 }
 
-TEST_F(BudgetTerm, OfTheLampMapIsTheScatter) {
+TEST_F(ErrorBudgetTerm, LampMapMatchesScatter) {
   expect_scatter(budget({1, 0, 0, 0.004}).lamp_map, [&](const auto& exact) {
     LampMap wrong = rig.map;
     for (Lamp& lamp : wrong.lamps) {
@@ -113,7 +113,7 @@ TEST_F(BudgetTerm, OfTheLampMapIsTheScatter) {
   });
 }
 
-TEST_F(BudgetTerm, OfTheNoiseIsTheScatter) {
+TEST_F(ErrorBudgetTerm, NoiseMatchesScatter) {
   const Positioner positioner(rig.map, rig.calibration);
   expect_scatter(budget({0.4, 0, 0, 0}).noise, [&](auto noisy) {
     for (Detection& detection : noisy) detection.sigma_px = 0.4;
@@ -121,7 +121,7 @@ TEST_F(BudgetTerm, OfTheNoiseIsTheScatter) {
   });
 }
 
-TEST(ErrorBudget, TotalIsTheSum) {
+TEST(ComputeErrorBudget, TotalIsSumOfSources) {
   const Lens lens(LensModel::pinhole, std::array{520.0, 520.0, 400.0, 300.0});
   const auto budget =
       error_budget(positions_of(synthetic_lamps()), lens, {{0, 0, 0}, 0}, {0.1, 0.2, 0.003, 0.004});
@@ -130,7 +130,7 @@ TEST(ErrorBudget, TotalIsTheSum) {
   EXPECT_GT(budget->lamp_map(0, 0), 0);
 }
 
-TEST(ErrorBudget, NeedsTwoLampsInFrontOfTheLens) {
+TEST(ComputeErrorBudget, ReturnsNulloptWithoutTwoLampsInFrontOfLens) {
   const Lens lens(LensModel::pinhole, std::array{520.0, 520.0, 400.0, 300.0});
   const ErrorSources noise{0.1, 0, 0, 0};
   const std::vector<Eigen::Vector3d> lamps_m{{0, 0, 2}, {1, 0, 2}};
@@ -139,12 +139,12 @@ TEST(ErrorBudget, NeedsTwoLampsInFrontOfTheLens) {
   EXPECT_TRUE(error_budget(lamps_m, lens, {{0, 0, 0}, 0}, noise));
 }
 
-/// Of a camera that stands level and that nobody told so: what it may do, one or all.
+/// Free states of a camera that is level and at rest: one or all.
 struct MayDo {
   bool drive, turn, lean;
 };
 
-class BodyBudget : public testing::TestWithParam<MayDo> {
+class ErrorBudgetWithPrior : public testing::TestWithParam<MayDo> {
  protected:
   static constexpr double kNoise_px = 0.1;
   BodyRig rig{synthetic_lamps(), rolling_calibration(), {{{0.1, -0.05, 0.05}, 0.7}, {}}, {}};
@@ -176,7 +176,7 @@ class BodyBudget : public testing::TestWithParam<MayDo> {
     state << fix.estimate.pose.position_m, fix.estimate.pose.yaw_rad;
     return state;
   }
-  /// Of a fix with an error of `step` one way and the other, per step.
+  /// Returns the central difference of a fix with an error of `step`.
   template <typename With>
   Eigen::Vector4d per_step(double step, const With& with) const {
     return (with(step) - with(-step)) / (2 * step);
@@ -189,7 +189,7 @@ class BodyBudget : public testing::TestWithParam<MayDo> {
   }
 };
 
-TEST_P(BodyBudget, IsWhatItsFixesState) {
+TEST_P(ErrorBudgetWithPrior, MatchesReportedCovarianceOfFix) {
   const Fix fix = rig.positioner().locate(seen_from(rig, kNoise_px), sensors());
   ASSERT_TRUE(fix.ok());
   const auto found = budget(prior(GetParam()));
@@ -203,8 +203,8 @@ TEST_P(BodyBudget, IsWhatItsFixesState) {
                                      1e-15));
 }
 
-/// Errors that fixes are given, one at a time, are what the budget says of them.
-TEST_P(BodyBudget, IsWhatErrorsDoToItsFixes) {
+/// The effects of single errors on fixes match the budget.
+TEST_P(ErrorBudgetWithPrior, MatchesEffectOfErrorsOnFix) {
   const auto found = budget(prior(GetParam()));
   const auto exact = seen_from(rig, kNoise_px);
   Eigen::Matrix4d by_center = Eigen::Matrix4d::Zero(), by_tilt = by_center, by_lamps = by_center;
@@ -233,7 +233,7 @@ TEST_P(BodyBudget, IsWhatErrorsDoToItsFixes) {
       by_lamps += std::pow(sources.lamp_map_m, 2) * move * move.transpose();
     }
   }
-  // What is of second order in the steps. Two causes move four states: yaw and height hardly.
+  // Errors of second order in the steps. Two errors change four states: yaw and height barely.
   const Eigen::Vector4d scale = found->total().diagonal().cwiseSqrt();
   const auto relative = [&](const Eigen::Matrix4d& difference) {
     return difference.cwiseQuotient(scale * scale.transpose()).cwiseAbs().maxCoeff();
@@ -248,15 +248,15 @@ std::string name_of_what_it_may(const testing::TestParamInfo<MayDo>& one) {
   return std::string(drive ? "Drive" : "") + (turn ? "Turn" : "") + (lean ? "Lean" : "");
 }
 
-INSTANTIATE_TEST_SUITE_P(OfOneThatMay, BodyBudget,
+INSTANTIATE_TEST_SUITE_P(FreeStates, ErrorBudgetWithPrior,
                          testing::Values(MayDo{true, false, false}, MayDo{false, true, false},
                                          MayDo{true, true, false}, MayDo{false, false, true},
                                          MayDo{true, false, true}, MayDo{true, true, true}),
                          name_of_what_it_may);
 
-class BodyBudgets : public BodyBudget {};
+class ErrorBudgetPriorCases : public ErrorBudgetWithPrior {};
 
-TEST_F(BodyBudgets, OfOneThatHardlyMayAreThoseOfOneThatStands) {
+TEST_F(ErrorBudgetPriorCases, MatchesStandingCameraWhenPriorIsTight) {
   BodyPrior prior;
   prior.velocity_sd_m_per_s = prior.inclination_sd_rad = 1e-7;
   const auto found = budget(prior);
@@ -268,15 +268,15 @@ TEST_F(BodyBudgets, OfOneThatHardlyMayAreThoseOfOneThatStands) {
   expect_like(found->total(), standing->total(), 1e-6);
 }
 
-/// One that nobody knows is estimated, whatever the calibration says of it.
-TEST_F(BodyBudgets, OfAnUnknownLeanHaveNoPartOfTheTilt) {
+/// An unknown tilt is estimated, independently of the calibration.
+TEST_F(ErrorBudgetPriorCases, IgnoresCalibratedTiltWhenTiltIsEstimated) {
   const auto known = budget(prior({true, false, false}));
   const auto unknown = budget(prior({true, false, true}));
   ASSERT_TRUE(known && unknown);
   EXPECT_LT(unknown->tilt(0, 0), 0.01 * known->tilt(0, 0));
 }
 
-TEST_F(BodyBudgets, NeedLampsThatTellTheLean) {
+TEST_F(ErrorBudgetPriorCases, ReturnsNulloptWhenLampsDoNotDetermineTilt) {
   BodyPrior in_hand;
   in_hand.inclination_sd_rad = 1.6;
   rig.map.lamps.resize(2);

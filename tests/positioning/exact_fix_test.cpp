@@ -1,8 +1,9 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Without noise a fix is the truth, computed forwards from world to pixel, to rounding.
+/// Without noise a fix equals the truth to rounding. Pixels are computed from world to image.
 #include <gtest/gtest.h>
 
+#include "camera/lens.h"
 #include "geometry/angles.h"
 #include "positioning/positioner.h"
 #include "support/near.h"
@@ -40,7 +41,7 @@ void expect_exact(const SyntheticRig& rig, const Sensors& sensors = {}) {
 }
 
 using LampsAndHeights = std::tuple<std::size_t, bool>;
-class ExactFix : public testing::TestWithParam<LampsAndHeights> {
+class PositionerNoiseless : public testing::TestWithParam<LampsAndHeights> {
  protected:
   SyntheticRig rig = rig_of(std::get<0>(GetParam()), std::get<1>(GetParam()));
   Random random{7};
@@ -51,7 +52,7 @@ class ExactFix : public testing::TestWithParam<LampsAndHeights> {
   }
 };
 
-TEST_P(ExactFix, AtEveryYaw) {
+TEST_P(PositionerNoiseless, MatchesTruthAtEveryYaw) {
   for (int yaw_deg = -180; yaw_deg <= 180; yaw_deg += 5) {
     rig.camera = place();
     rig.camera.yaw_rad = rad_from_deg(yaw_deg);
@@ -59,7 +60,7 @@ TEST_P(ExactFix, AtEveryYaw) {
   }
 }
 
-TEST_P(ExactFix, WithACalibratedTilt) {
+TEST_P(PositionerNoiseless, MatchesTruthWithCalibratedTilt) {
   for (int tilt_deg = 0; tilt_deg <= 10; tilt_deg += 2) {
     rig.camera = place();
     rig.calibration.rotation_center =
@@ -68,14 +69,14 @@ TEST_P(ExactFix, WithACalibratedTilt) {
   }
 }
 
-TEST_P(ExactFix, WithACalibratedShiftAndDispersion) {
+TEST_P(PositionerNoiseless, MatchesTruthWithCalibratedShiftAndDispersion) {
   rig.camera = place();
   rig.calibration.rotation_center = {RotationModel::shift, {411, 290}, {0, 0, 1}, {}};
   rig.calibration.dispersion = {{1.5, -2.5}, 0.01, {0, 0}, 40};
   expect_exact(rig);
 }
 
-TEST_P(ExactFix, WithAnInclinationSensorOverACalibratedTilt) {
+TEST_P(PositionerNoiseless, MatchesTruthWithInclinationSensorAndCalibratedTilt) {
   for (int i = 0; i < 20; ++i) {
     rig.camera = place();
     rig.calibration.rotation_center = tilted_by(rig.calibration.camera, rad_from_deg(2), i);
@@ -84,20 +85,20 @@ TEST_P(ExactFix, WithAnInclinationSensorOverACalibratedTilt) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Lamps, ExactFix,
+INSTANTIATE_TEST_SUITE_P(Lamps, PositionerNoiseless,
                          testing::Combine(testing::Values(2, 3, 4, 8), testing::Bool()),
                          [](const auto& instance) {
                            return std::to_string(std::get<0>(instance.param)) +
                                   (std::get<1>(instance.param) ? "AtOneHeight" : "AtManyHeights");
                          });
 
-TEST(ExactFix, OfOneLampWithKnownHeightAndYaw) {
+TEST(PositionerNoiseless, MatchesTruthForOneLampWithKnownHeightAndYaw) {
   SyntheticRig rig = rig_of(1, true);
   rig.camera = {{-0.3, 0.1, 0.2}, -2.5};
   expect_exact(rig, {{}, 0, HeightAndYaw{0.2, -2.5}});
 }
 
-TEST(ExactFix, OfTheRobotsCentre) {
+TEST(PositionerNoiseless, MatchesTruthOfRobotCenter) {
   SyntheticRig rig = rig_of(4, true);
   const Pose robot{{0.1, -0.2, 0.05}, 3.0};
   const CameraMount mount{{0.12, -0.03, 0.2}, 0.4};
@@ -111,7 +112,7 @@ TEST(ExactFix, OfTheRobotsCentre) {
   EXPECT_NEAR(fix.estimate.pose.yaw_rad, robot.yaw_rad, kExact_rad);
 }
 
-TEST(ExactFix, OfALeaningRobotsCentre) {
+TEST(PositionerNoiseless, MatchesTruthOfTiltedRobotCenter) {
   SyntheticRig rig = rig_of(4, true);
   const Eigen::Vector3d robot_m(0.1, -0.2, 0.05);
   const CameraMount mount{{0.12, -0.03, 0.2}, 1.3};
@@ -121,7 +122,7 @@ TEST(ExactFix, OfALeaningRobotsCentre) {
   rig.camera.position_m = robot_m + rotation_about_z(robot_yaw_rad) *
                                         level_from_inclination(of_robot) *
                                         mount.position_in_robot_m;
-  // The camera leans about its own axes, which are turned against the robot's: the same rotation.
+  // The same rotation about the axes of the camera, which are rotated relative to the robot's.
   const Eigen::Matrix3d camera_from_robot = rotation_about_z(-mount.yaw_in_robot_rad);
   const Eigen::Matrix3d lean =
       camera_from_robot * level_from_inclination(of_robot) * camera_from_robot.transpose();
@@ -137,8 +138,8 @@ TEST(ExactFix, OfALeaningRobotsCentre) {
   EXPECT_NEAR(fix.estimate.pose.yaw_rad, robot_yaw_rad, kExact_rad);
 }
 
-/// Two of them fit two poses; the third tells which.
-TEST(ExactFix, OfThreeLampsOfWhichTwoAreAmbiguous) {
+/// Two of the lamps fit two poses; the third selects one.
+TEST(PositionerNoiseless, MatchesTruthForThreeLampsWithAmbiguousPair) {
   Random random(4);
   for (int i = 0; i < 200; ++i) {
     SyntheticRig rig = rig_of(3, true);
@@ -153,7 +154,7 @@ TEST(ExactFix, OfThreeLampsOfWhichTwoAreAmbiguous) {
   }
 }
 
-TEST(ExactFix, InNationalCoordinatesAndWithNoise) {
+TEST(PositionerNoiseless, MatchesTruthInNationalCoordinates) {
   SyntheticRig rig = rig_of(5, false);
   const Eigen::Vector3d origin_m(4.5e5, 5e6, 120);
   for (Lamp& lamp : rig.map.lamps) lamp.position_m += origin_m;
@@ -169,7 +170,7 @@ TEST(ExactFix, InNationalCoordinatesAndWithNoise) {
   }
 }
 
-TEST(ExactFix, WithEveryLensModel) {
+TEST(PositionerNoiseless, MatchesTruthWithEveryLensModel) {
   const std::vector<double> opencv12{520,  522,  403,  296,  -0.28, 0.09,  1e-4, -2e-4,
                                      -.01, 0.02, 0.01, 1e-3, 1e-3,  -1e-3, 2e-3, 1e-3};
   for (const LensModel model : {LensModel::pinhole, LensModel::stereographic, LensModel::opencv4,
@@ -184,14 +185,14 @@ TEST(ExactFix, WithEveryLensModel) {
   }
 }
 
-TEST(ExactFix, WithASplinedLens) {
+TEST(PositionerNoiseless, MatchesTruthWithSplinedLens) {
   SyntheticRig rig = rig_of(8, false);
   rig.calibration.camera = splined_camera();
   rig.camera = {{0.1, 0.1, 0}, 1};
   expect_exact(rig);
 }
 
-TEST(ExactFix, WithAFisheye) {
+TEST(PositionerNoiseless, MatchesTruthWithFisheye) {
   SyntheticRig rig = rig_of(8, false);
   rig.calibration.camera = fisheye_camera();
   for (int yaw_deg = -180; yaw_deg <= 180; yaw_deg += 20) {
@@ -200,7 +201,7 @@ TEST(ExactFix, WithAFisheye) {
   }
 }
 
-TEST(ExactFix, WithLampsBeyondARightAngleOffTheAxisOfAFisheye) {
+TEST(PositionerNoiseless, MatchesTruthForLampsBeyond90DegreesOffAxis) {
   SyntheticRig rig = rig_of(8, false);
   rig.calibration.camera = fisheye_camera();
   rig.camera = {{0.1, 0.1, 0}, 1};

@@ -26,7 +26,7 @@ Camera pinhole_camera() {
 
 const ErrorSources kNoise{0.1, 0, 0, 0};
 
-TEST(VisibleLamps, EndAtTheImagesEdge) {
+TEST(FindVisibleLamps, ExcludesLampsOutsideImage) {
   // At 1 m above the camera the image is 1.6 m wide: its edges are at +-0.8 m, -+0.6 m.
   const LampMap map = lamp_map_of({{0.7999, 0, 1},
                                    {0.8001, 0, 1},
@@ -40,7 +40,7 @@ TEST(VisibleLamps, EndAtTheImagesEdge) {
   EXPECT_EQ(visible_lamps(map, pinhole_camera(), {{0, 0, 0}, 0}).size(), 4);
 }
 
-TEST(VisibleLamps, AreSeenWholeWhenTheirDiameterIsKnown) {
+TEST(FindVisibleLamps, ExcludesTruncatedLampsWhenDiameterIsKnown) {
   LampMap map = lamp_map_of({{0.75, 0, 1}, {0, 0, 1}});
   EXPECT_EQ(visible_lamps(map, pinhole_camera(), {{0, 0, 0}, 0}).size(), 2);
   map.lamps[0].shape = map.lamps[1].shape = make_disc(0.2);
@@ -49,13 +49,13 @@ TEST(VisibleLamps, AreSeenWholeWhenTheirDiameterIsKnown) {
   EXPECT_THAT(visible[0], IsNear(Eigen::Vector3d(0, 0, 1), 0));
 }
 
-TEST(VisibleLamps, TurnWithTheCamera) {
+TEST(FindVisibleLamps, DependsOnYaw) {
   const LampMap map = lamp_map_of({{0.7, 0, 1}});
   EXPECT_EQ(visible_lamps(map, pinhole_camera(), {{0, 0, 0}, 0}).size(), 1);
   EXPECT_EQ(visible_lamps(map, pinhole_camera(), {{0, 0, 0}, M_PI / 2}).size(), 0);
 }
 
-TEST(FloorLimits, CoverTheGridRowByRow) {
+TEST(ComputeFloorLimits, CoversGridRowByRow) {
   const LampMap map = synthetic_lamps();
   const auto limits = floor_limits(map, pinhole_camera(), {0, 0.3, -0.1, 0.1, 0.1}, 0.2, 0, kNoise);
   ASSERT_EQ(limits.places.size(), 4 * 3);
@@ -65,7 +65,7 @@ TEST(FloorLimits, CoverTheGridRowByRow) {
   }
 }
 
-TEST(FloorLimits, OfACameraThatMayMoveHavePartsForIt) {
+TEST(ComputeFloorLimits, IncludesMotionAndLeanWhenFree) {
   Camera camera = pinhole_camera();
   camera.row_time_s = 3e-5;
   camera.readout = Readout::rows;
@@ -89,7 +89,7 @@ TEST(FloorLimits, OfACameraThatMayMoveHavePartsForIt) {
     }
     ++with_fix;
     ASSERT_EQ(place.parts.size(), 6);
-    // What more is to be estimated comes on top.
+    // Additional estimated states increase the covariance.
     EXPECT_THAT(place.parts[0], IsNear(standing.places[i].parts[0], 1e-12));
     EXPECT_GT(place.total()(0, 0), standing.places[i].total()(0, 0));
   }
@@ -97,7 +97,7 @@ TEST(FloorLimits, OfACameraThatMayMoveHavePartsForIt) {
   EXPECT_GT(without, 0) << "some see too few lamps for a lean";
 }
 
-TEST(FloorLimits, OfAFisheyeAreTheScatterOfItsFixes) {
+TEST(ComputeFloorLimits, MatchesScatterWithFisheye) {
   constexpr int draws = 4000;
   const FloorGrid grid{-1.2, 1.2, 0.2, 0.2, 0.8};
   SyntheticRig rig{synthetic_lamps(), {fisheye_camera(), {}, {}, {}, {}}, {}, {}};
@@ -113,12 +113,12 @@ TEST(FloorLimits, OfAFisheyeAreTheScatterOfItsFixes) {
     for (int i = 0; i < draws; ++i) {
       scatter.add(positioner.locate(with_noise(exact, random)).estimate.pose);
     }
-    // Four standard deviations of a standard deviation of so many draws.
+    // Four standard deviations of a standard deviation from `draws` draws.
     EXPECT_LT(scatter.excess().cwiseAbs().maxCoeff(), 4 / std::sqrt(2.0 * draws));
   }
 }
 
-TEST(FloorLimits, HaveNoBudgetWhereNoLampsAreSeen) {
+TEST(ComputeFloorLimits, ReturnsNoPartsWithoutVisibleLamps) {
   const auto limits =
       floor_limits(synthetic_lamps(), pinhole_camera(), {50, 50, 0, 0, 1}, 0, 0, kNoise);
   ASSERT_EQ(limits.places.size(), 1);
@@ -126,7 +126,7 @@ TEST(FloorLimits, HaveNoBudgetWhereNoLampsAreSeen) {
   EXPECT_TRUE(limits.places[0].parts.empty());
 }
 
-TEST(FloorLimits, RefuseAGridThatIsNone) {
+TEST(ComputeFloorLimits, ThrowsOnInvalidGrid) {
   const auto on = [](const FloorGrid& grid) {
     return floor_limits(synthetic_lamps(), pinhole_camera(), grid, 0, 0, kNoise);
   };
@@ -138,7 +138,7 @@ TEST(FloorLimits, RefuseAGridThatIsNone) {
   EXPECT_THROW(on({0, NAN, 0, 1, 0.1}), std::invalid_argument);
 }
 
-TEST(FloorUnder, IsTheLampsRectangle) {
+TEST(MakeFloorGrid, ReturnsBoundingBoxOfLamps) {
   const FloorGrid grid = floor_under(synthetic_lamps(), 0.05);
   EXPECT_EQ(grid.x_min_m, -0.8);
   EXPECT_EQ(grid.x_max_m, 0.8);

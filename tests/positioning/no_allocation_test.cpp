@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// A Positioner answers without allocating, without throwing, from any number of threads.
+/// A Positioner neither allocates nor throws, and several threads may share it.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -18,7 +18,7 @@ namespace {
 std::atomic<long> allocations{0};
 }
 
-// Every allocation of this program is counted. Inlined, GCC would take free() for a mismatch.
+// Counts every allocation of this program. Inlined, GCC would report free() as a mismatch.
 [[gnu::noinline]] void* operator new(std::size_t size) {
   ++allocations;
   if (void* memory = std::malloc(size)) return memory;
@@ -54,7 +54,7 @@ SyntheticRig tilted_rig() {
 
 static_assert(noexcept(std::declval<const Positioner&>().locate({}, {})));
 
-TEST(Positioner, DoesNotAllocate) {
+TEST(Positioner, LocateDoesNotAllocate) {
   const SyntheticRig rig = tilted_rig();
   PositionerOptions options;
   options.mount = CameraMount{{0.1, 0.2, 0.3}, 0.4};
@@ -64,7 +64,7 @@ TEST(Positioner, DoesNotAllocate) {
   std::swap(swapped[0].lamp, swapped[6].lamp);
   for (Detection& detection : bad) detection.lamp = 1 + detection.lamp % 8;
   const Sensors sensors{Inclination{0.01, 0.02}, 0.001, HeightAndYaw{0, 0}};
-  // Whatever is estimated of a body, from one frame and from two.
+  // All combinations of estimated states of a body, from one frame and from two.
   std::array<Sensors, 8> bodies;
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     bodies[i].motion = KnownMotion::up_to(i & 1 ? 1 : 0, i & 2 ? 1 : 0);
@@ -88,7 +88,7 @@ TEST(Positioner, DoesNotAllocate) {
   EXPECT_EQ(allocations, before + 1) << "the counter does not count";
 }
 
-TEST(Positioner, DoesNotAllocateForASplinedLens) {
+TEST(Positioner, LocateDoesNotAllocateWithSplinedLens) {
   SyntheticRig rig = tilted_rig();
   rig.calibration.camera = splined_camera();
   const Positioner positioner(rig.map, rig.calibration);
@@ -98,7 +98,7 @@ TEST(Positioner, DoesNotAllocateForASplinedLens) {
   EXPECT_EQ(allocations, before);
 }
 
-TEST(CInterfaceMemory, IsNotAllocatedPerFix) {
+TEST(VlpLocate, DoesNotAllocate) {
   const SyntheticRig rig = tilted_rig();
   const TemporaryFolder folder;
   const std::string lamps = folder / "lamps.yaml", calibration = folder / "calibration.yaml";
@@ -121,7 +121,7 @@ TEST(CInterfaceMemory, IsNotAllocatedPerFix) {
   vlp_close(positioner);
 }
 
-TEST(Positioner, AnswersManyThreadsAlike) {
+TEST(Positioner, LocateReturnsSameFixInAllThreads) {
   const SyntheticRig rig = tilted_rig();
   const Positioner positioner(rig.map, rig.calibration);
   const auto detections = seen_from(rig);

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// What a Positioner refuses, and the reason it gives.
+/// Frames without a fix, and the status of each.
 #include <gtest/gtest.h>
 
 #include <limits>
@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-class Refusal : public testing::Test {
+class PositionerStatus : public testing::Test {
  protected:
   SyntheticRig rig{
       synthetic_lamps(), {synthetic_camera(), {}, {}, {}, {}}, {{0.1, -0.05, 0}, 0.4}, {}};
@@ -29,13 +29,13 @@ class Refusal : public testing::Test {
   }
 };
 
-TEST_F(Refusal, OfTooFewLamps) {
+TEST_F(PositionerStatus, ReturnsTooFewLampsBelowTwo) {
   EXPECT_EQ(status({}), FixStatus::too_few_lamps);
   EXPECT_EQ(status(seen(1)), FixStatus::too_few_lamps);
   EXPECT_EQ(status(seen(2)), FixStatus::ok);
 }
 
-TEST_F(Refusal, OfLampsThatAreNotInTheMap) {
+TEST_F(PositionerStatus, ReturnsTooFewLampsWhenLampsAreUnknown) {
   auto detections = seen(2);
   detections[1].lamp = 77;
   const Fix fix = Positioner(rig.map, rig.calibration).locate(detections);
@@ -43,7 +43,7 @@ TEST_F(Refusal, OfLampsThatAreNotInTheMap) {
   EXPECT_EQ(fix.unknown_lamps, 1);
 }
 
-TEST_F(Refusal, LeavesOutLampsThatAreNotInTheMap) {
+TEST_F(PositionerStatus, ReturnsOkWithoutUnknownLamps) {
   auto detections = seen(4);
   detections[1].lamp = 77;
   const Fix fix = Positioner(rig.map, rig.calibration).locate(detections);
@@ -52,13 +52,13 @@ TEST_F(Refusal, LeavesOutLampsThatAreNotInTheMap) {
   EXPECT_EQ(fix.unknown_lamps, 1);
 }
 
-TEST_F(Refusal, OfALampSeenTwice) {
+TEST_F(PositionerStatus, ReturnsDuplicateLampForRepeatedId) {
   auto detections = seen(3);
   detections[2].lamp = detections[0].lamp;
   EXPECT_EQ(status(detections), FixStatus::duplicate_lamp);
 }
 
-TEST_F(Refusal, OfMoreLampsThanAFrameHolds) {
+TEST_F(PositionerStatus, ReturnsTooManyLampsAboveLimit) {
   std::vector<Eigen::Vector3d> positions_m;
   for (int i = 0; i < 257; ++i) positions_m.emplace_back(0.01 * (i % 16), 0.01 * (i / 16), 2);
   rig.map = lamp_map_of(positions_m);
@@ -69,7 +69,7 @@ TEST_F(Refusal, OfMoreLampsThanAFrameHolds) {
   EXPECT_EQ(status(detections), FixStatus::ok);
 }
 
-TEST_F(Refusal, OfNumbersThatAreNotFinite) {
+TEST_F(PositionerStatus, ReturnsNotFiniteForInvalidNumbers) {
   for (const double bad : {kNan, std::numeric_limits<double>::infinity()}) {
     for (const int which : {0, 1, 2}) {
       auto detections = seen(3);
@@ -90,7 +90,7 @@ TEST_F(Refusal, OfNumbersThatAreNotFinite) {
   }
 }
 
-TEST_F(Refusal, OfAPixelThatNoRayReaches) {
+TEST_F(PositionerStatus, ReturnsOutsideLensForUnreachablePixel) {
   rig.calibration.camera.lens_model = LensModel::opencv4;
   rig.calibration.camera.intrinsics = {520, 520, 400, 300, -0.4, 0, 0, 0};
   auto detections = seen(3);
@@ -98,14 +98,14 @@ TEST_F(Refusal, OfAPixelThatNoRayReaches) {
   EXPECT_EQ(status(detections), FixStatus::outside_lens);
 }
 
-TEST_F(Refusal, OfALampBelowTheCamera) {
+TEST_F(PositionerStatus, ReturnsLampBelowCamera) {
   EXPECT_EQ(status(seen(1), {{}, 0, HeightAndYaw{1.6, 0}}), FixStatus::lamp_below_camera);
   EXPECT_EQ(status(seen(1), {{}, 0, HeightAndYaw{2.0, 0}}), FixStatus::lamp_below_camera);
   // An inclination that points the lamps' rays below the horizon.
   EXPECT_EQ(status(seen(3), {Inclination{3.1, 0}, 0, {}}), FixStatus::lamp_below_camera);
 }
 
-TEST_F(Refusal, OfLampsSeenAsOne) {
+TEST_F(PositionerStatus, ReturnsDegenerateForCoincidentPixels) {
   for (const std::size_t count : {2u, 3u, 4u}) {
     auto detections = seen(count);
     for (Detection& detection : detections) detection.pixel = detections[0].pixel;
@@ -113,19 +113,19 @@ TEST_F(Refusal, OfLampsSeenAsOne) {
   }
 }
 
-TEST_F(Refusal, OfLampsCloserTogetherThanTheirNoise) {
+TEST_F(PositionerStatus, ReturnsDegenerateWhenLampsAreCloserThanNoise) {
   auto detections = seen(2);
   detections[1].pixel = detections[0].pixel + Eigen::Vector2d(0.1, 0);
   EXPECT_EQ(status(detections), FixStatus::degenerate);
 }
 
-TEST_F(Refusal, OfTwoPosesForTwoLamps) {
+TEST_F(PositionerStatus, ReturnsAmbiguousForTwoPoses) {
   rig.map = lamp_map_of({{1.0, 0, 1.6}, {1.2, 0.1, 2.4}});
   rig.camera = {{0, 0, 0}, 0};
   EXPECT_EQ(status(seen(2)), FixStatus::ambiguous);
 }
 
-TEST_F(Refusal, OfAnImpossiblePositioner) {
+TEST_F(PositionerStatus, ConstructorThrowsOnInvalidArguments) {
   const auto build = [&](const LampMap& map, const Calibration& calibration,
                          const PositionerOptions& options = {}) {
     return Positioner(map, calibration, options);
@@ -157,7 +157,7 @@ TEST_F(Refusal, OfAnImpossiblePositioner) {
   EXPECT_THROW(build(rig.map, rig.calibration, options), std::invalid_argument);
 }
 
-TEST(FixStatus, HasANameAndAnExplanationEach) {
+TEST(FixStatus, HasNameAndExplanationForEachValue) {
   for (int i = 0; i <= static_cast<int>(FixStatus::mirrored_map); ++i) {
     const auto status = static_cast<FixStatus>(i);
     EXPECT_FALSE(name_of(status).empty());

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Wrong identities: left out where a majority outvotes them, refused where it cannot.
+/// Wrong identities: rejected by a majority; without a majority there is no fix.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -13,7 +13,7 @@
 namespace vlp {
 namespace {
 
-class Rejection : public testing::Test {
+class PositionerOutlierRejection : public testing::Test {
  protected:
   SyntheticRig rig{
       synthetic_lamps(), {synthetic_camera(), {}, {}, {}, {}}, {{0.1, -0.05, 0}, 0.4}, {}};
@@ -33,8 +33,8 @@ class Rejection : public testing::Test {
   }
 };
 
-TEST_F(Rejection, LeavesOutOneMisidentifiedLampOfFour) {
-  // The map has eight lamps; one of the four seen takes the identity of one that is not seen.
+TEST_F(PositionerOutlierRejection, RejectsOneMisidentifiedLampOfFour) {
+  // The map has eight lamps; one of the four detected ones gets the id of an undetected one.
   for (std::size_t wrong = 0; wrong < 4; ++wrong) {
     for (int id = 5; id <= 8; ++id) {
       auto detections = seen(4);
@@ -50,7 +50,7 @@ TEST_F(Rejection, LeavesOutOneMisidentifiedLampOfFour) {
   }
 }
 
-TEST_F(Rejection, LeavesOutTwoSwappedLampsOfFiveAndMore) {
+TEST_F(PositionerOutlierRejection, RejectsTwoSwappedLampsOfFiveOrMore) {
   for (const std::size_t count : {5u, 6u, 8u}) {
     for (std::size_t a = 0; a < count; ++a) {
       for (std::size_t b = a + 1; b < count; ++b) {
@@ -65,7 +65,7 @@ TEST_F(Rejection, LeavesOutTwoSwappedLampsOfFiveAndMore) {
   }
 }
 
-TEST_F(Rejection, WorksUnderLampsOfManyHeightsAndATilt) {
+TEST_F(PositionerOutlierRejection, RejectsOutlierWithManyHeightsAndTilt) {
   for (std::size_t i = 0; i < rig.map.lamps.size(); ++i) {
     rig.map.lamps[i].position_m.z() += i % 2 ? 0.3 : -0.1;
   }
@@ -80,7 +80,7 @@ TEST_F(Rejection, WorksUnderLampsOfManyHeightsAndATilt) {
   }
 }
 
-TEST_F(Rejection, KeepsAllLampsUnderATiltThatNothingCorrects) {
+TEST_F(PositionerOutlierRejection, KeepsAllLampsUnderUncorrectedTilt) {
   const LampMap map = rig.map;
   SyntheticRig tilted = rig;
   tilted.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.09, 2);  // 5 degrees
@@ -90,8 +90,8 @@ TEST_F(Rejection, KeepsAllLampsUnderATiltThatNothingCorrects) {
   EXPECT_EQ(fix.rejected_lamps, 0);
 }
 
-/// A reflection near the lamp passes for it by its place, but not by the noise that is stated.
-TEST_F(Rejection, LeavesOutALampThatIsALittleOffWhereTheNoiseIsStated) {
+/// A reflection near the lamp is consistent by position, but not by the reported noise.
+TEST_F(PositionerOutlierRejection, RejectsSmallDisplacementOnlyWhenSigmaIsReported) {
   for (const std::size_t count : {4u, 5u, 8u}) {
     for (std::size_t wrong = 0; wrong < count; ++wrong) {
       auto detections = seen(count);
@@ -107,8 +107,8 @@ TEST_F(Rejection, LeavesOutALampThatIsALittleOffWhereTheNoiseIsStated) {
   }
 }
 
-/// In a grid of lamps a wrong identity can hide in a scale and a turn.
-TEST_F(Rejection, NeverGivesAWrongFixInARegularGrid) {
+/// In a grid of lamps scale and rotation can hide a wrong identity.
+TEST_F(PositionerOutlierRejection, ReturnsNoWrongFixInRegularGrid) {
   std::vector<Eigen::Vector3d> positions_m;
   for (int i = 0; i < 49; ++i)
     positions_m.emplace_back(0.5 * (i % 7) - 1.5, 0.5 * (i / 7) - 1.5, 1.8);
@@ -143,8 +143,8 @@ TEST_F(Rejection, NeverGivesAWrongFixInARegularGrid) {
   EXPECT_GT(fixes, 1500);
 }
 
-/// Lamps close together and one far away: the far one, wrong, turns and scales the others a little.
-TEST_F(Rejection, OfAWrongLampFarFromACluster) {
+/// A cluster of lamps and a distant wrong one, which slightly rotates and scales the others.
+TEST_F(PositionerOutlierRejection, RejectsWrongLampFarFromCluster) {
   rig.map = lamp_map_of({{0, 0, 2.5}, {0.1, 0, 2.5}, {0, 0.1, 2.5}, {1.5, 0, 2.5}, {0, 1.5, 2.5}});
   rig.camera = {{0.3, 0.2, 0}, 0};
   for (const bool stated : {true, false}) {
@@ -158,7 +158,7 @@ TEST_F(Rejection, OfAWrongLampFarFromACluster) {
   }
 }
 
-TEST_F(Rejection, NamesAMirroredMapOfLampsNearlyInARow) {
+TEST_F(PositionerOutlierRejection, DetectsMirroredMapOfNearlyCollinearLamps) {
   for (const double width_m : {0.1, 0.15, 0.3}) {
     rig.map = lamp_map_of({{0, 0, 2.5}, {0.6, width_m, 2.5}, {1.2, 0, 2.5}, {1.8, width_m, 2.5}});
     rig.camera = {{0.9, 0, 0}, 0.4};
@@ -170,19 +170,19 @@ TEST_F(Rejection, NamesAMirroredMapOfLampsNearlyInARow) {
   }
 }
 
-TEST_F(Rejection, RefusesTwoHalvesThatContradict) {
+TEST_F(PositionerOutlierRejection, ReturnsInconsistentWhenHalvesContradict) {
   auto detections = seen(6);
   for (std::size_t i = 0; i < 3; ++i) detections[i].pixel += Eigen::Vector2d(60, 40);
   EXPECT_EQ(locate(detections).status, FixStatus::inconsistent);
 }
 
-TEST_F(Rejection, RefusesThreeLampsThatContradict) {
+TEST_F(PositionerOutlierRejection, ReturnsInconsistentWhenThreeLampsContradict) {
   auto detections = seen(3);
   detections[1].lamp = 8;
   EXPECT_EQ(locate(detections).status, FixStatus::inconsistent);
 }
 
-TEST_F(Rejection, RefusesAnotherRoomsMap) {
+TEST_F(PositionerOutlierRejection, ReturnsInconsistentForMapOfAnotherRoom) {
   rig.map = lamp_map_of({{0.1, 0.2, 1.6},
                          {-0.7, 0.4, 1.6},
                          {0.5, -0.4, 1.6},
@@ -196,7 +196,7 @@ TEST_F(Rejection, RefusesAnotherRoomsMap) {
   EXPECT_EQ(locate(detections).status, FixStatus::inconsistent);
 }
 
-TEST_F(Rejection, NamesAMirroredMap) {
+TEST_F(PositionerOutlierRejection, DetectsMirroredMap) {
   for (const bool equal_heights : {true, false}) {
     rig.map = synthetic_lamps();
     for (std::size_t i = 0; i < 8 && !equal_heights; ++i) {

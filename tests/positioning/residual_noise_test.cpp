@@ -36,7 +36,7 @@ TEST(SumResiduals, IgnoresFixesWithoutRedundancy) {
   EXPECT_EQ(sums.squares_px2, 2);
 }
 
-TEST(SumResiduals, LeavesOutFixWithWrongLamp) {
+TEST(SumResiduals, ExcludesFixWithWrongLamp) {
   const std::vector<Fix> fixes{fix_with(5, 0, 4), fix_with(4, 0, 4), fix_with(3000, 0, 4)};
   EXPECT_EQ(sum_residuals(fixes).chi_squared, 9);
 }
@@ -52,7 +52,7 @@ TEST(EstimateNoiseFactor, SubtractsCommonErrors) {
   EXPECT_FALSE(estimate_noise_factor({}));
 }
 
-TEST(EstimateBirgeRatio, IsOneWhereResidualsAreNotLarger) {
+TEST(EstimateBirgeRatio, ReturnsOneWhenResidualsAreNotLarger) {
   EXPECT_EQ(estimate_birge_ratio({.chi_squared = 10, .degrees_of_freedom = 20}), 1);
   EXPECT_EQ(estimate_birge_ratio({.chi_squared = 40, .degrees_of_freedom = 10}), 1);
   EXPECT_DOUBLE_EQ(estimate_birge_ratio({.chi_squared = 80, .degrees_of_freedom = 20}), 2);
@@ -61,7 +61,7 @@ TEST(EstimateBirgeRatio, IsOneWhereResidualsAreNotLarger) {
       1);
 }
 
-/// Mean of chi_squared over fixes of a rig whose lamps hang at drawn distances from the map.
+/// Mean of chi_squared over fixes of a rig whose lamps have random offsets from the map.
 class ExpectedChiSquared : public testing::Test {
  protected:
   void SetUp() override {
@@ -84,7 +84,7 @@ class ExpectedChiSquared : public testing::Test {
       const double sd_rad = sensors.inclination_sigma_rad;
       real.inclination = Inclination{sd_rad * random.normal(), sd_rad * random.normal()};
       const Fix fix = positioner.locate(with_noise(seen_from(real, kPixelSd_px), random), sensors);
-      // The draws that are refused or lose a lamp have the largest residuals: 1 in 10,000.
+      // Draws without a fix or with a rejected lamp have the largest residuals: 1 in 10,000.
       if (!fix.ok() || fix.rejected_lamps > 0) continue;
       found += fix.chi_squared;
       expected += fix.redundancy + fix.common_chi_squared;
@@ -98,15 +98,15 @@ class ExpectedChiSquared : public testing::Test {
   Random random{5};
 };
 
-TEST_F(ExpectedChiSquared, IsMeanOfFixesOfStandingCamera) { expect_mean({}); }
+TEST_F(ExpectedChiSquared, MatchesMeanOfStandingCamera) { expect_mean({}); }
 
-TEST_F(ExpectedChiSquared, IsMeanOfFixesWithEstimatedLean) {
+TEST_F(ExpectedChiSquared, MatchesMeanWithEstimatedTilt) {
   Sensors sensors;
   sensors.inclination_sigma_rad = 0.01;
   expect_mean(sensors);
 }
 
-TEST_F(ExpectedChiSquared, IsZeroUnlessRequested) {
+TEST_F(ExpectedChiSquared, ReturnsZeroUnlessRequested) {
   const Fix fix = Positioner(rig.map, rig.calibration).locate(seen_from(rig, kPixelSd_px));
   ASSERT_TRUE(fix.ok());
   EXPECT_EQ(fix.common_chi_squared, 0);

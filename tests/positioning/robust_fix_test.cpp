@@ -13,7 +13,7 @@ namespace {
 
 const Pose kTruth{{0.1, -0.05, 0}, 0.4};
 
-/// What a level camera at the true pose sees of lamps at two heights.
+/// Observations of lamps at two heights by a level camera at the true pose.
 std::array<Sighting, 5> sightings() {
   const std::array<Eigen::Vector3d, 5> lamps_m{Eigen::Vector3d{-0.6, -0.4, 1.6},
                                                {0.6, -0.4, 1.6},
@@ -27,16 +27,16 @@ std::array<Sighting, 5> sightings() {
   return seen;
 }
 
-TEST(Consensus, TakesThePoseWithTheLeastResidualsOfThoseAllLampsAgreeWith) {
+TEST(FindConsensus, ReturnsPoseWithSmallestResidualsAmongEqualCounts) {
   auto seen = sightings();
-  seen[0].z.x() += 0.004;  // the first pairs propose poses that are off
+  seen[0].z.x() += 0.004;  // the first pairs propose wrong poses
   const auto consensus = find_consensus(seen, 0.1);
   ASSERT_TRUE(consensus);
   EXPECT_EQ(consensus->count, 5u);
   EXPECT_THAT(consensus->pose.position_m, IsNear(kTruth.position_m, 1e-12));
 }
 
-TEST(Consensus, NeedsMoreThanHalfAndThree) {
+TEST(FindConsensus, ReturnsNulloptWithoutMajorityOfThree) {
   auto seen = sightings();
   seen[0].z.x() += 0.1, seen[1].z.y() -= 0.15;
   const auto consensus = find_consensus(seen, 0.01);

@@ -16,7 +16,7 @@ constexpr double kStep = 1e-6;
 // Central differences of a smooth function of order one: step^2 and rounding / step.
 constexpr double kDifferenceError = 1e-8;
 
-TEST(Sighting, PredictionIsTheLevelPointOverItsHeight) {
+TEST(PredictZ, MatchesProjectionOfLampInLevelFrame) {
   Random random(1);
   for (int i = 0; i < 100; ++i) {
     const Pose pose{{random.uniform(-2, 2), random.uniform(-2, 2), random.uniform(0, 1)},
@@ -27,7 +27,7 @@ TEST(Sighting, PredictionIsTheLevelPointOverItsHeight) {
   }
 }
 
-TEST(Sighting, PredictionDerivativesAgreeWithDifferences) {
+TEST(Predict, DerivativesMatchFiniteDifferences) {
   const Pose pose{{0.3, -0.7, 0.4}, 2.2};
   const Eigen::Vector3d lamp(1.1, 0.4, 2.5);
   const auto jacobian = predict(LevelPose(pose), lamp).d_z_d_state;
@@ -41,7 +41,7 @@ TEST(Sighting, PredictionDerivativesAgreeWithDifferences) {
   }
 }
 
-TEST(Sighting, TiltJacobianAgreesWithDifferences) {
+TEST(TiltJacobian, MatchesFiniteDifferences) {
   const Eigen::Vector2d z(0.6, -0.35);
   const Eigen::Vector3d ray(z.x(), z.y(), 1);
   for (int i = 0; i < 2; ++i) {

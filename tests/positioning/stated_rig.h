@@ -6,7 +6,7 @@
 
 namespace vlp {
 
-/// A camera that leans, under eight lamps at several heights, and what is stated of its errors.
+/// A tilted camera under eight lamps at several heights, with reported uncertainties.
 struct StatedRig : SyntheticRig {
   StatedRig()
       : SyntheticRig{
@@ -17,7 +17,7 @@ struct StatedRig : SyntheticRig {
     calibration.rotation_center = tilted_by(calibration.camera, 0.03, 1);
   }
 
-  /// A covariance with correlations all over.
+  /// Returns a covariance in which all quantities are correlated.
   static MatrixX mixed(const Eigen::VectorXd& scale, Random& random) {
     Eigen::MatrixXd root(scale.size(), scale.size());
     for (double& one : root.reshaped()) one = 0.3 * random.normal();
@@ -25,14 +25,14 @@ struct StatedRig : SyntheticRig {
     return scale.asDiagonal() * root * root.transpose() * scale.asDiagonal();
   }
 
-  /// Of the intrinsics.
+  /// Returns a covariance of the intrinsics.
   static Eigen::VectorXd lens_scale(double size) {
     Eigen::VectorXd scale = Eigen::VectorXd::Constant(12, 1e-4 * size);
     scale.head<4>().setConstant(0.1 * size);
     return scale;
   }
 
-  /// States an adjustment.
+  /// Sets an adjustment.
   void adjust(double size) {
     Adjustment adjustment{{}, {}, {}, 1, 1, 0.1};
     for (const Lamp& lamp : map.lamps) adjustment.lamps.push_back({lamp.id, lamp.position_m});
@@ -44,7 +44,7 @@ struct StatedRig : SyntheticRig {
     calibration.adjustment = adjustment;
   }
 
-  /// States what steps in a row do, each with what it passes on, and a survey.
+  /// Sets the covariances of sequential steps, with derivatives by earlier steps, and a survey.
   void calibrate_in_a_row() {
     Random random(8);
     IntrinsicsReport& report = calibration.intrinsics_report.emplace();

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// The budget of a unit against what its fixes state, against fixes with drawn errors, and part by
-/// part.
+/// Compares the budget of a camera with the covariance of its fixes, with fixes of drawn errors,
+/// and part by part.
 #include "positioning/unit_errors.h"
 
 #include <gtest/gtest.h>
@@ -45,7 +45,7 @@ UnitBudget budget_of(const StatedRig& rig) {
   return *UnitErrors(rig.map, rig.calibration).budget(rig.camera, all_lamps(), kNoise_px);
 }
 
-/// seen_from() knows of no dispersion.
+/// seen_from() does not apply the dispersion.
 std::vector<Detection> detections_of(const StatedRig& rig) {
   const Lens lens(rig.calibration.camera.lens_model, rig.calibration.camera.intrinsics);
   const Eigen::Matrix3d camera_from_level =
@@ -59,9 +59,9 @@ std::vector<Detection> detections_of(const StatedRig& rig) {
   return detections;
 }
 
-class OfAUnit : public testing::TestWithParam<StatedRig> {};
+class UnitErrorsParts : public testing::TestWithParam<StatedRig> {};
 
-TEST_P(OfAUnit, AddsUpToWhatItsFixesState) {
+TEST_P(UnitErrorsParts, BudgetMatchesReportedCovarianceOfFix) {
   const StatedRig& rig = GetParam();
   const Fix fix = Positioner(rig.map, rig.calibration).locate(detections_of(rig));
   ASSERT_TRUE(fix.ok());
@@ -70,7 +70,7 @@ TEST_P(OfAUnit, AddsUpToWhatItsFixesState) {
   const Eigen::Matrix4d common = fix.estimate.covariance - fix.noise_covariance;
   const Eigen::Vector4d sd = fix.estimate.covariance.diagonal().cwiseSqrt();
   const Eigen::Matrix4d scale = sd * sd.transpose();
-  // To where the fix's iterations stop.
+  // Convergence tolerance of the fix.
   constexpr double stopped = 1e-8;
   EXPECT_LT((budget.common() - common).cwiseQuotient(scale).cwiseAbs().maxCoeff(), stopped);
   EXPECT_LT((budget.noise - fix.noise_covariance).cwiseQuotient(scale).cwiseAbs().maxCoeff(),
@@ -78,8 +78,8 @@ TEST_P(OfAUnit, AddsUpToWhatItsFixesState) {
   EXPECT_EQ(budget.total(), Matrix4(budget.noise + budget.common()));
 }
 
-/// The same of one that may drive, turn and lean.
-TEST_P(OfAUnit, ThatMayMoveAddsUpToWhatItsFixesState) {
+/// The same for a camera that may move and be tilted.
+TEST_P(UnitErrorsParts, BudgetMatchesReportedCovarianceWithFreeMotion) {
   StatedRig rig = GetParam();
   rig.calibration.camera.row_time_s = 55e-6;
   rig.calibration.camera.readout = Readout::rows;
@@ -108,7 +108,7 @@ TEST_P(OfAUnit, ThatMayMoveAddsUpToWhatItsFixesState) {
   EXPECT_GT(budget->lean(0, 0), budget->noise(0, 0)) << "a lean that is not known is dear";
 }
 
-TEST_P(OfAUnit, TakesItsCovarianceApartToRounding) {
+TEST_P(UnitErrorsParts, SumToJointCovariance) {
   const StatedRig& rig = GetParam();
   const UnitErrors unit(rig.map, rig.calibration);
   const Eigen::MatrixXd& whole = unit.common().joint();
@@ -119,7 +119,7 @@ TEST_P(OfAUnit, TakesItsCovarianceApartToRounding) {
               IsNear(Eigen::MatrixXd::Zero(whole.rows(), whole.cols()), 1e-13));
 }
 
-TEST_P(OfAUnit, HasPartsThatAreVariancesEach) {
+TEST_P(UnitErrorsParts, ArePositiveSemidefinite) {
   const UnitBudget budget = budget_of(GetParam());
   for (const Matrix4& part :
        {budget.noise, budget.lens, budget.zenith, budget.offset, budget.lamp_map}) {
@@ -129,10 +129,10 @@ TEST_P(OfAUnit, HasPartsThatAreVariancesEach) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Stated, OfAUnit, testing::Values(adjusted(), in_a_row()),
+INSTANTIATE_TEST_SUITE_P(Stated, UnitErrorsParts, testing::Values(adjusted(), in_a_row()),
                          [](const auto& one) { return one.index == 0 ? "Adjusted" : "InARow"; });
 
-TEST(UnitErrors, LackThePartThatIsExact) {
+TEST(UnitErrors, PartIsZeroForExactQuantity) {
   StatedRig rig = adjusted();
   MatrixX& covariance = rig.calibration.adjustment->covariance;
   const auto without = [&](Eigen::Index first, Eigen::Index size) {
@@ -152,8 +152,8 @@ TEST(UnitErrors, LackThePartThatIsExact) {
   EXPECT_TRUE(budget_of(rig).common().isZero(0));
 }
 
-/// Of steps in a row each part is that of one of their own covariances alone.
-TEST(UnitErrors, TakeStepsInARowApart) {
+/// Each part of sequential steps results from the covariance of one step alone.
+TEST(UnitErrors, PartsMatchSequentialSteps) {
   const StatedRig rig = in_a_row();
   const UnitBudget whole = budget_of(rig);
   StatedRig only_lens = rig, only_zenith = rig, only_offset = rig, only_map = rig;
@@ -171,8 +171,8 @@ TEST(UnitErrors, TakeStepsInARowApart) {
   EXPECT_THAT(whole.lamp_map, IsNear(clear(only_map, false, false, false, true), small));
 }
 
-/// Fixes of calibrations and maps drawn from what is stated, with the pixels' noise.
-TEST(UnitErrors, AreWhatFixesWithDrawnErrorsShow) {
+/// Fixes with calibrations and maps drawn from the reported covariance, and with pixel noise.
+TEST(UnitErrors, BudgetMatchesErrorsOfDrawnCalibrations) {
   const StatedRig rig = adjusted();
   const UnitBudget budget = budget_of(rig);
   const auto exact = detections_of(rig);
@@ -198,7 +198,7 @@ TEST(UnitErrors, AreWhatFixesWithDrawnErrorsShow) {
     scatter += off * off.transpose() / trials;
     judged.add(off, budget.total());
   }
-  // Of 2000 draws a variance is known to 3.2 %, its root to half of that.
+  // 2000 draws determine a variance to 3.2 %, its root to half of that.
   for (int i = 0; i < 4; ++i) {
     EXPECT_NEAR(std::sqrt(scatter(i, i) / budget.total()(i, i)), 1, 0.06) << i;
   }
@@ -206,14 +206,14 @@ TEST(UnitErrors, AreWhatFixesWithDrawnErrorsShow) {
   EXPECT_NEAR(judged.share(), 0.95, 0.02);
 }
 
-TEST(FixSpread, OfNoneIsNoneWhateverRoundingLeaves) {
+TEST(ComputeFixSds, ReturnsZeroForNegativeVariances) {
   const FixSpread spread = spread_of(Matrix4(-1e-22 * Matrix4::Identity()));
   EXPECT_EQ(spread.horizontal_m, 0);
   EXPECT_EQ(spread.height_m, 0);
   EXPECT_EQ(spread.yaw_rad, 0);
 }
 
-TEST(UnitErrors, SayWhatIsNotStated) {
+TEST(UnitErrors, StatedReportsKnownParts) {
   StatedRig rig;
   const auto stated = [&](CommonPart part) {
     return UnitErrors(rig.map, rig.calibration).common().stated(part);
@@ -228,7 +228,7 @@ TEST(UnitErrors, SayWhatIsNotStated) {
   EXPECT_FALSE(stated(CommonPart::lamps) || stated(CommonPart::offset));
 }
 
-TEST(UnitErrors, SeeWhatACameraThatLeansSees) {
+TEST(UnitErrors, LampsSeenFromAppliesTilt) {
   StatedRig rig;
   rig.map = lamp_map_of({{0, 0, 1.6}, {0.1, 0, 1.6}});
   rig.camera = {{0, 0, 0}, 0};
@@ -238,7 +238,7 @@ TEST(UnitErrors, SeeWhatACameraThatLeansSees) {
   EXPECT_EQ(UnitErrors(rig.map, rig.calibration).lamps_seen_from(rig.camera).size(), 2U);
 }
 
-TEST(FloorLimits, OfAUnitNameWhatToImproveFirst) {
+TEST(FloorSummary, LargestReturnsDominantSource) {
   StatedRig rig = in_a_row();
   const auto summary_of = [&](double map_sd_m, double noise_px) {
     for (Lamp& lamp : rig.map.lamps) lamp.sd_m = map_sd_m;

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// The C API says what the C++ API says, in its own order, and lets nothing else out.
+/// The C API returns the values of the C++ API, in its own order, and throws no exceptions.
 #include "positioning/vlp.h"
 
 #include <gmock/gmock.h>
@@ -29,7 +29,7 @@ using testing::IsEmpty;
 using Handle = std::unique_ptr<vlp_positioner, void (*)(vlp_positioner*)>;
 using Covariance6 = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
 
-/// A body that drives and leans under lamps, its files, and both positioners of them.
+/// A moving, tilted body under lamps, its files, and the positioners of both APIs.
 class CInterface : public testing::Test {
  protected:
   CInterface() {
@@ -66,7 +66,7 @@ class CInterface : public testing::Test {
   std::vector<vlp_detection> given;
 };
 
-/// Bit by bit: no tolerance.
+/// Compares without tolerance.
 void expect_same(const vlp_fix& c, const Fix& fix) {
   ASSERT_EQ(c.status, static_cast<int>(fix.status));
   ASSERT_EQ(c.status, VLP_OK);
@@ -89,7 +89,7 @@ void expect_same(const vlp_fix& c, const Fix& fix) {
   EXPECT_GE(symmetric_eigen(Eigen::MatrixXd(covariance)).values.minCoeff(), -1e-15);
 }
 
-TEST_F(CInterface, LocatesAStandingCamera) {
+TEST_F(CInterface, LocateMatchesCppForStandingCamera) {
   rig.body.motion = {};
   seen = seen_from(rig, 0.1);
   for (std::size_t i = 0; i < seen.size(); ++i) {
@@ -104,7 +104,7 @@ TEST_F(CInterface, LocatesAStandingCamera) {
   EXPECT_EQ(Covariance6(fix.covariance).row(3), Eigen::RowVectorXd::Zero(6));
 }
 
-TEST_F(CInterface, LocatesABodyThatDrivesAndLeans) {
+TEST_F(CInterface, LocateMatchesCppForMovingTiltedBody) {
   rig.mount = CameraMount{{0.2, -0.1, 0.3}, 0.5};
   vlp_options options = {};
   options.has_mount = 1;
@@ -134,7 +134,7 @@ TEST_F(CInterface, LocatesABodyThatDrivesAndLeans) {
   EXPECT_EQ(covariance(4, 5), fix.body->covariance(kBodyPitch, kBodyYaw));
   EXPECT_EQ(covariance(4, 4), fix.body->covariance(kBodyPitch, kBodyPitch));
   EXPECT_EQ(c.velocity_covariance[1], fix.body->covariance(kBodyVelocity, kBodyVelocity + 1));
-  // The surveyed lamp's error is common to all fixes, and leans them as well as it moves them.
+  // The error of the surveyed lamp is common to all fixes and affects roll and pitch, too.
   const Covariance6 noise(c.noise_covariance);
   EXPECT_EQ(noise(0, 3), fix.body->noise_covariance(0, kBodyRoll));
   EXPECT_EQ(noise(4, 4), fix.body->noise_covariance(kBodyPitch, kBodyPitch));
@@ -142,7 +142,7 @@ TEST_F(CInterface, LocatesABodyThatDrivesAndLeans) {
   EXPECT_LT(fix.body->noise_covariance(kBodyVelocity, kBodyVelocity), c.velocity_covariance[0]);
 }
 
-TEST_F(CInterface, LocatesByOneLampAndEveryKnownFigure) {
+TEST_F(CInterface, LocateMatchesCppForOneLampWithAllSensors) {
   seen.resize(1);
   given.resize(1);
   vlp_sensors sensors = {};
@@ -170,7 +170,7 @@ TEST_F(CInterface, LocatesByOneLampAndEveryKnownFigure) {
   EXPECT_DOUBLE_EQ(fix.velocity_covariance[8], 0.04);
 }
 
-TEST_F(CInterface, LocatesTogetherWithEarlierFrames) {
+TEST_F(CInterface, LocateMatchesCppWithEarlierFrames) {
   vlp_sensors sensors = {};
   sensors.has_motion = 1;
   sensors.velocity_sd_m_per_s = 1;
@@ -195,7 +195,7 @@ TEST_F(CInterface, LocatesTogetherWithEarlierFrames) {
   expect_same(fix, rig.positioner().locate(seen, same, {&frame, 1}));
 }
 
-TEST_F(CInterface, RefusesNullOrTooManyEarlierFrames) {
+TEST_F(CInterface, LocateRejectsNullOrTooManyEarlierFrames) {
   const Handle positioner = open();
   vlp_fix fix;
   const vlp_earlier_frame null{nullptr, 3, 0.05};
@@ -212,7 +212,7 @@ TEST_F(CInterface, RefusesNullOrTooManyEarlierFrames) {
             VLP_TOO_MANY_LAMPS);
 }
 
-TEST_F(CInterface, KnowsAHeight) {
+TEST_F(CInterface, LocateMatchesCppWithKnownHeight) {
   vlp_sensors sensors = {};
   sensors.inclination_sigma_rad = 0.2;
   sensors.has_motion = sensors.has_height = 1;
@@ -227,14 +227,14 @@ TEST_F(CInterface, KnowsAHeight) {
   EXPECT_LE(std::sqrt(fix.noise_covariance[14]), 1e-4);
 }
 
-TEST_F(CInterface, RefusesAHeightWithoutAStandardDeviationAndSaysSo) {
+TEST_F(CInterface, LocateRejectsHeightWithoutStandardDeviation) {
   vlp_sensors sensors = {};
   sensors.has_height = 1;
   EXPECT_EQ(located(open().get(), &sensors).status, VLP_NOT_FINITE);
   EXPECT_THAT(vlp_explanation(VLP_NOT_FINITE), HasSubstr("that of a known height not positive"));
 }
 
-TEST_F(CInterface, StampsAndCountsWithoutAFix) {
+TEST_F(CInterface, LocateReportsStampAndUnknownLampsWithoutFix) {
   for (vlp_detection& detection : given) detection.lamp += 100;
   vlp_sensors sensors = {};
   sensors.stamp = -7;
@@ -245,7 +245,7 @@ TEST_F(CInterface, StampsAndCountsWithoutAFix) {
   EXPECT_EQ(fix.position_m[0], 0);
 }
 
-TEST_F(CInterface, RefusesWhatIsNone) {
+TEST_F(CInterface, LocateRejectsInvalidArguments) {
   const auto positioner = open();
   vlp_fix fix;
   EXPECT_EQ(vlp_locate(nullptr, given.data(), given.size(), nullptr, &fix), VLP_BAD_ARGUMENT);
@@ -263,7 +263,7 @@ TEST_F(CInterface, RefusesWhatIsNone) {
   vlp_close(nullptr);
 }
 
-TEST_F(CInterface, SaysWhatIsWrongWithAFileOrAnOption) {
+TEST_F(CInterface, LastErrorReportsInvalidFileOrOption) {
   EXPECT_STREQ(vlp_last_error(), "");
   vlp_positioner* positioner = nullptr;
   const std::string missing = folder / "none.yaml";
@@ -286,7 +286,7 @@ TEST_F(CInterface, SaysWhatIsWrongWithAFileOrAnOption) {
   EXPECT_THAT(vlp_last_error(), HasSubstr("xxx"));
 }
 
-TEST(CInterfaceCodes, AreExplainedEach) {
+TEST(VlpExplanation, DescribesEachCode) {
   std::set<std::string> texts;
   for (int code = VLP_TOO_SMALL; code <= VLP_ROW_TIME_UNKNOWN; ++code) {
     texts.insert(vlp_explanation(code));

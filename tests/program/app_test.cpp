@@ -19,7 +19,7 @@ namespace {
 
 using testing::HasSubstr;
 
-/// How a program ends that does this, and what it says on stderr.
+/// Returns the exit code of a program that executes `run`, and its stderr.
 std::pair<int, std::string> end_of(const std::function<void()>& run) {
   std::string name = "vlp-something";
   char* argv[] = {name.data(), nullptr};
@@ -29,7 +29,7 @@ std::pair<int, std::string> end_of(const std::function<void()>& run) {
   return {code, testing::internal::GetCapturedStderr()};
 }
 
-TEST(RunApp, TellsByTheExitCodeHowItWent) {
+TEST(RunApp, ReturnsExitCodeOfOutcome) {
   EXPECT_EQ(end_of([] {}).first, kDone);
   EXPECT_EQ(end_of([] { throw GateNotMet("mean_mm"); }).first, kGateNotMet);
   EXPECT_EQ(end_of([] { throw InputError("lamps.yaml", "is empty"); }).first, kBadInput);
@@ -37,14 +37,14 @@ TEST(RunApp, TellsByTheExitCodeHowItWent) {
   EXPECT_EQ(end_of([] { throw Undetermined("add lamps"); }).first, kUndetermined);
 }
 
-TEST(RunApp, SaysWhyInOneLineThatATerminalCanShow) {
+TEST(RunApp, PrintsErrorInOnePrintableLine) {
   const std::string said = end_of([] { throw Undetermined("lamp \x1b[2J is dark"); }).second;
   EXPECT_THAT(said, HasSubstr("vlp-something: error: lamp "));
   EXPECT_EQ(said.find('\x1b'), std::string::npos);
   EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 1);
 }
 
-/// End of a program that does this while its stdout is full.
+/// Returns the same for a program whose stdout is full.
 std::pair<int, std::string> end_with_full_stdout(const std::function<void()>& run) {
   const int kept = ::dup(STDOUT_FILENO), full = ::open("/dev/full", O_WRONLY | O_CLOEXEC);
   std::fflush(stdout);
@@ -60,7 +60,7 @@ std::pair<int, std::string> end_with_full_stdout(const std::function<void()>& ru
   return end;
 }
 
-TEST(RunApp, ReportsAFullStdoutHoweverItEnds) {
+TEST(RunApp, ReportsFullStdout) {
   for (const std::function<void()>& run : std::vector<std::function<void()>>{
            [] {}, [] { throw GateNotMet("mean_mm"); }, [] { throw Undetermined("add lamps"); }}) {
     const auto [code, said] = end_with_full_stdout(run);
@@ -69,7 +69,7 @@ TEST(RunApp, ReportsAFullStdoutHoweverItEnds) {
   }
 }
 
-TEST(Outputs, AreNoInputs) {
+TEST(CheckOutput, RejectsInputFile) {
   const TemporaryFolder folder;
   const std::string lamps = folder.file("lamps.yaml", "x").string();
   const std::string again = (folder / ".").string() + "/lamps.yaml";
@@ -80,7 +80,7 @@ TEST(Outputs, AreNoInputs) {
   check_output((folder / "other.yaml").string(), {lamps});
 }
 
-TEST(Outputs, AreNotTwiceOneFile) {
+TEST(CheckOutputs, RejectsSameFileTwice) {
   const TemporaryFolder folder;
   const std::string file = (folder / "a").string(), same = (folder / "b/../a").string();
   check_outputs({{"--output", file}, {"--ros", ""}, {"--plot", ""}}, {});
@@ -90,7 +90,7 @@ TEST(Outputs, AreNotTwiceOneFile) {
             "--output and --plot name one file");
 }
 
-TEST(Checks, OfNumbersAndNames) {
+TEST(Validators, CheckNumbersAndNames) {
   EXPECT_EQ(finite()("-1e3"), "");
   EXPECT_NE(finite()("inf"), "");
   EXPECT_NE(finite()("1 m"), "");

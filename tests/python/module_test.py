@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
-"""The Python module: says what the files say, locates as it should, refuses what is none."""
+"""The Python module: reads files, computes the fixes of the library, rejects invalid input."""
 
 import ast
 import os
@@ -36,7 +36,7 @@ class Module(unittest.TestCase):
             seen["frames"], seen["lamps"], seen["pixels"], seen["sigma_px"], **options
         )
 
-    def test_reads_files(self):
+    def test_readers_match_files(self):
         self.assertEqual(list(self.lamps.ids), [1, 2, 3, 4, 5])
         self.assertEqual(list(self.lamps.positions_m[4]), [0.05, 0, 1.5])
         self.assertEqual(self.calibration.imager_px, [800, 600])
@@ -44,7 +44,7 @@ class Module(unittest.TestCase):
         self.assertEqual(self.calibration.row_time_s, 3e-5)
         self.assertEqual(self.seen["pixels"].shape, (len(self.seen["lamps"]), 2))
 
-    def test_lens_is_its_own_inverse(self):
+    def test_unproject_inverts_project(self):
         pixels = np.array([[10.0, 20], [400, 300], [790, 590]])
         lens = self.calibration.lens
         np.testing.assert_allclose(lens.project(5 * lens.unproject(pixels)), pixels, atol=1e-8)
@@ -52,7 +52,7 @@ class Module(unittest.TestCase):
         same = vlp.Lens(self.calibration.lens_model, self.calibration.intrinsics)
         np.testing.assert_array_equal(same.unproject(pixels), lens.unproject(pixels))
 
-    def test_locates_where_the_truth_is(self):
+    def test_locate_frames_matches_ground_truth(self):
         fixes = self.located()
         self.assertTrue((fixes["status"] == 0).all())
         error = fixes["position_m"] - self.truth["position_m"]
@@ -62,7 +62,7 @@ class Module(unittest.TestCase):
         sd = np.sqrt(np.diagonal(fixes["covariance"], axis1=1, axis2=2))
         self.assertLess(np.abs(error / sd[:, :3]).max(), 5)
 
-    def test_one_frame_is_as_among_many(self):
+    def test_locate_matches_locate_frames(self):
         fixes = self.located()
         of_3 = self.seen["frames"] == 3
         seen = [self.seen[name][of_3] for name in ("lamps", "pixels", "sigma_px")]
@@ -77,7 +77,7 @@ class Module(unittest.TestCase):
         mounted = vlp.Positioner(self.lamps, self.calibration, mount=(0, 0, 0.5, 0)).locate(*seen)
         self.assertAlmostEqual(mounted.position_m[2], fix.position_m[2] - 0.5)
 
-    def test_one_lamp_has_a_regular_covariance_from_stated_errors(self):
+    def test_locate_one_lamp_returns_regular_covariance(self):
         seen = [self.seen[name][:1] for name in ("lamps", "pixels", "sigma_px")]
         exact = self.positioner.locate(*seen, vlp.Sensors(height_and_yaw=(0, 0)))
         stated = self.positioner.locate(
@@ -90,7 +90,7 @@ class Module(unittest.TestCase):
         self.assertEqual(stated.rejected_ids, [])
         self.assertIsNone(stated.body_covariance)
 
-    def test_names_rejected_lamps(self):
+    def test_locate_reports_rejected_lamps(self):
         of_3 = self.seen["frames"] == 3
         lamps, pixels, sigma_px = (
             self.seen[name][of_3].copy() for name in ("lamps", "pixels", "sigma_px")
@@ -100,7 +100,7 @@ class Module(unittest.TestCase):
         fix = self.positioner.locate(lamps, pixels, sigma_px)
         self.assertEqual(fix.rejected_ids, [lamps[0]])
 
-    def test_earlier_frames_determine_the_velocity(self):
+    def test_locate_estimates_velocity_from_earlier_frames(self):
         of_3 = self.seen["frames"] == 3
         seen = [self.seen[name][of_3] for name in ("lamps", "pixels", "sigma_px")]
         sensors = vlp.Sensors(velocity_sd_m_per_s=1)
@@ -111,7 +111,7 @@ class Module(unittest.TestCase):
         self.assertLess(together.body_covariance[4, 4], 0.01 * alone.body_covariance[4, 4])
         self.assertLess(np.abs(together.velocity_m_per_s).max(), 0.01)
 
-    def test_says_why_there_is_no_fix(self):
+    def test_locate_reports_status_without_fix(self):
         fix = self.positioner.locate([1], [[400.0, 300]])
         self.assertFalse(fix.ok)
         self.assertEqual(fix.status, "too_few_lamps")
@@ -127,7 +127,7 @@ class Module(unittest.TestCase):
         self.assertTrue(np.isnan(fixes["position_m"]).all())
         self.assertIn("fewer than two", vlp.explanation(fixes["status"][0]))
 
-    def test_refuses_what_is_none(self):
+    def test_rejects_invalid_arguments(self):
         with self.assertRaisesRegex(vlp.InputError, "none.yaml"):
             vlp.LampMap("none.yaml")
         with self.assertRaisesRegex(ValueError, "shape"):
@@ -158,7 +158,7 @@ class Module(unittest.TestCase):
             vlp.Calibration(RENDERED / "true_calibration.yaml"),
         )
 
-    def test_detects_as_the_table_says(self):
+    def test_detect_matches_detections_table(self):
         detector = self.detector()
         true = vlp.read_detections(RENDERED / "sample/true_detections.csv")
         image = true["images"][0]
@@ -168,7 +168,7 @@ class Module(unittest.TestCase):
             row = (true["frames"] == 0) & (true["lamps"] == lamp)
             self.assertLess(np.linalg.norm(true["pixels"][row][0] - pixel), 6 * sigma + 0.05)
 
-    def test_detects_the_lamps_of_a_room(self):
+    def test_detect_identifies_lamps_of_one_room(self):
         text = (RENDERED / "lamps.yaml").read_text()
         hall = text.replace("{id: ", "{room: hall, id: ")
         office = re.sub(r"id: (\d)", r"room: office, id: 1\1", text).replace(", 1.6]", ", 1.7]")
@@ -189,7 +189,7 @@ class Module(unittest.TestCase):
             with self.assertRaisesRegex(vlp.InputError, "has no lamp with 'room: attic'"):
                 vlp.LampMap(file, "attic")
 
-    def test_detects_in_any_array(self):
+    def test_detect_accepts_any_memory_layout(self):
         detector = self.detector()
         image = np.array(PIL.Image.open(RENDERED / "sample/0000.png"))
         found = detector.detect(image)
@@ -203,7 +203,7 @@ class Module(unittest.TestCase):
             detector.detect(image)
         print(f"{10 * (time.process_time() - begin):.3f} ms of processor time a frame")
 
-    def test_locates_many_frames_in_no_time(self):
+    def test_locate_frames_is_fast(self):
         copies = 100000 // len(self.seen["images"]) + 1
         count = len(self.seen["images"])
         frames = np.concatenate([self.seen["frames"] + count * i for i in range(copies)])
@@ -216,7 +216,7 @@ class Module(unittest.TestCase):
         self.assertTrue((fixes["status"] == 0).all())
         self.assertLess(took, 5)  # 1 s on a machine of its own
 
-    def test_stubs_are_of_the_module(self):
+    def test_stubs_match_module(self):
         stubs = ast.parse((SOURCE / "lib/python/vlp-stubs/__init__.pyi").read_text()).body
         functions = [node for node in stubs if isinstance(node, ast.FunctionDef)]
         classes = [node for node in stubs if isinstance(node, ast.ClassDef)]
@@ -259,7 +259,7 @@ class Module(unittest.TestCase):
         self.assertEqual(tables["TruthTable"], list(self.truth))
 
     @unittest.skipUnless("VLP_PYBIND11_VERSION" in os.environ, "run by ctest -R Python.Module")
-    def test_refuses_numpy_2_if_its_pybind11_does_not_support_it(self):
+    def test_import_rejects_numpy_2_without_pybind11_support(self):
         imports = "import sys, numpy; numpy.__version__ = '2.0.0'; import vlp"
         told = subprocess.run([sys.executable, "-c", imports], capture_output=True, text=True)
         version = [int(number) for number in os.environ["VLP_PYBIND11_VERSION"].split(".")[:2]]

@@ -11,7 +11,7 @@ using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-/// A figure as one text.
+/// Formats a row as one text.
 std::vector<std::string> texts(const std::vector<ReportFigure>& figures) {
   std::vector<std::string> lines;
   for (const auto& [label, value, unit, interval] : figures) {
@@ -31,7 +31,7 @@ Evaluation evaluation() {
   return evaluation;
 }
 
-TEST(EvaluationFigures, SaysMillimetresAndLeavesOutWhatThereIsNot) {
+TEST(ReportStatistics, FormatsMillimetersAndOmitsMissingStatistics) {
   EXPECT_THAT(
       texts(report_figures(evaluation())),
       ElementsAre("captures | 10 |  | ", "without a fix | 2 |  | ",
@@ -41,7 +41,7 @@ TEST(EvaluationFigures, SaysMillimetresAndLeavesOutWhatThereIsNot) {
                   "horizontal error, largest | 4 | mm | "));
 }
 
-TEST(EvaluationFigures, GivesEachFigureItsOwnInterval) {
+TEST(ReportStatistics, MatchesIntervalsToStatistics) {
   Evaluation full = evaluation();
   full.intervals_m = {{0.001, 0.002}, {0.003, 0.004}, Interval{0.005, 0.006}, {0.007, 0.008}, 5};
   full.drawn = "stations";
@@ -60,14 +60,14 @@ TEST(EvaluationFigures, GivesEachFigureItsOwnInterval) {
       Contains(HasSubstr("other fixes: no evidence, too few; 0 captures have a fix in both")));
 }
 
-TEST(EvaluationFigures, NotesWhatIsMissingAndWhatErrorsAre) {
+TEST(ReportNotes, ReportsReferenceAndMissingFixes) {
   const auto notes = report_notes(evaluation());
   EXPECT_THAT(notes, ElementsAre("Horizontal errors are distances from the true place, by image.",
                                  "Captures without a fix: 1 degenerate, 1 no row.",
                                  "Caution: there are too few captures with a fix for intervals."));
 }
 
-TEST(EvaluationFigures, OfADriveBearItsName) {
+TEST(ReportStatistics, LabelsBeginWithNameOfDrive) {
   LineFit fit{};
   fit.distances_m = {1001, 0.001, 0.002, 0.003, 0.004, 0.005};
   fit.jitter_m = 0.006;

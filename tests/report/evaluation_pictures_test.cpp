@@ -20,7 +20,7 @@ EvaluationInput input() {
   return input;
 }
 
-TEST(EvaluationPictures, ShowsTheFloorWithWhatIsMissingAndTheDistribution) {
+TEST(MakeEvaluationPlots, ContainsFloorPlanAndDistribution) {
   EvaluationInput with_truth = input();
   with_truth.truth = {"truth.csv",
                       {{"a", {0, 0}, {}, {}, 2},
@@ -35,7 +35,7 @@ TEST(EvaluationPictures, ShowsTheFloorWithWhatIsMissingAndTheDistribution) {
   EXPECT_THAT(pictures[1].alt, HasSubstr("further off than 2 mm"));
 }
 
-/// A room of four lamps with a survey of 2 mm; its camera leans and knows its zenith.
+/// Room of four lamps surveyed to 2 mm; its camera is tilted and has a zenith covariance.
 struct StatedRoom {
   LampMap lamps;
   Calibration calibration{
@@ -69,7 +69,7 @@ struct StatedRoom {
   }
 };
 
-TEST(EvaluationPictures, ShowsWhereTheStatedUncertaintyComesFrom) {
+TEST(MakeBudgetPlot, DividesReportedVarianceBySource) {
   const StatedRoom room;
   const auto picture = budget_picture(room.fixes(), room.lamps, room.calibration);
   ASSERT_TRUE(picture);
@@ -81,8 +81,9 @@ TEST(EvaluationPictures, ShowsWhereTheStatedUncertaintyComesFrom) {
   EXPECT_THAT(picture->alt, HasSubstr("noise 9 %, lens 0 %, zenith "));
 }
 
-/// Of a camera that leans nobody knows how its uncertainty divides.
-TEST(EvaluationPictures, LeavesFixesWithALeanOutOfTheBudget) {
+/// The uncertainty of a fix with estimated roll and pitch cannot be divided like that of a level
+/// camera.
+TEST(MakeBudgetPlot, OmitsFixesWithEstimatedRollPitch) {
   const StatedRoom room;
   auto fixes = room.fixes();
   fixes[1].fix->sd = Eigen::Vector4d(1e-2, 1e-2, 2e-2, 2e-3);
@@ -95,7 +96,7 @@ TEST(EvaluationPictures, LeavesFixesWithALeanOutOfTheBudget) {
   EXPECT_FALSE(budget_picture(fixes, room.lamps, room.calibration));
 }
 
-TEST(EvaluationPictures, ShowsNoBudgetOfWhatIsNotStated) {
+TEST(MakeBudgetPlot, ReturnsNulloptWithoutReportedCommonPart) {
   StatedRoom room;
   EXPECT_FALSE(budget_picture(room.fixes(), {}, room.calibration));
   auto fixes = room.fixes();
@@ -106,8 +107,8 @@ TEST(EvaluationPictures, ShowsNoBudgetOfWhatIsNotStated) {
   EXPECT_FALSE(budget_picture(room.fixes(), room.lamps, room.calibration));
 }
 
-/// A fix that left a lamp out has nothing of its error.
-TEST(EvaluationPictures, LeavesLampsOutOfTheBudgetAsTheFixDid) {
+/// A rejected lamp does not contribute to the uncertainty of the fix.
+TEST(MakeBudgetPlot, OmitsLampsRejectedByFix) {
   StatedRoom room;
   room.lamps.lamps[0].sd_m = 0.1;
   auto fixes = room.fixes();
@@ -117,7 +118,7 @@ TEST(EvaluationPictures, LeavesLampsOutOfTheBudgetAsTheFixDid) {
               testing::Not(HasSubstr("zenith 0 %")));
 }
 
-TEST(EvaluationPictures, ShowsTheDriveAlongACommandedLine) {
+TEST(MakeEvaluationPlots, ContainsTrackAlongCommandedLine) {
   EvaluationInput with_line = input();
   with_line.line_m = {Eigen::Vector2d{0, 0}, Eigen::Vector2d{1, 0}};
   const auto pictures = evaluation_pictures(with_line, evaluate(with_line), {});

@@ -17,7 +17,7 @@ TEST(HtmlText, EscapesMarkupQuotesAndControlCharacters) {
   EXPECT_EQ(html_text("\u00a0\u00b5"), "\u00a0\u00b5");
 }
 
-TEST(HtmlTable, MarksRowsAndNamesItsHeaders) {
+TEST(HtmlTable, MarksRowsAndDeclaresHeaderScope) {
   const std::string html = html_table({"<c>", {"h"}, {{"a", "b"}, {"d", "e"}}, {1}});
   EXPECT_THAT(html, HasSubstr("<caption>&lt;c&gt;</caption>"));
   EXPECT_THAT(html, HasSubstr("<th scope=\"col\">h</th>"));
@@ -27,7 +27,7 @@ TEST(HtmlTable, MarksRowsAndNamesItsHeaders) {
 }
 
 // As the examples of RFC 4648, section 10, with and without padding.
-TEST(HtmlFigure, EncodesTheImage) {
+TEST(HtmlFigure, EncodesImageAsBase64) {
   const auto encoded = [](const char* image) {
     return html_figure({ReportPart::other, image, "c", "a"});
   };

@@ -15,7 +15,7 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-TEST(ReportPicture, KnowsWhatTheProgramsDraw) {
+TEST(ReadReportPlot, RecognizesPlotsByTitle) {
   const TemporaryFolder folder;
   draw(folder / "a.svg", drawing_of(RotationPlot{"", {}, {203, 198}, {210, 190}}));
   EXPECT_EQ(read_report_picture(folder / "a.svg").part, ReportPart::rotation);
@@ -28,7 +28,7 @@ TEST(ReportPicture, KnowsWhatTheProgramsDraw) {
   EXPECT_THAT(picture.alt, HasSubstr("dispersion"));
 }
 
-TEST(ReportPicture, TakesOthersByTheirName) {
+TEST(ReadReportPlot, NamesUnknownImagesByFile) {
   const TemporaryFolder folder;
   const auto file = folder.file("my room.svg", "<?xml?><svg><title>else</title></svg>");
   EXPECT_EQ(read_report_picture(file).part, ReportPart::other);
@@ -37,7 +37,7 @@ TEST(ReportPicture, TakesOthersByTheirName) {
             ReportPart::other);
 }
 
-TEST(ReportPicture, RefusesWhatIsNone) {
+TEST(ReadReportPlot, RejectsInvalidFile) {
   const TemporaryFolder folder;
   EXPECT_THAT(refusal_of([&] { read_report_picture(folder / "none.svg"); }),
               HasSubstr("none.svg: cannot be opened"));

@@ -10,7 +10,7 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-TEST(Report, BeginsWithTheVerdictAndNamesTheGates) {
+TEST(ReportHtml, BeginsWithVerdictAndMarksFailedGates) {
   Report report{"unit 7", {{"mean_mm", "mm", 0.5, 1, Direction::at_most}}, {}, {}, {}, {}, {}};
   EXPECT_THAT(report_html(report), HasSubstr("<strong>PASS</strong>"));
   report.gates.push_back({"p90_mm", "mm", 2.5, 2, Direction::at_most});
@@ -21,7 +21,7 @@ TEST(Report, BeginsWithTheVerdictAndNamesTheGates) {
   EXPECT_LT(html.find("<h1>unit 7</h1>"), html.find("FAIL</strong>"));
 }
 
-TEST(Report, HasFactsAndFloorPlanBeforeTheGates) {
+TEST(ReportHtml, HasFactsAndFloorPlanBeforeGates) {
   Report report{"unit 7", {{"mean_mm", "mm", 0.5, 1, Direction::at_most}}, {}, {}, {}, {}, {}};
   report.facts = {{"operator", "<Ann>"}};
   report.pictures = {
@@ -37,7 +37,7 @@ TEST(Report, HasFactsAndFloorPlanBeforeTheGates) {
   EXPECT_LT(worst, gate);
 }
 
-TEST(Report, ShowsAGateOfWhatIsNotKnown) {
+TEST(ReportHtml, FailsGateWithoutValue) {
   const std::string html =
       report_html({"unit 7", {{"halves_px", "px", {}, 1, Direction::at_most}}, {}, {}, {}, {}, {}});
   EXPECT_THAT(html, HasSubstr("<strong>FAIL</strong>1 of 1 gate is not met."));
@@ -45,26 +45,26 @@ TEST(Report, ShowsAGateOfWhatIsNotKnown) {
                               "<td>at most\u00a01\u00a0px</td><td>NOT\u00a0MET</td>"));
 }
 
-TEST(Report, SaysTheCautionInTheVerdictsBox) {
+TEST(ReportHtml, HasCautionInVerdictBox) {
   Report report{"unit 7", {{"mean_mm", "mm", 0.5, 1, Direction::at_most}}, {}, {}, {}, {}, {}};
   report.caution = "9 of 10 <captures>";
   EXPECT_THAT(report_html(report), HasSubstr("(1 gate).<p>9 of 10 &lt;captures&gt;</p>\n</div>"));
 }
 
-TEST(Report, WithoutGatesHasNoVerdict) {
+TEST(ReportHtml, HasNoVerdictWithoutGates) {
   const std::string html = report_html({"unit 7", {}, {}, {}, {}, {}, {}});
   EXPECT_THAT(html, HasSubstr("NO VERDICT"));
   EXPECT_THAT(html, Not(HasSubstr("PASS</strong>")));
 }
 
-TEST(Report, LeavesOutWhatThereIsNot) {
+TEST(ReportHtml, OmitsEmptySections) {
   const std::string html = report_html({"unit 7", {}, {}, {}, {}, {}, {}});
   EXPECT_THAT(html, Not(HasSubstr("<h2>")));
   EXPECT_THAT(html, Not(HasSubstr("<table>")));
   EXPECT_THAT(html, Not(HasSubstr("<img")));
 }
 
-TEST(Report, TakesNothingFromFilesForMarkup) {
+TEST(ReportHtml, EscapesAllInput) {
   const std::string evil = "</title><script>alert('1')</script>&\"";
   Report report{
       evil, {{evil, evil, 1, 2, Direction::at_most}}, {{evil, evil, evil, evil}}, {evil}, {}, {},
@@ -80,7 +80,7 @@ TEST(Report, TakesNothingFromFilesForMarkup) {
   EXPECT_THAT(html, HasSubstr("&lt;/title&gt;&lt;script&gt;alert(&#39;1&#39;)"));
 }
 
-TEST(Report, ShowsEachPartOfTheCalibrationAndItsHistory) {
+TEST(ReportHtml, ContainsEachPartOfCalibrationAndHistory) {
   Calibration calibration;
   calibration.camera = {
       "cam-9", {800, 600}, LensModel::opencv4, {500, 501, 400, 300, 0.125, 0, 0, 0}, {}, 3e-5, {}};
@@ -103,7 +103,7 @@ TEST(Report, ShowsEachPartOfTheCalibrationAndItsHistory) {
   }
 }
 
-TEST(Report, OfALensByAnotherProgramSaysWhereItIsKnownAlone) {
+TEST(ReportHtml, ReportsOnlyValidRegionOfImportedLens) {
   Calibration calibration;
   calibration.camera = {"cam-9", {800, 600}, LensModel::pinhole, {500, 501, 400, 300}, {}, {}, {}};
   calibration.intrinsics_report.emplace();
@@ -114,7 +114,7 @@ TEST(Report, OfALensByAnotherProgramSaysWhereItIsKnownAlone) {
   EXPECT_THAT(html, Not(HasSubstr("views of the board")));
 }
 
-TEST(Report, OrdersPicturesByTheirParts) {
+TEST(ReportHtml, OrdersPlotsByPart) {
   Report report{"a", {}, {}, {}, {}, {}, {}};
   report.pictures = {{ReportPart::distribution, "<svg>", "second", "b"},
                      {ReportPart::camera, "\x89PNG", "first", "a"}};

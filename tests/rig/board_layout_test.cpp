@@ -11,20 +11,20 @@ Board board_with(const IdOrder& order) {
   return {"tag36h11", 3, 2, 0.02, 0.5, 1, false, 10, order};
 }
 
-/// Ids row by row from the top left.
+/// Returns the ids row by row from the top left.
 std::vector<int> ids_of(const IdOrder& order) {
   std::vector<int> ids;
   for (const BoardTag& tag : board_layout(board_with(order))) ids.push_back(tag.id);
   return ids;
 }
 
-TEST(BoardLayout, PutsMarkersIntoWhiteSquares) {
+TEST(ComputeBoardLayout, PlacesMarkersInWhiteSquares) {
   Board board{"DICT_4X4_50", 5, 4, 0.01, 1, 1, false, 3, {false, BoardCorner::top_left}};
   board.kind = BoardKind::charuco;
   board.square_size_m = 0.02;
   const auto markers = board_layout(board);
   ASSERT_EQ(markers.size(), 10U);
-  // The corner in which the first squares touch is the origin; the square right of the first one.
+  // The first inner corner is the origin; the marker is in the square right of the first one.
   EXPECT_EQ(markers[0].id, 3);
   EXPECT_NEAR(markers[0].corners_m[3].x(), 0.005, 1e-12);
   EXPECT_NEAR(markers[0].corners_m[3].y(), -0.015, 1e-12);
@@ -36,7 +36,7 @@ TEST(BoardLayout, PutsMarkersIntoWhiteSquares) {
   EXPECT_NEAR(board_layout(board)[0].corners_m[3].x(), -0.015, 1e-12);
 }
 
-TEST(BoardLayout, CountsIdsInTheirOrder) {
+TEST(ComputeBoardLayout, CountsIdsInIdOrder) {
   using enum BoardCorner;
   EXPECT_EQ(ids_of({false, top_left}), (std::vector{10, 11, 12, 13, 14, 15}));
   EXPECT_EQ(ids_of({false, top_right}), (std::vector{12, 11, 10, 15, 14, 13}));
@@ -48,7 +48,7 @@ TEST(BoardLayout, CountsIdsInTheirOrder) {
   EXPECT_EQ(ids_of({true, bottom_right}), (std::vector{15, 13, 11, 14, 12, 10}));
 }
 
-TEST(BoardLayout, PutsCornersOneTagAndOneGapApart) {
+TEST(ComputeBoardLayout, PlacesTagsAtPitch) {
   const Board board = board_with({false, BoardCorner::top_left});
   EXPECT_DOUBLE_EQ(tag_pitch_m(board), 0.03);
   EXPECT_TRUE(tag_field_m(board).isApprox(Eigen::Vector2d(0.08, 0.05)));

@@ -16,18 +16,18 @@ std::string refusal_with(const std::string& from, const std::string& to) {
   return refusal(read_board, folder.file("board.yaml", changed(kBoardYaml, from, to)));
 }
 
-TEST(Board, IsReadWithEveryKeyOfTheFormat) {
+TEST(ReadBoard, ReadsEveryKey) {
   const TemporaryFolder folder;
   expect_same(read_board(folder.file("board.yaml", kBoardYaml)), sample_board());
 }
 
-TEST(Board, IsWrittenByteForByteInTheFormat) {
+TEST(WriteBoard, MatchesFormatByteForByte) {
   const TemporaryFolder folder;
   write_board(folder / "board.yaml", sample_board());
   EXPECT_EQ(folder.content_of(folder / "board.yaml"), kBoardYaml);
 }
 
-TEST(Board, KeepsEachOfTheEightIdOrders) {
+TEST(WriteBoard, KeepsEachIdOrder) {
   const std::pair<std::string, IdOrder> orders[] = {
       {"row-major-from-bottom-left", {false, BoardCorner::bottom_left}},
       {"row-major-from-bottom-right", {false, BoardCorner::bottom_right}},
@@ -56,14 +56,14 @@ constexpr const char* kKalibrTarget =
     "tagSize: 0.02            #size of apriltag, edge to edge [m]\n"
     "tagSpacing: 0.2          #ratio of space between tags to tagSize\n";
 
-TEST(Board, IsReadFromKalibrsDescriptionOfItsTarget) {
+TEST(ReadBoard, ReadsKalibrAprilGrid) {
   const TemporaryFolder folder;
   const Board board{"tag36h11", 5, 4, 0.02, 0.2, 2, true, 0, {false, BoardCorner::bottom_left}};
   expect_same(read_board(folder.file("target.yaml", kKalibrTarget)), board);
 }
 
-/// As Kalibr's own downloads end.
-TEST(Board, TakesKalibrsOffsetForTheFirstId) {
+/// Ends as the files that Kalibr distributes.
+TEST(ReadBoard, UsesKalibrOffsetAsFirstId) {
   const TemporaryFolder folder;
   const auto with = [&](const std::string& offset) {
     return folder.file("target.yaml", kKalibrTarget + ("codeOffset: " + offset) +
@@ -77,7 +77,7 @@ TEST(Board, TakesKalibrsOffsetForTheFirstId) {
   EXPECT_THAT(refusal(read_board, with("0.5")), HasSubstr("target.yaml:6: codeOffset: should be"));
 }
 
-TEST(Board, RefusesKalibrsOtherTargetsAndKeys) {
+TEST(ReadBoard, RejectsOtherKalibrTargetsAndKeys) {
   const TemporaryFolder folder;
   const auto refusal_of = [&](const std::string& from, const std::string& to) {
     return refusal(read_board, folder.file("target.yaml", changed(kKalibrTarget, from, to)));
@@ -99,7 +99,7 @@ constexpr const char* kCharuco =
     "format: vlp-board/1\nkind: charuco\ncols: 10\nrows: 7\nsquare_size_m: 0.03\n"
     "marker_size_m: 0.02\ndictionary: DICT_5X5_100\n";
 
-TEST(Board, MayBeOfSquares) {
+TEST(ReadBoard, ReadsBoardsOfSquares) {
   const TemporaryFolder folder;
   const std::string chessboard =
       "format: vlp-board/1\nkind: chessboard\ncols: 10\nrows: 7\nsquare_size_m: 0.03\n";
@@ -119,7 +119,7 @@ TEST(Board, MayBeOfSquares) {
   EXPECT_EQ(folder.content_of(folder / "written.yaml"), all);
 }
 
-TEST(Board, OfSquaresIsRefusedForWhatItCannotBe) {
+TEST(ReadBoard, RejectsInvalidBoardOfSquares) {
   const TemporaryFolder folder;
   const auto refusal_of = [&](const std::string& from, const std::string& to) {
     return refusal(read_board, folder.file("board.yaml", changed(kCharuco, from, to)));
@@ -135,7 +135,7 @@ TEST(Board, OfSquaresIsRefusedForWhatItCannotBe) {
               HasSubstr("top_left: 'red' is unknown; the colours of a square are: black, white"));
 }
 
-TEST(Board, IsReadFromKalibrsDescriptionOfACheckerboard) {
+TEST(ReadBoard, ReadsKalibrCheckerboard) {
   const TemporaryFolder folder;
   const std::string target =
       "target_type: 'checkerboard'\ntargetCols: 9\ntargetRows: 6\n"
@@ -145,7 +145,7 @@ TEST(Board, IsReadFromKalibrsDescriptionOfACheckerboard) {
               HasSubstr("target.yaml:4: rowSpacingMeters: is not colSpacingMeters"));
 }
 
-TEST(Board, KeepsTheOtherValueOfEachSwitch) {
+TEST(WriteBoard, KeepsBothValuesOfEachSwitch) {
   Board board = sample_board();
   board.border_bits = 1;
   board.corner_squares = false;
@@ -156,7 +156,7 @@ TEST(Board, KeepsTheOtherValueOfEachSwitch) {
   expect_same(read_board(folder / "board.yaml"), board);
 }
 
-TEST(Board, KeepsTheStandardDeviationOfThePrint) {
+TEST(WriteBoard, KeepsPrintSd) {
   const TemporaryFolder folder;
   const Board board = read_board(folder.file("board.yaml", kBoardYaml + "print_sd: 0.0002\n"));
   EXPECT_EQ(board.print_sd, 0.0002);
@@ -167,7 +167,7 @@ TEST(Board, KeepsTheStandardDeviationOfThePrint) {
               HasSubstr("print_sd: 0.2 (relative) is not within 0 and 0.02"));
 }
 
-TEST(Board, NamesLineAndKeyOfEachMissingKey) {
+TEST(ReadBoard, ReportsLineAndKeyOfMissingKey) {
   for (const std::string key : {"family", "cols", "rows", "tag_size_m", "tag_spacing",
                                 "border_bits", "corner_squares", "first_id", "id_order"}) {
     const std::size_t begin = kBoardYaml.find("\n" + key + ":") + 1;
@@ -177,7 +177,7 @@ TEST(Board, NamesLineAndKeyOfEachMissingKey) {
   }
 }
 
-TEST(Board, NamesTheWordsThatAreKnown) {
+TEST(ReadBoard, ReportsValidWords) {
   EXPECT_EQ(refusal_with("tag36h11", "tag36h12"),
             "board.yaml:2: family: 'tag36h12' is unknown; the families are: tag36h11, tag25h9, "
             "tag16h5, tagCircle21h7, tagCircle49h12, tagCustom48h12, tagStandard41h12, "
@@ -187,7 +187,7 @@ TEST(Board, NamesTheWordsThatAreKnown) {
                         "row-major-from-bottom-left, row-major-from-bottom-right, "));
 }
 
-TEST(Board, RefusesWhatNoBoardCanBe) {
+TEST(ReadBoard, RejectsInvalidValues) {
   EXPECT_EQ(refusal_with("cols: 8", "cols: 0"),
             "board.yaml:3: cols: should be a whole number within 1 and 1000, not '0'");
   EXPECT_EQ(refusal_with("rows: 5", "rows: 4.5"),
@@ -206,7 +206,7 @@ TEST(Board, RefusesWhatNoBoardCanBe) {
             "board.yaml:9: first_id: should be a whole number within 0 and 1000000, not '-1'");
 }
 
-TEST(Board, RefusesAnEmptyValueInItsOwnLine) {
+TEST(ReadBoard, ReportsLineOfEmptyValue) {
   EXPECT_EQ(refusal_with("tag_size_m: 0.016", "tag_size_m:"),
             "board.yaml:5: tag_size_m: should be a finite number, not nothing");
   EXPECT_EQ(refusal_with("id_order: column-major-from-top-left", "id_order:"),

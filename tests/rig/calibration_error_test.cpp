@@ -21,7 +21,7 @@ Calibration leaning() {
   return calibration;
 }
 
-TEST(CalibrationError, OfTheLensLeavesTheZenithAndMovesItsPixel) {
+TEST(WithLensError, KeepsZenithAndMovesItsPixel) {
   const Calibration moved = with_lens_error(leaning(), Eigen::Vector4d(10, -5, 1, 2));
   EXPECT_EQ(moved.camera.intrinsics, (std::vector<double>{510, 505, 401, 302}));
   EXPECT_EQ(moved.rotation_center->zenith_in_camera, leaning().rotation_center->zenith_in_camera);
@@ -32,7 +32,7 @@ TEST(CalibrationError, OfTheLensLeavesTheZenithAndMovesItsPixel) {
   EXPECT_FALSE(with_lens_error(alone, Eigen::Vector4d(1, 0, 0, 0)).rotation_center);
 }
 
-TEST(CalibrationError, OfTheZenithIsOfItsNormalizedPoint) {
+TEST(WithZenithError, MovesNormalizedPoint) {
   const Calibration moved = with_zenith_error(leaning(), {0.001, 0.002});
   EXPECT_THAT(zenith_point(*moved.rotation_center), IsNear(Eigen::Vector2d(0.021, -0.008), 1e-15));
   EXPECT_NEAR(moved.rotation_center->zenith_in_camera.norm(), 1, 1e-15);
@@ -40,7 +40,7 @@ TEST(CalibrationError, OfTheZenithIsOfItsNormalizedPoint) {
               IsNear(Eigen::Vector2d(400 + 0.021 * 500, 300 - 0.008 * 510), 1e-9));
 }
 
-TEST(CalibrationError, OfTheOffsetIsInUnitsOfTheNormalizedPlane) {
+TEST(WithOffsetError, UsesUnitsOfNormalizedPlane) {
   const Calibration moved = with_offset_error(leaning(), {0.001, -0.002});
   EXPECT_THAT(moved.dispersion->offset_px, IsNear(Eigen::Vector2d(1, -1.22), 1e-12));
   EXPECT_EQ(moved.rotation_center->center_px, leaning().rotation_center->center_px);

@@ -16,7 +16,7 @@ std::string calibration_refusal(const std::string& yaml) {
   return refusal(read_calibration, folder.file("calibration.yaml", yaml));
 }
 
-/// "calibration.yaml:LINE: " of the line of the sample that holds `text`.
+/// Returns "calibration.yaml:LINE: " for the line of the sample with `text`.
 std::string place_of(const std::string& text) {
   const auto begin = kCalibrationYaml.begin();
   const auto end = begin + static_cast<std::ptrdiff_t>(kCalibrationYaml.find(text));
@@ -27,7 +27,7 @@ struct Case {
   std::string from;
   std::string to;
   std::string problem;  // begins with the key
-  std::string at = {};  // text of the line that is named, when it is not that of `from`
+  std::string at = {};  // text of the reported line, if it is not that of `from`
 };
 
 void expect_refused(const std::vector<Case>& cases) {
@@ -38,7 +38,7 @@ void expect_refused(const std::vector<Case>& cases) {
   }
 }
 
-TEST(CalibrationRefusals, NameLineAndKeyOfACameraThatCannotBe) {
+TEST(ReadCalibration, ReportsLineAndKeyOfInvalidCamera) {
   const std::string unit = ": is it in the right unit?";
   expect_refused(
       {{"id: \"007\"", "id:", "camera.id: should be text, not nothing"},
@@ -64,7 +64,7 @@ TEST(CalibrationRefusals, NameLineAndKeyOfACameraThatCannotBe) {
        {"readout:", "read_out:", "camera: key 'read_out' is unknown here; the keys are: id, "}});
 }
 
-TEST(CalibrationRefusals, NameLineAndKeyOfAReportThatCannotBe) {
+TEST(ReadCalibration, ReportsLineAndKeyOfInvalidReport) {
   expect_refused(
       {{"views: 40", "views: -1", "intrinsics_report.views: should be a whole number within 0 and"},
        {"corners: 6400", "corners: many", "intrinsics_report.corners: should be a whole number"},
@@ -76,7 +76,7 @@ TEST(CalibrationRefusals, NameLineAndKeyOfAReportThatCannotBe) {
        {"uncertainty_px", "uncertainty_mm", "intrinsics_report: key 'uncertainty_mm' is unknown"}});
 }
 
-TEST(CalibrationRefusals, NameLineAndKeyOfARotationCentreThatCannotBe) {
+TEST(ReadCalibration, ReportsLineAndKeyOfInvalidRotationCenter) {
   const std::string covariance = "rotation_center.covariance: is not a covariance: it should be ";
   const std::string matrix = "[[0.04, 0.01], [0.01, 0.09]]";
   expect_refused(
@@ -105,7 +105,7 @@ TEST(CalibrationRefusals, NameLineAndKeyOfARotationCentreThatCannotBe) {
         "model: tilt"}});
 }
 
-TEST(CalibrationRefusals, NameLineAndKeyOfADispersionThatCannotBe) {
+TEST(ReadCalibration, ReportsLineAndKeyOfInvalidDispersion) {
   expect_refused(
       {{"[1.5, -0.75]", "1.5", "dispersion.offset_px: should be a list, not '1.5'"},
        {"radius_m: 0.0031", "radius_m: -0.0031", "dispersion.radius_m: -0.0031 m is not within 0"},
@@ -115,7 +115,7 @@ TEST(CalibrationRefusals, NameLineAndKeyOfADispersionThatCannotBe) {
        {"captures: 12", "note: x\n  captures: 12", "dispersion: key 'note' is unknown here"}});
 }
 
-TEST(CalibrationRefusals, NameLineAndKeyOfAHistoryThatCannotBe) {
+TEST(ReadCalibration, ReportsLineAndKeyOfInvalidHistory) {
   expect_refused(
       {{"history:", "x: 1\nhistory:", "key 'x' is unknown"},
        {"program: vlp-intrinsics", "program: [a]",
@@ -127,7 +127,7 @@ TEST(CalibrationRefusals, NameLineAndKeyOfAHistoryThatCannotBe) {
        {"[]\n", "none\n", "history[1].inputs: should be a list, not 'none'"}});
 }
 
-TEST(CalibrationRefusals, NameEachPartsMissingKeys) {
+TEST(ReadCalibration, ReportsMissingKeysOfEachPart) {
   for (const std::string key : {"views", "corners", "outliers", "rms_px", "model", "center_px",
                                 "zenith_in_camera", "offset_px", "radius_m", "center_m", "captures",
                                 "id", "imager_px", "lens_model", "intrinsics"}) {
@@ -139,7 +139,7 @@ TEST(CalibrationRefusals, NameEachPartsMissingKeys) {
   }
 }
 
-TEST(CalibrationRefusals, NameThePartThatTheHistoryTellsOf) {
+TEST(ReadCalibration, ReportsMissingPartOfHistory) {
   const std::size_t begin = kCalibrationYaml.find("dispersion:\n");
   const std::size_t end = kCalibrationYaml.find("camera:\n");
   EXPECT_EQ(calibration_refusal(

@@ -16,7 +16,7 @@
 namespace vlp {
 namespace {
 
-/// Writes, reads and writes again: the values and the bytes stay.
+/// Writes, reads and writes again: values and bytes do not change.
 void expect_kept(const Calibration& calibration) {
   const TemporaryFolder folder;
   write_calibration(folder / "first.yaml", calibration);
@@ -26,21 +26,21 @@ void expect_kept(const Calibration& calibration) {
   EXPECT_EQ(folder.content_of(folder / "second.yaml"), folder.content_of(folder / "first.yaml"));
 }
 
-TEST(Calibration, IsReadWithEveryKeyOfTheFormat) {
+TEST(ReadCalibration, ReadsEveryKey) {
   const TemporaryFolder folder;
   const auto file = folder.file("calibration.yaml", kCalibrationYaml);
-  // It tells of no rotation centre in the history, which may be shorter than the file.
+  // The history lacks the rotation center: it may have fewer parts than the file.
   expect_same(read_calibration(file), sample_calibration());
 }
 
-TEST(Calibration, IsWrittenByteForByteInTheFormat) {
+TEST(WriteCalibration, MatchesFormatByteForByte) {
   const TemporaryFolder folder;
   write_calibration(folder / "calibration.yaml", sample_calibration());
   EXPECT_EQ(folder.content_of(folder / "calibration.yaml"), kCalibrationYaml);
   EXPECT_EQ(calibration_text(sample_calibration()), kCalibrationYaml);
 }
 
-TEST(Calibration, MayHaveItsPartsInAnyOrder) {
+TEST(ReadCalibration, AcceptsPartsInAnyOrder) {
   const TemporaryFolder folder;
   const std::size_t camera = kCalibrationYaml.find("camera:\n  id:");
   const std::string reordered = "format: vlp-calibration/1\n" + kCalibrationYaml.substr(camera) +
@@ -48,7 +48,7 @@ TEST(Calibration, MayHaveItsPartsInAnyOrder) {
   expect_same(read_calibration(folder.file("calibration.yaml", reordered)), sample_calibration());
 }
 
-TEST(Calibration, KeepsCovariancesAndAnAdjustment) {
+TEST(WriteCalibration, KeepsCovariancesAndAdjustment) {
   Calibration calibration = sample_calibration();
   const Eigen::MatrixXd root = Eigen::MatrixXd::Random(12 + 6, 12 + 6);
   Eigen::MatrixXd covariance = 0.01 * root * root.transpose();
@@ -63,7 +63,7 @@ TEST(Calibration, KeepsCovariancesAndAnAdjustment) {
   expect_kept(calibration);
 }
 
-TEST(Calibration, RefusesAnAdjustmentThatIsOfSomethingElse) {
+TEST(ReadCalibration, RejectsMismatchedAdjustment) {
   const TemporaryFolder folder;
   Calibration calibration = sample_calibration();
   calibration.adjustment =
@@ -84,7 +84,7 @@ TEST(Calibration, RefusesAnAdjustmentThatIsOfSomethingElse) {
   EXPECT_THAT(refusal("    - [1]\n", ""), testing::HasSubstr("15 rows of 1, 2, 3"));
 }
 
-TEST(Calibration, IsWrittenWithoutAnInfiniteUncertainty) {
+TEST(WriteCalibration, OmitsInfiniteUncertainty) {
   Calibration calibration = sample_calibration();
   calibration.intrinsics_report->uncertainty_px = std::numeric_limits<double>::infinity();
   const TemporaryFolder folder;
@@ -93,7 +93,7 @@ TEST(Calibration, IsWrittenWithoutAnInfiniteUncertainty) {
   expect_same(read_calibration(folder / "calibration.yaml"), calibration);
 }
 
-TEST(Calibration, KeepsEachPartWithoutEachOptionalKey) {
+TEST(WriteCalibration, KeepsEachPartWithoutOptionalKeys) {
   const std::function<void(Calibration&)> removals[] = {
       [](Calibration& c) { c.camera.pixel_pitch_m.reset(); },
       [](Calibration& c) { c.camera.row_time_s.reset(); },
@@ -114,7 +114,7 @@ TEST(Calibration, KeepsEachPartWithoutEachOptionalKey) {
   Calibration with_less_and_less = sample_calibration();
   for (const auto& remove : removals) {
     Calibration calibration = sample_calibration();
-    calibration.history.pop_back();  // it tells of the dispersion
+    calibration.history.pop_back();  // the entry of the dispersion
     remove(calibration);
     expect_kept(calibration);
     remove(with_less_and_less);
@@ -122,7 +122,7 @@ TEST(Calibration, KeepsEachPartWithoutEachOptionalKey) {
   }
 }
 
-TEST(Calibration, KeepsEachWord) {
+TEST(WriteCalibration, KeepsEachEnumerator) {
   for (const RotationModel model : {RotationModel::shift, RotationModel::tilt}) {
     for (const Readout readout : {Readout::rows, Readout::columns}) {
       Calibration calibration = sample_calibration();
@@ -133,7 +133,7 @@ TEST(Calibration, KeepsEachWord) {
   }
 }
 
-TEST(Calibration, KeepsEachLensModelWithItsParameters) {
+TEST(WriteCalibration, KeepsEachLensModelWithParameters) {
   for (const auto& [model, parameters] : {std::pair{LensModel::pinhole, 4},
                                           {LensModel::stereographic, 4},
                                           {LensModel::opencv4, 8},
@@ -149,7 +149,7 @@ TEST(Calibration, KeepsEachLensModelWithItsParameters) {
   }
 }
 
-TEST(Calibration, OfASplinedLensStatesErrorsOfItsCore) {
+TEST(WriteCalibration, KeepsErrorsOfSplinedLensCore) {
   Calibration calibration = sample_calibration();
   const auto first = [](const std::optional<MatrixX>& by) { return MatrixX(by->leftCols(4)); };
   auto& report = *calibration.intrinsics_report;
@@ -169,7 +169,7 @@ TEST(Calibration, OfASplinedLensStatesErrorsOfItsCore) {
   expect_kept(calibration);
 }
 
-TEST(Calibration, KeepsTextOfAnyKind) {
+TEST(WriteCalibration, KeepsAnyText) {
   std::string all_ascii;
   for (char c = 0; c >= 0 && c < 127; ++c) all_ascii += c;
   for (const std::string& text :
@@ -187,7 +187,7 @@ TEST(Calibration, KeepsTextOfAnyKind) {
   }
 }
 
-TEST(Calibration, KeepsRandomFiguresExactly) {
+TEST(WriteCalibration, KeepsRandomNumbersExactly) {
   std::mt19937_64 random(2);
   std::normal_distribution<double> normal(0, 1000);
   const auto figure = [&] { return normal(random) * std::exp(normal(random) / 100); };
@@ -203,7 +203,7 @@ TEST(Calibration, KeepsRandomFiguresExactly) {
   }
 }
 
-TEST(Calibration, KeepsAnyUnitVectorAndACovarianceOfFullCorrelation) {
+TEST(WriteCalibration, KeepsUnitVectorsAndFullCorrelation) {
   std::mt19937_64 random(3);
   std::normal_distribution<double> normal;
   for (int i = 0; i < 30; ++i) {

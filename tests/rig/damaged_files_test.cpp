@@ -19,12 +19,12 @@ void expect_refused_when_cut(const TemporaryFolder& folder, Read read, const std
   std::filesystem::remove(file);
 }
 
-TEST(FileCutShort, IsNeverTakenForABoard) {
+TEST(ReadBoard, RejectsEveryTruncation) {
   const TemporaryFolder folder;
   expect_refused_when_cut(folder, read_board, kBoardYaml);
 }
 
-TEST(FileCutShort, IsNeverTakenForACalibrationWhateverItsParts) {
+TEST(ReadCalibration, RejectsEveryTruncation) {
   const TemporaryFolder folder;
   for (unsigned parts = 0; parts < 1U << 4; ++parts) {
     SCOPED_TRACE(parts);
@@ -39,8 +39,8 @@ TEST(FileCutShort, IsNeverTakenForACalibrationWhateverItsParts) {
   }
 }
 
-// Nothing in the format tells how many lamps there are.
-TEST(FileCutShort, IsAMapOfTheLampsBeforeWhenTheCutIsBetweenTwoLines) {
+// The format does not contain the number of lamps.
+TEST(ReadLampMap, ReturnsEarlierLampsWhenTruncatedBetweenLines) {
   const TemporaryFolder folder;
   const auto file = folder.file("lamps.yaml", kLampsYaml);
   int maps = 0;
@@ -56,7 +56,7 @@ TEST(FileCutShort, IsAMapOfTheLampsBeforeWhenTheCutIsBetweenTwoLines) {
 
 class Damage {
  public:
-  /// Changes one to four places: a byte is changed, put in or left out, or a piece stands twice.
+  /// Damages one to four places: changes, inserts or removes a byte, or duplicates a piece.
   std::string done_to(std::string text) {
     for (std::size_t changes = 1 + below(4); changes > 0; --changes) {
       const std::size_t at = below(text.size());
@@ -89,7 +89,7 @@ class Damage {
   std::mt19937_64 random_{4};
 };
 
-/// Either it is refused with an InputError, or what was read can be written and read again.
+/// Expects an InputError, or a result that can be written and read again.
 template <typename Read, typename Write>
 void expect_read_or_refused(const std::string& whole, Read read, Write write) {
   const TemporaryFolder folder;
@@ -106,23 +106,23 @@ void expect_read_or_refused(const std::string& whole, Read read, Write write) {
       write(folder / "again.yaml", found);
       expect_same(read(folder / "again.yaml"), found);
     }
-    std::filesystem::remove(file);  // or the file system is slow to write it anew
+    std::filesystem::remove(file);  // file systems are slow to overwrite
     if (testing::Test::HasFailure()) return;
   }
-  // Neither is rare, or little is tested.
+  // Both outcomes are frequent; otherwise little is tested.
   EXPECT_GT(times_read, 10);
   EXPECT_LT(times_read, times / 2);
 }
 
-TEST(DamagedFile, IsReadOrRefusedAsALampMap) {
+TEST(ReadLampMap, ReadsOrRejectsDamagedFile) {
   expect_read_or_refused(kLampsYaml, read_lamp_map, write_lamp_map);
 }
 
-TEST(DamagedFile, IsReadOrRefusedAsABoard) {
+TEST(ReadBoard, ReadsOrRejectsDamagedFile) {
   expect_read_or_refused(kBoardYaml, read_board, write_board);
 }
 
-TEST(DamagedFile, IsReadOrRefusedAsACalibration) {
+TEST(ReadCalibration, ReadsOrRejectsDamagedFile) {
   expect_read_or_refused(kCalibrationYaml, read_calibration, write_calibration);
 }
 

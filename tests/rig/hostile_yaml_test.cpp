@@ -4,7 +4,7 @@
 
 #include "rig/samples.h"
 
-// Files that are made, or happen, to take a reader's memory, stack or time.
+// Files that exhaust memory, stack or time of a reader, by intent or by accident.
 namespace vlp {
 namespace {
 
@@ -13,7 +13,7 @@ using testing::HasSubstr;
 const std::string kHead = "format: vlp-lamps/1\nlamps: ";
 constexpr std::size_t kMostBytes = 1 << 20;
 
-/// For a map whose lamps are `value`.
+/// Returns the message for a map whose lamps are `value`.
 std::string refusal_of_lamps(const std::string& value) { return map_refusal(kHead + value + "\n"); }
 
 std::string repeated(const std::string& text, std::size_t count) {
@@ -22,7 +22,7 @@ std::string repeated(const std::string& text, std::size_t count) {
   return all;
 }
 
-TEST(HostileYaml, OfAHundredThousandLevelsIsRefused) {
+TEST(ReadYaml, RejectsHundredThousandLevels) {
   constexpr std::size_t levels = 100000;
   const std::string deep = ": is nested too deep: is it the right file?";
   for (const std::string open : {"[", "{", "{a: ", "- ", "? ", "[{a: ", "[a, "}) {
@@ -37,7 +37,7 @@ TEST(HostileYaml, OfAHundredThousandLevelsIsRefused) {
   EXPECT_THAT(map_refusal(indented), HasSubstr(deep));
 }
 
-TEST(HostileYaml, OfABillionLaughsIsRefused) {
+TEST(ReadYaml, RejectsBillionLaughs) {
   std::string bomb = "a0: &a0 [lol, lol, lol, lol, lol, lol, lol, lol, lol]\n";
   for (int i = 1; i < 10; ++i) {
     const std::string alias = "*a" + std::to_string(i - 1);
@@ -49,8 +49,8 @@ TEST(HostileYaml, OfABillionLaughsIsRefused) {
               HasSubstr("lamps.yaml:3: an alias (*) is not read here"));
 }
 
-// Every key is right; it would take 400 GB.
-TEST(HostileYaml, OfAHistoryThatRepeatsItselfIsRefused) {
+// All keys are valid, but the file would need 400 GB.
+TEST(ReadYaml, RejectsSelfReferencingHistory) {
   std::string text = changed(kCalibrationYaml, "history:\n  - part", "history:\n  - &a\n    part");
   text = changed(text, "    inputs:\n",
                  "    inputs:\n" + repeated("      - {file: a, sha256: b}\n", 15000));
@@ -61,7 +61,7 @@ TEST(HostileYaml, OfAHistoryThatRepeatsItselfIsRefused) {
               HasSubstr(": an alias (*) is not read here: write out what it stands for"));
 }
 
-TEST(HostileYaml, LongerThanAMebibyteIsRefused) {
+TEST(ReadYaml, RejectsFileAboveOneMebibyte) {
   std::string content = kLampsYaml + "#";
   content += std::string(kMostBytes - content.size() - 1, 'x') + "\n";
   ASSERT_EQ(content.size(), kMostBytes);
@@ -75,11 +75,11 @@ TEST(HostileYaml, LongerThanAMebibyteIsRefused) {
   EXPECT_EQ(refusal(read_lamp_map, file), refused);
 }
 
-TEST(HostileYaml, IsRefusedBeforeAllOfItIsRead) {
+TEST(ReadYaml, RejectsDeviceWithoutReading) {
   EXPECT_EQ(refusal(read_lamp_map, "/dev/zero"), "zero: is a pipe or a device, not a file");
 }
 
-TEST(HostileYaml, OfManySmallPiecesIsRefusedForWhatItIs) {
+TEST(ReadYaml, ReportsLineForManySmallNodes) {
   for (const std::string piece : {"1,", "[],", "{},", "&a 1,", "a: 1,", "'',", "? ,"}) {
     const std::string list = repeated(piece, 100'000 / piece.size()).append("]");
     EXPECT_THAT(refusal_of_lamps("[" + list), testing::StartsWith("lamps.yaml:2: "));
@@ -93,7 +93,7 @@ TEST(HostileYaml, OfManySmallPiecesIsRefusedForWhatItIs) {
               HasSubstr("lamps.yaml:2: lamps: should be a list, not 'aaaa"));
 }
 
-TEST(HostileYaml, IsNotAMapOfTenThousandLamps) {
+TEST(ReadLampMap, AcceptsTenThousandLamps) {
   std::string yaml = kHead + "\n";
   for (int id = 0; id < 10000; ++id) {
     yaml += "  - {id: " + std::to_string(id) + ", position_m: [" + std::to_string(id % 100) + ", " +

@@ -9,12 +9,12 @@ namespace {
 
 using testing::HasSubstr;
 
-/// For a map of one lamp, in the third line.
+/// Returns the message for a map with one lamp, in the third line.
 std::string refusal_of_lamp(const std::string& keys) {
   return map_refusal("format: vlp-lamps/1\nlamps:\n  - {" + keys + "}\n");
 }
 
-TEST(LampMapRefusals, NameLineAndKeyOfAMissingKey) {
+TEST(ReadLampMap, ReportsLineAndKeyOfMissingKey) {
   EXPECT_EQ(refusal_of_lamp("id: 1"),
             "lamps.yaml:3: lamps[0]: key 'position_m' is missing; there are: id");
   EXPECT_EQ(refusal_of_lamp("id: 1, position_mm: [0, 0, 2000]"),
@@ -28,7 +28,7 @@ TEST(LampMapRefusals, NameLineAndKeyOfAMissingKey) {
       "lamps.yaml:1: key 'format' is missing: the file should begin with 'format: vlp-lamps/1'");
 }
 
-TEST(LampMapRefusals, NameLineAndKeyOfAnUnknownKey) {
+TEST(ReadLampMap, ReportsLineAndKeyOfUnknownKey) {
   EXPECT_EQ(refusal_of_lamp("id: 1, position_m: [0, 0, 2], position_mm: [0, 0, 2000]"),
             "lamps.yaml:3: lamps[0]: key 'position_mm' is unknown here; the keys are: id, "
             "position_m, shape, diameter_m, size_m, yaw_rad, frequency_hz, duty, sd_m, room");
@@ -36,14 +36,14 @@ TEST(LampMapRefusals, NameLineAndKeyOfAnUnknownKey) {
             "lamps.yaml:2: key 'units' is unknown here; the keys are: format, sd_m, lamps");
 }
 
-TEST(LampMapRefusals, NameLineAndKeyOfAKeyThatStandsTwice) {
+TEST(ReadLampMap, ReportsLineAndKeyOfDuplicateKey) {
   EXPECT_EQ(refusal_of_lamp("id: 1, position_m: [0, 0, 2], id: 2"),
             "lamps.yaml:3: lamps[0]: key 'id' stands twice");
   EXPECT_EQ(map_refusal("format: vlp-lamps/1\nlamps: []\nlamps: []\n"),
             "lamps.yaml:3: key 'lamps' stands twice");
 }
 
-TEST(LampMapRefusals, NameWhatARectangleLacksAndADiscDoesNotHave) {
+TEST(ReadLampMap, RejectsKeysOfOtherShape) {
   const std::string lamp = "id: 1, position_m: [0, 0, 2], ", place = "lamps.yaml:3: lamps[0]";
   EXPECT_EQ(refusal_of_lamp(lamp + "size_m: [1.2, 0.1]"),
             place + ".size_m: is of a rectangle: say 'shape: rectangle', too");
@@ -63,18 +63,18 @@ TEST(LampMapRefusals, NameWhatARectangleLacksAndADiscDoesNotHave) {
               HasSubstr(place + ".yaw_rad: 90 rad is not within -6.3 and 6.3 rad"));
 }
 
-TEST(LampMapRefusals, NameTheLineOfAnIdThatStandsTwice) {
+TEST(ReadLampMap, ReportsLineOfDuplicateId) {
   EXPECT_EQ(map_refusal(changed(kLampsYaml, "id: 7", "id: 1")),
             "lamps.yaml:4: lamps[1]: id 1 stands twice");
 }
 
-TEST(LampMapRefusals, NameBothOfTwoLampsInOnePlace) {
+TEST(ReadLampMap, ReportsBothLampsAtOnePosition) {
   EXPECT_EQ(map_refusal(changed(kLampsYaml, "[-0.25, 0, 2.1]", "[0.5, -0.3, 2.1009]")),
             "lamps.yaml:4: lamps[1]: lamp 7 is where lamp 1 is");
   EXPECT_EQ(map_refusal(changed(kLampsYaml, "[-0.25, 0, 2.1]", "[0.5, -0.3, 2.102]")), "");
 }
 
-TEST(LampMapRefusals, NameAnIdThatIsNoWholeNumber) {
+TEST(ReadLampMap, RejectsIdThatIsNotInteger) {
   for (const std::string id : {"-1", "1.5", "1.0", "2147483648", "one", "0x1", "[1]", "''", ""}) {
     EXPECT_THAT(refusal_of_lamp("id: " + id + ", position_m: [0, 0, 2]"),
                 HasSubstr("lamps.yaml:3: lamps[0].id: should be a whole number within 0 and "
@@ -82,7 +82,7 @@ TEST(LampMapRefusals, NameAnIdThatIsNoWholeNumber) {
   }
 }
 
-TEST(LampMapRefusals, NameWhatIsNoFiniteNumber) {
+TEST(ReadLampMap, RejectsNumbersThatAreNotFinite) {
   for (const std::string number :
        {"2.1 m", "2,1", ".nan", ".NaN", "nan", ".inf", "-.inf", "inf", "1e999", "0x10", "2.1.1",
         "1_000", "+-2", "true", "''", "~", "two"}) {
@@ -94,7 +94,7 @@ TEST(LampMapRefusals, NameWhatIsNoFiniteNumber) {
   }
 }
 
-TEST(LampMapRefusals, ShowWhatStandsInPlaceOfANumber) {
+TEST(ReadLampMap, ReportsValueInPlaceOfNumber) {
   const std::string place = "lamps.yaml:3: lamps[0].duty: should be a finite number, not ";
   const std::string lamp = "id: 1, position_m: [0, 0, 2], duty: ";
   EXPECT_EQ(refusal_of_lamp(lamp + "50 %"), place + "'50 %'");
@@ -103,7 +103,7 @@ TEST(LampMapRefusals, ShowWhatStandsInPlaceOfANumber) {
   EXPECT_EQ(refusal_of_lamp(lamp), place + "nothing");
 }
 
-TEST(LampMapRefusals, NameAPositionThatIsNotThreeNumbers) {
+TEST(ReadLampMap, RejectsPositionWithoutThreeNumbers) {
   const std::string place = "lamps.yaml:3: lamps[0].position_m: ";
   EXPECT_EQ(refusal_of_lamp("id: 1, position_m: [0, 2]"), place + "should be 3 numbers, not 2");
   EXPECT_EQ(refusal_of_lamp("id: 1, position_m: [0, 0, 2,1]"),
@@ -113,7 +113,7 @@ TEST(LampMapRefusals, NameAPositionThatIsNotThreeNumbers) {
             place + "should be a list, not a mapping");
 }
 
-TEST(LampMapRefusals, AskForTheUnitWhenAFigureCannotBeInIt) {
+TEST(ReadLampMap, ReportsUnitOfImplausibleValue) {
   const std::string lamp = "id: 1, position_m: [0, 0, 2], ";
   const std::string place = "lamps.yaml:3: lamps[0].";
   EXPECT_EQ(refusal_of_lamp("id: 1, position_m: [500, -300, 2100]"),
@@ -128,7 +128,7 @@ TEST(LampMapRefusals, AskForTheUnitWhenAFigureCannotBeInIt) {
   EXPECT_THAT(refusal_of_lamp(lamp + "duty: 0"), HasSubstr(place + "duty: 0 (a share of the"));
 }
 
-TEST(LampMapRefusals, NameAnotherShape) {
+TEST(ReadLampMap, RejectsUnknownShape) {
   EXPECT_EQ(map_refusal("format: vlp-lamps/1\nlamps: []\n"), "lamps.yaml:2: lamps: holds no lamp");
   EXPECT_EQ(map_refusal("format: vlp-lamps/1\n\nlamps:\n\n# none\n"),
             "lamps.yaml:3: lamps: should be a list, not nothing");

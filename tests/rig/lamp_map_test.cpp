@@ -17,18 +17,18 @@ namespace {
 
 using testing::HasSubstr;
 
-TEST(LampMap, IsReadWithEveryKeyOfTheFormat) {
+TEST(ReadLampMap, ReadsEveryKey) {
   const TemporaryFolder folder;
   expect_same(read_lamp_map(folder.file("lamps.yaml", kLampsYaml)), sample_lamps());
 }
 
-TEST(LampMap, IsWrittenByteForByteInTheFormat) {
+TEST(WriteLampMap, MatchesFormatByteForByte) {
   const TemporaryFolder folder;
   write_lamp_map(folder / "lamps.yaml", sample_lamps());
   EXPECT_EQ(folder.content_of(folder / "lamps.yaml"), kLampsYaml);
 }
 
-TEST(LampMap, HasAStandardDeviationOfAllLampsOrOfOne) {
+TEST(ReadLampMap, ReadsStandardDeviationOfMapOrLamp) {
   const TemporaryFolder folder;
   const LampMap map = read_lamp_map(folder.file("lamps.yaml", R"(format: vlp-lamps/1
 sd_m: 0.002
@@ -59,7 +59,7 @@ lamps:
               HasSubstr("has no lamp with 'room: attic'"));
 }
 
-TEST(LampMap, HasDiscsAndRectangles) {
+TEST(ReadLampMap, ReadsDiscsAndRectangles) {
   const TemporaryFolder folder;
   const std::string yaml = R"(format: vlp-lamps/1
 lamps:
@@ -82,7 +82,7 @@ lamps:
   expect_same(read_as("2.1], diameter_m", "2.1], shape: disc, diameter_m"), map);
 }
 
-TEST(LampMap, FindsALampByItsId) {
+TEST(FindLamp, ReturnsLampWithId) {
   LampMap map;
   for (const int id : {7, 2, 40}) map.lamps.push_back({id, {0, 0.1 * id, 2}, {}, {}, {}});
   EXPECT_EQ(find_lamp(map.lamps, 2), &map.lamps[1]);
@@ -91,7 +91,7 @@ TEST(LampMap, FindsALampByItsId) {
   EXPECT_EQ(find_lamp({}, 7), nullptr);
 }
 
-TEST(LampMap, KeepsEveryDoubleExactly) {
+TEST(WriteLampMap, KeepsEveryDoubleExactly) {
   std::mt19937_64 random(1);
   const auto any_finite = [&random] {
     for (;;) {
@@ -111,15 +111,15 @@ TEST(LampMap, KeepsEveryDoubleExactly) {
   expect_same(read_lamp_map(folder / "lamps.yaml"), map);
 }
 
-// Readers of YAML 1.1 take 1e-07 for text.
-TEST(LampMap, HasAPointInEveryNumberWithAnExponent) {
+// Readers of YAML 1.1 parse 1e-07 as text.
+TEST(WriteLampMap, WritesPointInNumbersWithExponent) {
   const TemporaryFolder folder;
   write_lamp_map(folder / "lamps.yaml", {{{1, {1e-7, -2e300, 0}, {}, 1e5, {}}}});
   EXPECT_THAT(folder.content_of(folder / "lamps.yaml"),
               HasSubstr("{id: 1, position_m: [1.0e-07, -2.0e+300, 0], frequency_hz: 100000}"));
 }
 
-TEST(LampMap, MayBeWrittenInOtherWaysOfYaml) {
+TEST(ReadLampMap, AcceptsOtherYamlStyles) {
   const TemporaryFolder folder;
   const auto lamps = read_lamp_map(folder.file("lamps.yaml", R"(---
 # A comment.

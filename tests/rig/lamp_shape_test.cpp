@@ -10,7 +10,7 @@
 namespace vlp {
 namespace {
 
-TEST(OutlineOf, RectangleHasItsCorners) {
+TEST(OutlineOf, RectangleContainsCorners) {
   const LampShape shape{ShapeKind::rectangle, Eigen::Vector2d(1.2, 0.4), std::numbers::pi / 2};
   const auto outline_m = outline_of(shape, {1, 2, 3}, 8);
   ASSERT_EQ(outline_m.size(), 8U);
@@ -21,7 +21,7 @@ TEST(OutlineOf, RectangleHasItsCorners) {
   EXPECT_LT((outline_m[0] - Eigen::Vector3d(1, 2.6, 3)).norm(), 1e-12) << "middle of a side";
 }
 
-TEST(OutlineOf, DiscIsACircle) {
+TEST(OutlineOf, DiscIsCircle) {
   const Eigen::Vector3d center_m(1, 2, 3);
   const auto outline_m = outline_of(make_disc(0.2), center_m);
   ASSERT_EQ(outline_m.size(), 16U);
@@ -31,9 +31,9 @@ TEST(OutlineOf, DiscIsACircle) {
   }
 }
 
-TEST(OutlineOf, IsEmptyWithoutASize) { EXPECT_TRUE(outline_of({}, {1, 2, 3}).empty()); }
+TEST(OutlineOf, ReturnsNoneWithoutSize) { EXPECT_TRUE(outline_of({}, {1, 2, 3}).empty()); }
 
-TEST(WorldFromShape, ScalesAndTurnsPoints) {
+TEST(WorldFromShape, ScalesAndRotatesPoints) {
   const LampShape shape{ShapeKind::rectangle, Eigen::Vector2d(1.2, 0.4), std::numbers::pi / 2};
   const Eigen::Vector3d point_m = world_from_shape(shape, {1, 2, 3}, {0.5, -1});
   EXPECT_LT((point_m - Eigen::Vector3d(1.2, 2.3, 3)).norm(), 1e-12);

@@ -27,7 +27,7 @@ TEST(ReadFile, ReturnsAllBytes) {
   EXPECT_EQ(read_file(folder.file("a", large), large.size()), large);
 }
 
-TEST(ReadFile, RefusesMoreThanItsLimitUnread) {
+TEST(ReadFile, RejectsFileAboveLimitWithoutReading) {
   const TemporaryFolder folder;
   const auto file = folder.file("a", std::string(101, 'x'));
   EXPECT_EQ(read_refusal(file), "a: is longer than 100 bytes: is it the right file?");
@@ -35,7 +35,7 @@ TEST(ReadFile, RefusesMoreThanItsLimitUnread) {
   EXPECT_EQ(read_refusal(file, 5 << 20), "a: is longer than 5 MiB: is it the right file?");
 }
 
-TEST(ReadFile, RefusesWhatIsNoFileWithoutWaiting) {
+TEST(ReadFile, RejectsOtherFileTypesWithoutWaiting) {
   const TemporaryFolder folder;
   ASSERT_EQ(::mkfifo((folder / "pipe").c_str(), 0600), 0);
   fs::create_symlink("/dev/zero", folder / "device");
@@ -50,7 +50,7 @@ TEST(ReadFile, RefusesWhatIsNoFileWithoutWaiting) {
   EXPECT_EQ(read_refusal(folder / "none"), "none: cannot be opened: No such file or directory");
 }
 
-TEST(ReadFile, ReadsTheStreamThatTheProcessHas) {
+TEST(ReadFile, ReadsStreamOfProcess) {
   int ends[2];
   ASSERT_EQ(::pipe(ends), 0);
   const std::string name = "/dev/fd/" + std::to_string(ends[0]);
@@ -60,7 +60,7 @@ TEST(ReadFile, ReadsTheStreamThatTheProcessHas) {
   ::close(ends[0]);
 }
 
-TEST(ReadFile, RefusesALinkToAStreamAmongTheDevices) {
+TEST(ReadFile, RejectsLinkToStreamAmongDevices) {
   const fs::path link = "/dev/shm/vlp-test-" + std::to_string(::getpid());
   int ends[2];
   ASSERT_EQ(::pipe(ends), 0);
@@ -77,7 +77,7 @@ TEST(ReadFile, RefusesALinkToAStreamAmongTheDevices) {
   ::close(ends[0]);
 }
 
-TEST(ReadFile, RefusesAStreamThatIsTooLong) {
+TEST(ReadFile, RejectsStreamAboveLimit) {
   int ends[2];
   ASSERT_EQ(::pipe(ends), 0);
   const std::string name = "/dev/fd/" + std::to_string(ends[0]);

@@ -23,18 +23,18 @@ LampMap sample_lamps();
 Board sample_board();
 /// Every part, every optional key, and a history with inputs.
 Calibration sample_calibration();
-/// Only what a calibration cannot do without.
+/// Only the required parts of a calibration.
 Calibration bare_calibration();
 
 void expect_same(const LampMap& found, const LampMap& expected);
 void expect_same(const Board& found, const Board& expected);
 void expect_same(const Calibration& found, const Calibration& expected);
 
-/// `text` with its first `from` replaced; fails the test when there is none.
+/// Returns `text` with its first `from` replaced; fails the test if there is none.
 std::string changed(std::string text, const std::string& from, const std::string& to);
 
-/// The message with which `read` refuses `file`, without the folder's name; "" when it does not.
-/// Anything thrown but an InputError fails the test.
+/// Returns the message of the InputError that `read` throws for `file`, without the folder's name;
+/// "" if it does not throw. Other exceptions fail the test.
 template <typename Read>
 std::string refusal(Read read, const std::filesystem::path& file) {
   try {
@@ -50,7 +50,7 @@ std::string refusal(Read read, const std::filesystem::path& file) {
   return "";
 }
 
-/// That of `yaml` as lamps.yaml.
+/// Returns the message for `yaml` as lamps.yaml.
 inline std::string map_refusal(const std::string& yaml) {
   const TemporaryFolder folder;
   return refusal(read_lamp_map, folder.file("lamps.yaml", yaml));

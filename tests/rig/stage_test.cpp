@@ -11,7 +11,7 @@ namespace {
 
 HistoryEntry entry_of(const std::string& program) { return {"", program, "1.2.3", "", {}}; }
 
-/// sample_calibration() with the rotation centre's history, too.
+/// Returns sample_calibration() with the rotation center in the history, too.
 Calibration whole_calibration() {
   Calibration calibration = sample_calibration();
   calibration.history.insert(calibration.history.begin() + 1,
@@ -19,7 +19,7 @@ Calibration whole_calibration() {
   return calibration;
 }
 
-TEST(Stage, ACameraBeginsAnew) {
+TEST(WithCamera, RemovesOtherParts) {
   const Calibration sample = sample_calibration();
   Calibration expected = sample;
   expected.rotation_center.reset();
@@ -29,7 +29,7 @@ TEST(Stage, ACameraBeginsAnew) {
               expected);
 }
 
-TEST(Stage, ARotationCenterIsAddedToACamera) {
+TEST(WithRotationCenter, AddsPartToCamera) {
   Calibration before = whole_calibration();
   const RotationCenter center = *before.rotation_center;
   before.rotation_center.reset();
@@ -41,7 +41,7 @@ TEST(Stage, ARotationCenterIsAddedToACamera) {
   expect_same(with_rotation_center(before, center, entry_of("vlp-rotation")), expected);
 }
 
-TEST(Stage, ARotationCenterReplacesTheOldOneAndDropsTheDispersion) {
+TEST(WithRotationCenter, ReplacesOldPartAndRemovesDispersion) {
   RotationCenter center = *sample_calibration().rotation_center;
   center.center_px = {1, 2};
   Calibration expected = whole_calibration();
@@ -53,7 +53,7 @@ TEST(Stage, ARotationCenterReplacesTheOldOneAndDropsTheDispersion) {
               expected);
 }
 
-TEST(Stage, ADispersionKeepsWhatItRestsOnAndReplacesTheOldOne) {
+TEST(WithDispersion, KeepsEarlierPartsAndReplacesOldPart) {
   const Dispersion dispersion{{3, 4}, 0.5, {6, 7}, 8, {}};
   Calibration expected = whole_calibration();
   expected.dispersion = dispersion;
@@ -62,7 +62,7 @@ TEST(Stage, ADispersionKeepsWhatItRestsOnAndReplacesTheOldOne) {
               expected);
 }
 
-TEST(Stage, WhatItGivesCanBeWrittenAndRead) {
+TEST(WithDispersion, ResultCanBeWrittenAndRead) {
   const TemporaryFolder folder;
   const Calibration given = with_rotation_center(
       whole_calibration(), *sample_calibration().rotation_center, entry_of("vlp-rotation"));

@@ -32,7 +32,7 @@ void become_nobody() {
   if (::geteuid() == 0 && ::setuid(65534) != 0) throw std::runtime_error("cannot change user");
 }
 
-TEST(WriteFileFailure, KeepsTheOldFileInAFolderThatMayNotBeWritten) {
+TEST(WriteFileFailure, KeepsOldFileInReadOnlyFolder) {
   const TemporaryFolder folder;
   const auto file = folder.file("a.yaml", kOld);
   fs::permissions(folder / "", fs::perms(0555));
@@ -46,7 +46,7 @@ TEST(WriteFileFailure, KeepsTheOldFileInAFolderThatMayNotBeWritten) {
   EXPECT_EQ(count_in(folder / ""), 1U);
 }
 
-TEST(WriteFileFailure, KeepsTheOldFileWhenOnlyAPartCanBeWritten) {
+TEST(WriteFileFailure, KeepsOldFileAfterPartialWrite) {
   const TemporaryFolder folder;
   const auto file = folder.file("a.yaml", kOld);
   const std::string message = thrown_in_child([&] {
@@ -60,11 +60,11 @@ TEST(WriteFileFailure, KeepsTheOldFileWhenOnlyAPartCanBeWritten) {
   EXPECT_EQ(count_in(folder / ""), 1U);
 }
 
-TEST(WriteFileFailure, KeepsTheOldFileOnAFullDisk) {
+TEST(WriteFileFailure, KeepsOldFileOnFullDisk) {
   const TemporaryFolder folder;
   const std::string cannot_mount = "cannot mount";
   const std::string message = thrown_in_child([&] {
-    // Only this process sees the mount, which goes with it.
+    // The mount exists for this process only, and ends with it.
     if (::unshare(CLONE_NEWNS) != 0 ||
         ::mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0 ||
         ::mount("tmpfs", (folder / "").c_str(), "tmpfs", 0, "size=64k") != 0) {
@@ -84,7 +84,7 @@ TEST(WriteFileFailure, KeepsTheOldFileOnAFullDisk) {
   EXPECT_THAT(message, HasSubstr("a.yaml: cannot be written: No space left on device; kept"));
 }
 
-TEST(ReadFile, ThatMayNotBeReadIsRefused) {
+TEST(ReadFile, RejectsUnreadableFile) {
   const TemporaryFolder folder;
   const auto file = folder.file("lamps.yaml", kLampsYaml);
   fs::permissions(file, fs::perms::none);
@@ -95,7 +95,7 @@ TEST(ReadFile, ThatMayNotBeReadIsRefused) {
   EXPECT_EQ(message, file.string() + ": cannot be opened: Permission denied");
 }
 
-TEST(WriteFile, KilledAtAnyMomentLeavesTheOldFileOrTheNew) {
+TEST(WriteFile, LeavesOldOrNewFileWhenKilled) {
   const std::string contents[] = {std::string(300'000, 'a') + "\n",
                                   std::string(200'000, 'b') + "\n"};
   const TemporaryFolder folder;
@@ -127,12 +127,12 @@ TEST(WriteFile, KilledAtAnyMomentLeavesTheOldFileOrTheNew) {
     times_changed += now != last ? 1 : 0;
     last = now;
   }
-  // Or nothing was tested.
+  // Otherwise nothing was tested.
   EXPECT_GT(times_changed, 0) << "no child came to write";
   EXPECT_GT(count_in(folder / ""), 1U) << "no child was killed while it wrote";
 }
 
-TEST(WriteFile, ByManyThreadsAtOnceLeavesOneContentWhole) {
+TEST(WriteFile, LeavesOneCompleteContentFromManyThreads) {
   const TemporaryFolder folder;
   const auto file = folder.file("a.yaml", std::string(100'000, 'a'));
   const auto is_whole = [&] {

@@ -27,7 +27,7 @@ std::vector<std::string> names_in(const fs::path& folder) {
   return names;
 }
 
-TEST(WriteFile, PutsTheContentInPlaceOfTheOld) {
+TEST(WriteFile, ReplacesContent) {
   const TemporaryFolder folder;
   const auto file = folder.file("a.yaml", "old content that is longer\n");
   write_file(file, "new\n");
@@ -40,7 +40,7 @@ TEST(WriteFile, PutsTheContentInPlaceOfTheOld) {
   EXPECT_THAT(names_in(folder / ""), ElementsAre("a.yaml"));
 }
 
-TEST(WriteFile, MakesAFileThatOthersMayReadAsTheUserHasSetIt) {
+TEST(WriteFile, CreatesFileWithPermissionsOfUmask) {
   const TemporaryFolder folder;
   const mode_t before = ::umask(027);
   write_file(folder / "a.yaml", "new\n");
@@ -48,7 +48,7 @@ TEST(WriteFile, MakesAFileThatOthersMayReadAsTheUserHasSetIt) {
   EXPECT_EQ(fs::status(folder / "a.yaml").permissions(), fs::perms(0640));
 }
 
-TEST(WriteFile, KeepsThePermissionsOfTheFileItReplaces) {
+TEST(WriteFile, KeepsPermissionsOfReplacedFile) {
   const TemporaryFolder folder;
   const auto file = folder.file("a.yaml", "old\n");
   for (const fs::perms mode : {fs::perms(0600), fs::perms(0664), fs::perms(0444)}) {
@@ -61,7 +61,7 @@ TEST(WriteFile, KeepsThePermissionsOfTheFileItReplaces) {
   EXPECT_EQ(fs::status(file).permissions(), fs::perms(0444));
 }
 
-TEST(WriteFile, KeepsOwnerAndGroupOfTheFileItReplaces) {
+TEST(WriteFile, KeepsOwnerAndGroupOfReplacedFile) {
   if (::geteuid() != 0) GTEST_SKIP() << "only root gives files away";
   const TemporaryFolder folder;
   const auto file = folder.file("a.yaml", "old\n");
@@ -106,14 +106,14 @@ mode_t mode_after_another_user(const TemporaryFolder& folder, const std::vector<
   return found.st_mode & 0777;
 }
 
-TEST(WriteFile, GivesNoPermissionsToAnotherGroup) {
+TEST(WriteFile, GivesNoPermissionsToOtherGroup) {
   if (::geteuid() != 0) GTEST_SKIP() << "only root acts as another user";
   const TemporaryFolder folder;
   EXPECT_EQ(mode_after_another_user(folder, {12346}), mode_t{0664});
   EXPECT_EQ(mode_after_another_user(folder, {}), mode_t{0604});
 }
 
-TEST(WriteFile, WritesToTheStreamThatTheProcessHas) {
+TEST(WriteFile, WritesToStreamOfProcess) {
   const TemporaryFolder folder;
   const auto file = folder.file("log", "old\n");
   const int descriptor = ::open(file.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
@@ -124,7 +124,7 @@ TEST(WriteFile, WritesToTheStreamThatTheProcessHas) {
   EXPECT_EQ(folder.content_of(file), "old\nnew\nnewer\n");
 }
 
-TEST(WriteFile, TakesAPathFromTheCurrentFolder) {
+TEST(WriteFile, AcceptsPathInCurrentFolder) {
   const TemporaryFolder folder;
   const fs::path before = fs::current_path();
   fs::current_path(folder / "");
@@ -133,14 +133,14 @@ TEST(WriteFile, TakesAPathFromTheCurrentFolder) {
   EXPECT_THAT(names_in(folder / ""), ElementsAre("a.yaml"));
 }
 
-TEST(WriteFile, TakesTheLongestName) {
+TEST(WriteFile, AcceptsLongestName) {
   const TemporaryFolder folder;
   const std::string name(255, 'x');
   write_file(folder / name, "new\n");
   EXPECT_THAT(names_in(folder / ""), ElementsAre(name));
 }
 
-TEST(WriteFile, LeavesNothingWhereItCannotWrite) {
+TEST(WriteFile, LeavesNoFileWhenWritingFails) {
   const TemporaryFolder folder;
   const auto file = folder.file("file", "old\n");
   fs::create_directory(folder / "folder");
@@ -176,7 +176,7 @@ TEST(WriteFile, FollowsSymbolicLinks) {
   EXPECT_THAT(names_in(folder / "real"), ElementsAre("a.yaml"));
 }
 
-TEST(WriteFile, FollowsALinkToWhatIsNotThereYet) {
+TEST(WriteFile, FollowsLinkToMissingFile) {
   const TemporaryFolder folder;
   fs::create_directory(folder / "real");
   fs::create_symlink("real/new.yaml", folder / "link");
@@ -185,7 +185,7 @@ TEST(WriteFile, FollowsALinkToWhatIsNotThereYet) {
   EXPECT_EQ(folder.content_of(folder / "real/new.yaml"), "new\n");
 }
 
-TEST(WriteFile, RefusesALinkToItself) {
+TEST(WriteFile, RejectsLinkToItself) {
   const TemporaryFolder folder;
   fs::create_symlink("b", folder / "a");
   fs::create_symlink("a", folder / "b");
@@ -193,14 +193,14 @@ TEST(WriteFile, RefusesALinkToItself) {
   EXPECT_TRUE(fs::is_symlink(folder / "a") && fs::is_symlink(folder / "b"));
 }
 
-TEST(WriteFile, WritesToDevicesAsTheyAre) {
+TEST(WriteFile, WritesToDevicesDirectly) {
   write_file("/dev/null", "new\n");
   EXPECT_TRUE(fs::is_character_file("/dev/null"));
   EXPECT_EQ(write_refusal("/dev/full"), "full: cannot be written: No space left on device");
   EXPECT_TRUE(fs::is_character_file("/dev/full"));
 }
 
-TEST(WriteFile, WritesToAPipeAsItIs) {
+TEST(WriteFile, WritesToPipeDirectly) {
   const TemporaryFolder folder;
   const fs::path pipe = folder / "pipe";
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);

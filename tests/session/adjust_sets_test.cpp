@@ -8,7 +8,7 @@
 namespace vlp {
 namespace {
 
-TEST(AdjustSets, OfOneNameGoByTheirPaths) {
+TEST(NameApart, UsesPathsForEqualNames) {
   std::vector<AdjustSet> sets{{"check", {}, {}}, {"rotation", {}, {}}, {"check", {}, {}}};
   name_apart(sets, {"a/check", "a/rotation", "b/check"});
   EXPECT_EQ(sets[0].name, "a/check");

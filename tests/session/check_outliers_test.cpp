@@ -20,7 +20,7 @@ std::vector<CheckError> errors_with(const std::vector<std::size_t>& indices) {
   return errors;
 }
 
-TEST(DescribeCheckOutliers, NamesRunsOfCaptures) {
+TEST(DescribeCheckOutliers, NamesRangesOfCaptures) {
   EXPECT_EQ(describe_check_outliers(errors_with({0, 1, 2, 3, 4})),
             "captures 100 to 104 are off by up to 52.0 mm, the others by 0.05 mm: taken elsewhere "
             "than their table says, or by another camera");
@@ -31,14 +31,14 @@ TEST(DescribeCheckOutliers, NamesRunsOfCaptures) {
             "captures 100, 102, 103, 105, 107, 109 and 1 more groups");
 }
 
-TEST(DescribeCheckOutliers, EndsARunAtACaptureWithoutError) {
+TEST(DescribeCheckOutliers, EndsRangeAtCaptureWithoutError) {
   auto errors = errors_with({0, 1, 2, 3, 4, 5});
   errors.erase(errors.begin() + 3);
   const std::string outliers = describe_check_outliers(errors);
   EXPECT_EQ(outliers.substr(0, outliers.find(" are")), "captures 100 to 102, 104, 105");
 }
 
-TEST(DescribeCheckOutliers, IsEmptyWithoutGrossOutliers) {
+TEST(DescribeCheckOutliers, ReturnsEmptyWithoutGrossOutliers) {
   EXPECT_EQ(describe_check_outliers(errors_with({})), "");
   auto errors = errors_with({});
   errors[3].horizontal_m = 0.004;
@@ -48,7 +48,7 @@ TEST(DescribeCheckOutliers, IsEmptyWithoutGrossOutliers) {
   EXPECT_EQ(describe_check_outliers({{"a", 1e-5}, {"b", 1}, {"c", 1e-5}}), "") << "too few";
 }
 
-TEST(DescribeResidualOutliers, NamesTwoCapturesOrMore) {
+TEST(DescribeResidualOutliers, RequiresTwoCaptures) {
   std::vector<CaptureResidual> residuals;
   residuals.reserve(24);
   for (std::size_t i = 0; i < 24; ++i) residuals.push_back({std::to_string(100 + i), 0.02, i});

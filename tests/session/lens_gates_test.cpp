@@ -7,7 +7,7 @@
 namespace vlp {
 namespace {
 
-TEST(LensGates, AreMetUpToTheirLimits) {
+TEST(LensGates, PassUpToLimits) {
   const std::vector<Metric> good{{"rms_px", 1},     {"uncertainty_px", 2}, {"halves_px", 1},
                                  {"coverage", 0.4}, {"views", 6},          {"board_tilt_deg", 20}};
   EXPECT_EQ(words_of_missed(check_gates(lens_gates(), good)), "");
@@ -17,7 +17,7 @@ TEST(LensGates, AreMetUpToTheirLimits) {
   for (const CheckedMetric& gate : check_gates(lens_gates(), bad)) EXPECT_FALSE(gate.met());
 }
 
-TEST(LensGates, AreNotMetByALensWithoutHalves) {
+TEST(LensGates, FailWithoutSplitHalfDifference) {
   const std::vector<Metric> metrics{{"rms_px", 0.1},
                                     {"uncertainty_px", 0.1},
                                     {"coverage", 1},

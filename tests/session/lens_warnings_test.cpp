@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// What passes with a doubt says so.
+/// Warnings about lenses that pass.
 #include <gmock/gmock.h>
 
 #include "calibration/intrinsics/synthetic_views.h"
@@ -14,7 +14,7 @@ using testing::Contains;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-/// Views of a plain board of which the edges went so far towards the dark.
+/// Views of a plain board with edges displaced by `shift_px` towards the dark side.
 LensInput views_with_edges(double shift_px) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   LensInput input{{}, views.board, "board.yaml", {}, 0, WarpChoice::automatic};
@@ -28,7 +28,7 @@ LensInput views_with_edges(double shift_px) {
   return input;
 }
 
-TEST(LensWarnings, TellEdgesThatAreFurtherOffThanACameraMakesThem) {
+TEST(SolveLens, WarnsOfLargeEdgeDisplacement) {
   EXPECT_THAT(solve_lens(views_with_edges(0.3), {}).warnings, IsEmpty());
   const LensResult result = solve_lens(views_with_edges(0.6), {});
   ASSERT_TRUE(result.ok()) << result.why;
@@ -36,7 +36,7 @@ TEST(LensWarnings, TellEdgesThatAreFurtherOffThanACameraMakesThem) {
   EXPECT_THAT(result.warnings, Contains(HasSubstr("is tag_spacing of board.yaml right?")));
 }
 
-TEST(LensWarnings, TellThatNothingIsHeldOut) {
+TEST(SolveLens, WarnsWhenNoViewIsHeldOut) {
   LensInput input = views_with_edges(0);
   input.held_out = 30;
   EXPECT_THAT(solve_lens(input, {}).warnings,

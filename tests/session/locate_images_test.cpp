@@ -13,8 +13,8 @@ namespace {
 using testing::ElementsAre;
 using testing::IsEmpty;
 
-/// A camera that leans by 20 degrees; centres that are looked for in a plane that is off by an
-/// angle are off by 40 px a radian, and 2 px where ellipses stand for discs.
+/// Camera tilted by 20 degrees. Errors of lamp centers: 40 px per radian of the angle error of the
+/// detection plane, or 2 px for ellipses in place of discs.
 class LeaningRig {
  public:
   LeaningRig() { rig_.body.motion.inclination = lean_; }
@@ -37,7 +37,7 @@ class LeaningRig {
   }
   std::vector<Detection> exact() const { return seen_from(rig_, 0.05); }
 
-  /// How far off the level of each was, in degrees; -1: nobody knew.
+  /// Error of the level direction of each detection, degrees; -1: unknown level.
   std::vector<double> looks;
   /// Only ellipses show lamps.
   bool shown_by_ellipses_alone = false;
@@ -64,7 +64,7 @@ double error_m(const LocateInput& input) {
   return found.ok() ? found.rows[0].fix->pose.position_m.norm() : 1;
 }
 
-TEST(RedetectTilted, LooksUntilTheFixStays) {
+TEST(RedetectTilted, RepeatsUntilConvergence) {
   LeaningRig rig;
   LocateInput input = rig.input(1.6);
   EXPECT_GT(error_m(input), 0.01);
@@ -78,7 +78,7 @@ TEST(RedetectTilted, LooksUntilTheFixStays) {
   EXPECT_LT(rig.looks.back(), 0.01);
 }
 
-TEST(RedetectTilted, LeavesCapturesWhoseLeanIsGiven) {
+TEST(RedetectTilted, SkipsCapturesWithGivenInclination) {
   LeaningRig rig;
   LocateInput input = rig.input(0);
   input.captures["a"].inclination = Inclination{rad_from_deg(16), rad_from_deg(-12)};
@@ -91,7 +91,7 @@ TEST(RedetectTilted, LeavesCapturesWhoseLeanIsGiven) {
   EXPECT_LT(error_m(input), 1e-4) << "but for a sensor that is not exact";
 }
 
-TEST(RedetectTilted, KeepsWhatShowsMoreLampsWhereThereIsNoFix) {
+TEST(RedetectTilted, KeepsDetectionWithMoreLampsWithoutFix) {
   LeaningRig rig;
   rig.shown_by_ellipses_alone = true;
   LocateInput input = rig.input(1.6);

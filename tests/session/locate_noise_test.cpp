@@ -62,7 +62,7 @@ class LocateFramesNoise : public testing::TestWithParam<Case> {
   std::vector<Pose> truth;
 };
 
-TEST_P(LocateFramesNoise, StandardDeviationsMatchTheErrors) {
+TEST_P(LocateFramesNoise, StandardDeviationsMatchErrors) {
   constexpr int draws = 500;
   Eigen::Vector4d squares = Eigen::Vector4d::Zero();
   int fixes = 0, within = 0;
@@ -100,7 +100,7 @@ INSTANTIATE_TEST_SUITE_P(Rooms, LocateFramesNoise,
                                          Case{"MapErrorsNotStated", 0.002, Noise::not_stated}),
                          [](const auto& one) { return one.param.name; });
 
-TEST(LocateFrames, NotesResidualsThatExceedStatedNoise) {
+TEST(LocateFrames, ReportsResidualsAboveGivenNoise) {
   SyntheticRig rig{synthetic_lamps(), {synthetic_camera(), {}, {}, {}, {}}, {}, {}};
   Random random(3);
   LocateInput input{{}, rig.map, rig.calibration};

@@ -22,7 +22,7 @@ LocateInput example() {
           read_calibration(kExample + "calibration.yaml")};
 }
 
-TEST(LocateFrames, GivesAFixToEachOfTheExample) {
+TEST(LocateFrames, LocatesAllFramesOfExample) {
   const LocateResult found = locate_frames(example());
   EXPECT_TRUE(found.ok());
   EXPECT_EQ(found.summary.fixes, found.rows.size());
@@ -30,7 +30,7 @@ TEST(LocateFrames, GivesAFixToEachOfTheExample) {
   EXPECT_THAT(found.lamps_left_out, IsEmpty());
 }
 
-TEST(LocateFrames, CountsTheCapturesThatALampIsLeftOutOf) {
+TEST(LocateFrames, CountsCapturesOfRejectedLamp) {
   LocateInput input = example();
   int moved = 0;
   for (Frame& frame : input.frames) {
@@ -59,7 +59,7 @@ LocateInput drive_without_stated_motion(double sigma_px) {
   return input;
 }
 
-TEST(LocateFrames, NamesUnstatedMotionAsCauseOfResiduals) {
+TEST(LocateFrames, ReportsUnknownMotionAsCauseOfResiduals) {
   LocateInput input = drive_without_stated_motion(0.02);
   const LocateResult found = locate_frames(input);
   EXPECT_THAT(found.warnings,
@@ -70,7 +70,7 @@ TEST(LocateFrames, NamesUnstatedMotionAsCauseOfResiduals) {
   EXPECT_THAT(locate_frames(input).warnings, Not(testing::Contains(HasSubstr("moves"))));
 }
 
-TEST(LocateFrames, DoesNotNameMotionOfCameraThatStands) {
+TEST(LocateFrames, DoesNotReportMotionOfStandingCamera) {
   BodyRig rig{synthetic_lamps(), rolling_calibration(), {}, {}};
   LocateInput input{{}, rig.map, rig.calibration};
   input.lamps.lamps.front().position_m.x() += 0.02;
@@ -81,7 +81,7 @@ TEST(LocateFrames, DoesNotNameMotionOfCameraThatStands) {
   EXPECT_THAT(locate_frames(input).warnings, Not(testing::Contains(HasSubstr("moves"))));
 }
 
-TEST(LocateFrames, SeesALampThatMovedWhereItIs) {
+TEST(LocateFrames, ReportsOffsetOfMovedLamp) {
   BodyRig rig{synthetic_lamps(), rolling_calibration(), {}, {}};
   LocateInput input{{}, rig.map, rig.calibration};
   const Eigen::Vector2d moved_m(1e-3, -2e-3);
@@ -134,7 +134,7 @@ LocateInput room_with_a_moved_lamp(double by_m) {
   return input;
 }
 
-TEST(LocateFrames, NamesALampLeftOutWithItsOffset) {
+TEST(LocateFrames, ReportsRejectedLampWithOffset) {
   const LocateResult found = locate_frames(room_with_a_moved_lamp(0.03));
   EXPECT_THAT(found.warnings,
               testing::Contains("lamp 2 hangs 30 mm from where the map has it (x +30 mm, y +0 mm): "
@@ -148,7 +148,7 @@ TEST(LocateFrames, NamesALampLeftOutWithItsOffset) {
   EXPECT_THAT(locate_frames(room_with_a_moved_lamp(0)).lamps_left_out, IsEmpty());
 }
 
-TEST(LocateFrames, UsesInclinationsWhereThereAreSome) {
+TEST(LocateFrames, UsesInclinationsOfTable) {
   LocateInput input = example();
   const double x_m = locate_frames(input).rows[0].fix->pose.position_m.x();
   Capture leaning;
@@ -161,7 +161,7 @@ TEST(LocateFrames, UsesInclinationsWhereThereAreSome) {
   EXPECT_THAT(found.warnings, testing::Contains(HasSubstr("images are not in captures.csv")));
 }
 
-TEST(LocateFrames, WarnsOfLampsWhereTheLensIsNotKnown) {
+TEST(LocateFrames, WarnsOfLampsOutsideCalibratedRegion) {
   LocateInput input = example();
   IntrinsicsReport& report = input.calibration.intrinsics_report.emplace();
   report.region_px = {{-1e4, -1e4}, {1e4, -1e4}, {1e4, 1e4}, {-1e4, 1e4}};
@@ -181,7 +181,7 @@ TEST(LocateFrames, WarnsOfLampsWhereTheLensIsNotKnown) {
   }
 }
 
-TEST(LocateFrames, IsUndeterminedWithoutAFix) {
+TEST(LocateFrames, FailsWithoutFix) {
   LocateInput input = example();
   for (Frame& frame : input.frames) frame.detections.resize(1);
   const LocateResult found = locate_frames(input);
@@ -215,7 +215,7 @@ double worst_error_m(const LocateInput& input, double speed_m_per_s) {
   return worst_m;
 }
 
-TEST(LocateFrames, EstimatesTheVelocityWhenToldThatTheCameraDrives) {
+TEST(LocateFrames, EstimatesVelocityOfMovingCamera) {
   LocateInput input = drive(1);
   EXPECT_GT(worst_error_m(input, 1), 4e-3);
   input.motion = KnownMotion::up_to(200, 200);  // of no weight
@@ -227,7 +227,7 @@ TEST(LocateFrames, EstimatesTheVelocityWhenToldThatTheCameraDrives) {
   EXPECT_FALSE(found.rows[1].fix->inclination);
 }
 
-TEST(LocateFrames, TakesOdometry) {
+TEST(LocateFrames, UsesOdometry) {
   LocateInput input = drive(1);
   for (auto& [image, capture] : input.captures) {
     capture.velocity_m_per_s = Eigen::Rotation2Dd(-0.3) * Eigen::Vector2d(1, 0);
@@ -236,7 +236,7 @@ TEST(LocateFrames, TakesOdometry) {
   EXPECT_NEAR(locate_frames(input).rows[0].fix->velocity_m_per_s->x(), 1, 1e-9);
 }
 
-TEST(LocateFrames, FixesTwoFramesOfTwoLampsTogether) {
+TEST(LocateFrames, LocatesTwoFramesOfTwoLampsJointly) {
   LocateInput input = drive(1);
   for (Frame& frame : input.frames) frame.detections.resize(2);
   input.motion = KnownMotion::up_to(2, 0);
@@ -249,7 +249,7 @@ TEST(LocateFrames, FixesTwoFramesOfTwoLampsTogether) {
   EXPECT_LT((*found.rows[2].fix->sd)[2], 0.2 * alone_sd_m);
 }
 
-TEST(LocateFrames, NeedsARowTimeForCamerasThatMove) {
+TEST(LocateFrames, ThrowsForMovingCameraWithoutRowTime) {
   LocateInput input = drive(1);
   input.motion = KnownMotion::up_to(2, 0);
   input.calibration.camera.row_time_s.reset();
@@ -260,7 +260,7 @@ TEST(LocateFrames, NeedsARowTimeForCamerasThatMove) {
   EXPECT_THROW(locate_frames(input), std::invalid_argument);
 }
 
-TEST(LocateFrames, EstimatesALeanWhereNoSensorReadsIt) {
+TEST(LocateFrames, EstimatesTiltWithoutSensor) {
   BodyRig rig{synthetic_lamps(), rolling_calibration(), {}, {}};
   rig.body.motion.inclination = {0.1, -0.08};
   LocateInput input{{{"a", seen_from(rig, 0.05)}}, rig.map, rig.calibration};

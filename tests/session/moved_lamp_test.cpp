@@ -88,7 +88,7 @@ std::vector<std::string> lines_of(const StepResult& result) {
   return lines;
 }
 
-TEST_F(MovedLamp, IsNamedByEveryStepInTheSameWords) {
+TEST_F(MovedLamp, IsReportedIdenticallyByAllSteps) {
   take_captures({-0.018, 0.024});
   const auto names_it = HasSubstr(
       "lamp 2 hangs 30 mm from where the map has it (x -18 mm, y +24 mm): moved, or entered "
@@ -104,7 +104,7 @@ TEST_F(MovedLamp, IsNamedByEveryStepInTheSameWords) {
   }
 }
 
-TEST_F(MovedLamp, IsTheReasonOfADispersionThatFails) {
+TEST_F(MovedLamp, IsReportedAsCauseOfFailedDispersion) {
   take_captures({0.03, 0});
   const StepResult result = disperse();
   EXPECT_EQ(result.failure, StepFailure::wrong_map);
@@ -112,7 +112,7 @@ TEST_F(MovedLamp, IsTheReasonOfADispersionThatFails) {
               testing::StartsWith("lamps.yaml: lamp 2 hangs 30 mm from where the map has it"));
 }
 
-TEST_F(MovedLamp, IsNoneOfARightMap) {
+TEST_F(MovedLamp, IsNotReportedForCorrectMap) {
   take_captures({0, 0});
   for (const StepResult& result : {rotate(), disperse(), level(), locate(), adjust()}) {
     EXPECT_TRUE(result.ok()) << result.why;
@@ -122,7 +122,7 @@ TEST_F(MovedLamp, IsNoneOfARightMap) {
 
 /// Captures of a large room tie few of its lamps together. The captures that fit a mirrored map by
 /// chance must not pass for all.
-TEST(SolveLevelling, FailsIfMostCapturesContradictTheMap) {
+TEST(SolveLevelling, FailsWhenMostCapturesContradictMap) {
   constexpr int rows = 10;
   constexpr double distance_m = 1.2, height_m = 2.5, focal_px = 520, noise_px = 0.05;
   LampCaptures input{{}, {}, "lamps.yaml", {}};

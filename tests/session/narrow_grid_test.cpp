@@ -30,7 +30,7 @@ LensResult solved_with(const SplineGrid& grid) {
   return solve_lens(input, {});
 }
 
-TEST(NarrowGrid, IsRefusedWithTheGridToTake) {
+TEST(SolveLensNarrowGrid, FailsWithProposedGrid) {
   const LensResult result = solved_with({3, 12, 12, 100});
   ASSERT_FALSE(result.ok());
   EXPECT_THAT(result.why,
@@ -40,7 +40,7 @@ TEST(NarrowGrid, IsRefusedWithTheGridToTake) {
               HasSubstr(": take --lens LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=12_Ny="));
 }
 
-TEST(NarrowGrid, UpAndDownTakesMoreRows) {
+TEST(SolveLensNarrowGrid, ProposesMoreRowsForVerticalField) {
   const LensResult result = solved_with({3, 12, 5, 230});
   ASSERT_FALSE(result.ok());
   EXPECT_THAT(result.why, testing::ContainsRegex("take --lens LENSMODEL_SPLINED_"
@@ -48,7 +48,7 @@ TEST(NarrowGrid, UpAndDownTakesMoreRows) {
                                                  "fov_x_deg=230"));
 }
 
-TEST(WideGrid, IsRefusedWithTheGridToTake) {
+TEST(SolveLensWideGrid, FailsWithProposedGrid) {
   constexpr std::size_t count = 12;
   constexpr double noise_px = 0.02;
   Random random(62);

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Row times that explain the stripe periods alike, and what the places of the lights decide.
+/// Row times that explain the stripe periods equally well, distinguished by the light positions.
 #include "session/position_cost.h"
 
 #include <gmock/gmock.h>
@@ -59,7 +59,7 @@ struct Images {
 
   explicit Images(LampMap lamps) : map(std::move(lamps)) {}
 
-  /// Adds an image of the lamps `ids` where `seen` has them.
+  /// Adds an image of the lamps `ids` at their positions in `seen`.
   void add(const std::vector<int>& ids, double yaw_rad, const Inclination& lean,
            const LampMap& seen) {
     const BodyRig rig{seen, calibration, {{{0.1, -0.05, 0}, yaw_rad}, {{0, 0}, 0, lean}}, {}};
@@ -110,7 +110,7 @@ struct Images {
   }
 };
 
-TEST(PositionCosts, DecideBetweenTwoAssignments) {
+TEST(ComputePositionCosts, DistinguishesTwoAssignments) {
   for (const std::vector<int>& seen : {std::vector{2, 3, 4, 5, 6}, {1, 2, 3, 4, 5}}) {
     Images images(mixed_rows());
     for (int k = 0; k < 5; ++k) images.add(seen, k);
@@ -122,21 +122,21 @@ TEST(PositionCosts, DecideBetweenTwoAssignments) {
   }
 }
 
-TEST(PositionCosts, DecideByOneLampOfFive) {
+TEST(ComputePositionCosts, DistinguishesByOneLampOfFive) {
   Images images(two_rows());
   for (int k = 0; k < 5; ++k) images.add({2, 3, 4, 5, 6}, k);
   images.expect_true_row_time(true);
   images.expect_true_row_time(false);
 }
 
-TEST(PositionCosts, DecideForACameraThatLeans) {
+TEST(ComputePositionCosts, DistinguishesForTiltedCamera) {
   Images images(mixed_rows());
   for (int k = 0; k < 5; ++k) images.add({2, 3, 4, 5, 6}, k, {0.3, -0.2});
   images.expect_true_row_time();
 }
 
 /// Each image shows three lamps.
-TEST(PositionCosts, ArePooledOverImagesOfFewLamps) {
+TEST(ComputePositionCosts, PoolsImagesOfFewLamps) {
   Images images(mixed_rows());
   for (int k = 0; k < 3; ++k) {
     images.add({2, 3, 4}, k);
@@ -146,7 +146,7 @@ TEST(PositionCosts, ArePooledOverImagesOfFewLamps) {
   images.expect_true_row_time(true);
 }
 
-TEST(PositionCosts, AreNoneOfImagesOfTwoLamps) {
+TEST(ComputePositionCosts, ReturnsZeroForImagesOfTwoLamps) {
   Images images(mixed_rows());
   for (int k = 0; k < 5; ++k) {
     images.add({2, 3}, k);
@@ -156,7 +156,7 @@ TEST(PositionCosts, AreNoneOfImagesOfTwoLamps) {
   images.expect_undecided();
 }
 
-TEST(PositionCosts, AreNotMisledByAMovedLamp) {
+TEST(ComputePositionCosts, IsRobustToMovedLamp) {
   Images images(mixed_rows());
   LampMap moved = images.map;
   moved.lamps[3].position_m += Eigen::Vector3d(0.25, -0.1, 0);
@@ -166,7 +166,7 @@ TEST(PositionCosts, AreNotMisledByAMovedLamp) {
 }
 
 /// A light between the lamps that has the period of the lamp that is not lit.
-TEST(PositionCosts, AreNotMisledByAnotherLight) {
+TEST(ComputePositionCosts, IsRobustToOtherLight) {
   Images images(mixed_rows());
   LampMap other = images.map;
   other.lamps[5].position_m = {-0.2, 0.1, 1.6};
@@ -175,7 +175,7 @@ TEST(PositionCosts, AreNotMisledByAnotherLight) {
 }
 
 /// Around a circle each assignment is a turn of the other.
-TEST(PositionCosts, LeaveASymmetricMapUndecided) {
+TEST(ComputePositionCosts, ReturnsEqualCostsForSymmetricMap) {
   std::vector<Eigen::Vector3d> circle_m;
   for (int i = 0; i < 6; ++i) {
     const double angle_rad = i * std::numbers::pi / 3;
@@ -191,7 +191,7 @@ TEST(PositionCosts, LeaveASymmetricMapUndecided) {
 
 /// In a zigzag each assignment is the other's mirror image, moved along: lamps 2 to 5 have the
 /// distances of lamps 1 to 4.
-TEST(PositionCosts, RefuseAMirroredAssignment) {
+TEST(ComputePositionCosts, RejectsMirroredAssignment) {
   const LampMap zigzag = with_even_ratios(
       {{-0.8, -0.2, 1.6}, {-0.4, 0.2, 1.6}, {0, -0.2, 1.6}, {0.4, 0.2, 1.6}, {0.8, -0.2, 1.6}});
   Images images(zigzag);
@@ -200,7 +200,7 @@ TEST(PositionCosts, RefuseAMirroredAssignment) {
   images.expect_true_row_time(false);
 }
 
-TEST(PositionCosts, AreAllTheSameWhereTheMapIsOfAnotherRoom) {
+TEST(ComputePositionCosts, ReturnsEqualCostsForMapOfAnotherRoom) {
   Images images(mixed_rows());
   LampMap room = images.map;
   for (Lamp& lamp : room.lamps) lamp.position_m.y() *= -1;
@@ -210,7 +210,7 @@ TEST(PositionCosts, AreAllTheSameWhereTheMapIsOfAnotherRoom) {
 }
 
 /// A group that may be either of two lamps takes no part.
-TEST(PositionCosts, LeaveOutLampsOfOneFrequency) {
+TEST(ComputePositionCosts, IgnoresLampsWithSameFrequency) {
   LampMap map = mixed_rows();
   map.lamps.push_back({7, {0.3, 0.5, 1.6}, {}, map.lamps[0].frequency_hz, {}});
   Images images(map);

@@ -53,7 +53,7 @@ Observation observe(const LampMap& map, const std::vector<double>& deviations, b
   return image;
 }
 
-TEST(CheckRowTime, ReportsRowTimeOffBy5Percent) {
+TEST(CheckRowTime, ReportsRowTimeErrorOf5Percent) {
   const LampMap map = make_map();
   const std::vector<Observation> images(4, observe(map, {0, 0, 0, 0, 0}, true));
   const RowTimeCheck check = check_row_time(images, map, {1.9e-5, "camera_type.yaml"});
@@ -69,7 +69,7 @@ TEST(CheckRowTime, ReportsRowTimeOffBy5Percent) {
   EXPECT_NEAR(*value_of(metrics, "row_time_sd_us"), 0.01, 0.005);
 }
 
-TEST(CheckRowTime, AcceptsLampsWithinTheirDrift) {
+TEST(CheckRowTime, AcceptsLampsWithinDrift) {
   const LampMap map = make_map();
   Random random(1);
   constexpr int trials = 500;
@@ -87,7 +87,7 @@ TEST(CheckRowTime, AcceptsLampsWithinTheirDrift) {
   EXPECT_EQ(measured, trials);
 }
 
-TEST(CheckRowTime, ReturnsNoneForTwoLamps) {
+TEST(CheckRowTime, ReturnsNulloptForTwoLamps) {
   LampMap map = make_map();
   map.lamps.resize(2);
   const std::vector<Observation> images(4, observe(map, {0, 0}, true));

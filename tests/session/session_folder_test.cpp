@@ -14,7 +14,7 @@ namespace fs = std::filesystem;
 using testing::HasSubstr;
 using testing::SizeIs;
 
-TEST(CapturesIn, AreThoseOfBothTablesAndTheTruthHolds) {
+TEST(CapturesIn, PrefersTruthToCaptures) {
   const TemporaryFolder folder;
   EXPECT_THAT(captures_in(folder / ""), SizeIs(0));
   folder.file("captures.csv",
@@ -32,13 +32,13 @@ TEST(CapturesIn, AreThoseOfBothTablesAndTheTruthHolds) {
   EXPECT_FALSE(captures.at("c.png").inclination);
 }
 
-TEST(CapturesIn, SayWhereATableIsWrong) {
+TEST(CapturesIn, NamesLineOfInvalidTable) {
   const TemporaryFolder folder;
   folder.file("captures.csv", "image,x_m,y_m\na.png,1,2\nb.png,1");
   EXPECT_THAT(refusal_of([&] { captures_in(folder / ""); }), HasSubstr("captures.csv:3"));
 }
 
-TEST(TruthFile, IsTheTruthOrElseCapturesWithPlaces) {
+TEST(TruthFile, ReturnsTruthOrCapturesWithPlaces) {
   const TemporaryFolder folder;
   EXPECT_FALSE(truth_file(folder / ""));
   folder.file("captures.csv", "image,time_s\na.png,1\n");
@@ -49,7 +49,7 @@ TEST(TruthFile, IsTheTruthOrElseCapturesWithPlaces) {
   EXPECT_EQ(truth_file(folder / "")->filename(), "truth.csv");
 }
 
-TEST(TruthIn, TakesThePlacesThatCapturesTell) {
+TEST(TruthIn, ReadsPlacesOfCaptures) {
   const TemporaryFolder folder;
   folder.file("captures.csv", "image,x_m,y_m\nb.png,3,4\na.png,1,2\nc.png,,\n");
   const auto places = truth_in(folder / "");
@@ -60,7 +60,7 @@ TEST(TruthIn, TakesThePlacesThatCapturesTell) {
   EXPECT_EQ(truth_in(folder / "")[0].image, "d.png");
 }
 
-TEST(SessionFolder, SaysWhatIsMissing) {
+TEST(SessionFolder, NamesMissingFile) {
   const TemporaryFolder folder;
   const auto refusal = [&] { return refusal_of([&] { SessionFolder(folder / "unit"); }); };
   EXPECT_THAT(refusal(), HasSubstr("unit: is not a folder of captures"));
@@ -78,7 +78,7 @@ TEST(SessionFolder, SaysWhatIsMissing) {
   EXPECT_FALSE(known.check());
 }
 
-TEST(SessionFolder, KnowsDrivesByTheirPlaces) {
+TEST(SessionFolder, FindsDrivesWithPlaces) {
   const TemporaryFolder folder;
   for (const char* name : {"unit/rotation", "unit/line-y", "unit/line-x", "unit/line-z"}) {
     fs::create_directories(folder / name);
@@ -97,7 +97,7 @@ TEST(SessionFolder, KnowsDrivesByTheirPlaces) {
   EXPECT_FALSE(holds_captures(folder / "unit", folder / "unit/results"));
 }
 
-TEST(EndsOf, AreTheFirstAndTheLastPlace) {
+TEST(EndsOf, ReturnsFirstAndLastPlace) {
   const std::vector<TruthRow> drive{
       {"a", {0, 1}, {}, {}}, {"b", {2, 1}, {}, {}}, {"c", {3, 1}, {}, {}}};
   EXPECT_EQ(ends_of("t.csv", drive)[1].x(), 3);

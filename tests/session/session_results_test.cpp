@@ -29,7 +29,7 @@ class SessionResultsTest : public testing::Test {
   const fs::path results = folder / "results", session = folder / "session";
 };
 
-TEST_F(SessionResultsTest, StepsHoldWhileTheirInputsAndOutputsAreAsTheyWere) {
+TEST_F(SessionResultsTest, KeepsStepsWithUnchangedInputsAndOutputs) {
   SessionResults kept(results, session);
   EXPECT_FALSE(kept.kept("lens", "key of the lens"));
   keep_two_steps(kept);
@@ -42,7 +42,7 @@ TEST_F(SessionResultsTest, StepsHoldWhileTheirInputsAndOutputsAreAsTheyWere) {
   EXPECT_FALSE(kept.kept("rotation", "key of the rotation"));
 }
 
-TEST_F(SessionResultsTest, WhatWasABadFileIsTriedAgain) {
+TEST_F(SessionResultsTest, RepeatsStepAfterBadInput) {
   SessionResults kept(results, session);
   kept.plan(kPlan);
   StepResult bad, undetermined;
@@ -55,7 +55,7 @@ TEST_F(SessionResultsTest, WhatWasABadFileIsTriedAgain) {
   EXPECT_EQ(kept.kept("lens", "key")->why, "too few");
 }
 
-TEST_F(SessionResultsTest, NothingStaysThatTheRunDoesNotMake) {
+TEST_F(SessionResultsTest, RemovesOutputsOfEarlierRuns) {
   {
     SessionResults before(results, session);
     keep_two_steps(before);
@@ -76,7 +76,7 @@ TEST_F(SessionResultsTest, NothingStaysThatTheRunDoesNotMake) {
   EXPECT_TRUE(fs::exists(results / "mine.txt"));
 }
 
-TEST_F(SessionResultsTest, FilesThatNoRunWroteAreNeitherRemovedNorOverwritten) {
+TEST_F(SessionResultsTest, KeepsForeignFiles) {
   fs::create_directories(results / "steps");
   const std::vector<std::string> mine{"line-a-fixes.csv", "steps/mine.json", "steps/line-a.json"};
   for (const std::string& name : mine) folder.file("results/" + name, "mine");
@@ -100,7 +100,7 @@ TEST_F(SessionResultsTest, FilesThatNoRunWroteAreNeitherRemovedNorOverwritten) {
       ThrowsMessage<InputError>(HasSubstr("holds lens.svg, which is not of vlp-calibrate")));
 }
 
-TEST_F(SessionResultsTest, AListOfOthersRemovesNothingOutside) {
+TEST_F(SessionResultsTest, ForgedListRemovesNothingOutside) {
   folder.file("outside.txt", "mine");
   { const SessionResults taken(results, session); }
   folder.file("results/steps/outputs", "../outside.txt\nsteps/../../outside.txt\n" +
@@ -111,7 +111,7 @@ TEST_F(SessionResultsTest, AListOfOthersRemovesNothingOutside) {
   EXPECT_TRUE(fs::exists(folder / "outside.txt"));
 }
 
-TEST_F(SessionResultsTest, AListOfOthersRemovesOnlyWhatRunsWrite) {
+TEST_F(SessionResultsTest, RemovesOnlyOutputsOfRunsByForeignList) {
   { const SessionResults taken(results, session); }
   folder.file("results/mine.txt", "mine");
   folder.file("results/line-x", "mine");
@@ -128,7 +128,7 @@ TEST_F(SessionResultsTest, AListOfOthersRemovesOnlyWhatRunsWrite) {
   }
 }
 
-TEST_F(SessionResultsTest, OutputsThatCannotBeRemovedStayInTheList) {
+TEST_F(SessionResultsTest, KeepsOutputsThatCannotBeRemovedInList) {
   const std::vector<StepOutputs> with_picture{{"lens", {"lens.yaml", "lens.svg"}}};
   {
     SessionResults before(results, session);
@@ -145,7 +145,7 @@ TEST_F(SessionResultsTest, OutputsThatCannotBeRemovedStayInTheList) {
   EXPECT_FALSE(fs::exists(results / "lens.svg"));
 }
 
-TEST_F(SessionResultsTest, OfAnEarlierVersionThatWasInterruptedGoOn) {
+TEST_F(SessionResultsTest, ResumesInterruptedResultsOfEarlierVersion) {
   { const SessionResults taken(results, session); }
   fs::remove(results / "steps/outputs");
   folder.file("results/line-x-fixes.csv", "of a drive whose step is not recorded");
@@ -157,7 +157,7 @@ TEST_F(SessionResultsTest, OfAnEarlierVersionThatWasInterruptedGoOn) {
   EXPECT_TRUE(fs::exists(results / "line-y-fixes.csv"));
 }
 
-TEST_F(SessionResultsTest, DrivesMayHaveTheLongestNames) {
+TEST_F(SessionResultsTest, AcceptsDrivesWithLongestNames) {
   const std::string drive = "line-" + std::string(195, 'x'), fixes = drive + "-fixes.csv";
   {
     SessionResults before(results, session);
@@ -170,7 +170,7 @@ TEST_F(SessionResultsTest, DrivesMayHaveTheLongestNames) {
   EXPECT_FALSE(fs::exists(results / fixes));
 }
 
-TEST_F(SessionResultsTest, OutputsThatAreLinksAreRefused) {
+TEST_F(SessionResultsTest, RejectsLinkedOutputs) {
   { const SessionResults taken(results, session); }
   fs::create_symlink(folder.file("mine.txt", "mine"), results / "lens.yaml");
   SessionResults taken(results, session);
@@ -179,7 +179,7 @@ TEST_F(SessionResultsTest, OutputsThatAreLinksAreRefused) {
   EXPECT_EQ(TemporaryFolder::content_of(folder / "mine.txt"), "mine");
 }
 
-TEST_F(SessionResultsTest, OfAnEarlierVersionAreTakenOverWithoutAList) {
+TEST_F(SessionResultsTest, AdoptsResultsOfEarlierVersion) {
   {
     SessionResults before(results, session);
     std::vector<StepOutputs> with_drive = kPlan;
@@ -199,7 +199,7 @@ TEST_F(SessionResultsTest, OfAnEarlierVersionAreTakenOverWithoutAList) {
   EXPECT_TRUE(fs::exists(results / "line-y-fixes.csv"));
 }
 
-TEST_F(SessionResultsTest, WhatIsBehindAStepThatFailedIsForgotten) {
+TEST_F(SessionResultsTest, RemovesStepsAfterFailedStep) {
   SessionResults kept(results, session);
   keep_two_steps(kept);
   kept.forget_behind("lens");
@@ -210,7 +210,7 @@ TEST_F(SessionResultsTest, WhatIsBehindAStepThatFailedIsForgotten) {
   EXPECT_FALSE(kept.kept("lens", "key of the lens"));
 }
 
-TEST_F(SessionResultsTest, BelongToOneSessionAndOneRunAtATime) {
+TEST_F(SessionResultsTest, AllowsOneSessionAndOneRun) {
   const auto take = [&](const fs::path& of) { return [&, of] { SessionResults(results, of); }; };
   {
     const SessionResults taken(results, session);

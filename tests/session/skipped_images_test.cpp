@@ -21,20 +21,20 @@ std::vector<std::string> lines(const std::vector<SkippedImage>& skipped) {
   return lines;
 }
 
-TEST(SkippedImages, NamesImagesWithoutTheirFolder) {
+TEST(SkippedImages, OmitsFolderOfImages) {
   EXPECT_THAT(lines(skipped_images({Observation{"f/a.png"},
                                     rejected("f/b.png", RejectionReason::unreadable, "is empty"),
                                     rejected("f/c.png", RejectionReason::blurred, "is 3: large")})),
               ElementsAre("b.png: is empty", "c.png: is 3: large"));
 }
 
-TEST(SkippedImages, NamesTheFoldersIfThereAreSeveral) {
+TEST(SkippedImages, NamesFoldersWhenSeveral) {
   EXPECT_THAT(lines(skipped_images({Observation{"f/a.png"},
                                     rejected("g/a.png", RejectionReason::unreadable, "is empty")})),
               ElementsAre("g/a.png: is empty"));
 }
 
-TEST(AddRemarks, CombinesTheFramesOfAVideo) {
+TEST(AddRemarks, CombinesFramesOfVideo) {
   Observations seen;
   seen.images = {rejected("a.png", RejectionReason::too_few_corners, "shows 1 tag"),
                  rejected("b.avi#000000", RejectionReason::too_few_corners, "shows 2 tags"),
@@ -54,7 +54,7 @@ TEST(AddRemarks, CombinesTheFramesOfAVideo) {
                           "c.avi#000000: shows 2 tags", "b.avi#000004: is as #000003"));
 }
 
-TEST(AddRemarks, FailsIfNoImageCanBeUsed) {
+TEST(AddRemarks, FailsWithoutUsableImage) {
   Observations seen;
   seen.warnings = {"dark"};
   seen.failure = {true, "shows another board", "board.yaml"};

@@ -27,7 +27,7 @@ StepResult sample() {
   return result;
 }
 
-TEST(StepFile, GivesBackWhatWasKept) {
+TEST(StepFile, RoundTripIsExact) {
   const TemporaryFolder folder;
   write_step(folder / "s.json", {"key", "outputs", sample()});
   const auto kept = read_step(folder / "s.json");
@@ -51,7 +51,7 @@ TEST(StepFile, GivesBackWhatWasKept) {
   EXPECT_EQ(message_of(result), "lamps.yaml: look swapped");
 }
 
-TEST(StepFile, IsAsItsSchemaSays) {
+TEST(StepFile, MatchesSchema) {
   const TemporaryFolder folder;
   std::vector<std::filesystem::path> files;
   for (int failure = 0; !name_of(static_cast<StepFailure>(failure)).empty(); ++failure) {
@@ -64,7 +64,7 @@ TEST(StepFile, IsAsItsSchemaSays) {
   EXPECT_EQ(problems_by_schema("step", files), "");
 }
 
-TEST(StepFile, IsNothingWhenItIsCutOrOfAnotherVersion) {
+TEST(ReadStep, ReturnsNulloptForTruncatedFileOrOtherVersion) {
   const TemporaryFolder folder;
   EXPECT_FALSE(read_step(folder / "none.json"));
   write_step(folder / "s.json", {"key", "outputs", sample()});
@@ -77,7 +77,7 @@ TEST(StepFile, IsNothingWhenItIsCutOrOfAnotherVersion) {
   EXPECT_FALSE(read_step(folder.file("other.json", other)));
 }
 
-TEST(StepFailure, HasANameEach) {
+TEST(StepFailure, HasNameForEachEnumerator) {
   for (const auto failure :
        {StepFailure::none, StepFailure::bad_input, StepFailure::undetermined,
         StepFailure::wrong_board, StepFailure::wrong_map, StepFailure::wrong_place}) {

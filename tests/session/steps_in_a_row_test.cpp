@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// What each step passes on of what it got: fixes that know what lens, rotation and dispersion
-/// left.
+/// Error propagation through sequential calibration: the covariance of fixes includes the errors of
+/// lens, rotation and dispersion.
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
@@ -20,8 +20,8 @@ namespace {
 
 constexpr double kExactMap_m = 1e-9;
 
-/// A turn on the spot at two heights, and captures at a known place of the camera, or of the axis,
-/// turning by a quarter: what is wrong about the lever arm does not average out.
+/// Rotation in place at two heights, and captures at a known place of the camera or of the axis, at
+/// yaws over a quarter turn: errors of the lever arm do not average out.
 struct Row {
   Survey survey{kExactMap_m};
   LampCaptures turns;
@@ -70,14 +70,14 @@ struct Row {
   }
 };
 
-TEST(StepsInARow, PassOnNothingWhereTheLensSaysNothing) {
+TEST(SequentialCalibration, HasNoLensJacobianWithoutLensCovariance) {
   Random random(1);
   const Calibration calibration = Row(random, 0).calibrated();
   EXPECT_FALSE(calibration.rotation_center->by_intrinsics);
   EXPECT_FALSE(calibration.dispersion->by_intrinsics);
 }
 
-TEST(StepsInARow, MoveWithTheLensAsTheySay) {
+TEST(SequentialCalibration, LensJacobianPredictsChange) {
   Random random(2);
   Row row(random, 0);
   Calibration& calibration = row.turns.calibration;
@@ -103,13 +103,13 @@ TEST(StepsInARow, MoveWithTheLensAsTheySay) {
   const Eigen::Vector2d offset_said =
       *exact.dispersion->by_intrinsics * error + *exact.dispersion->by_zenith * zenith;
   EXPECT_GT(offset.norm(), 1e-6);
-  // What lens and zenith do mostly takes each other back.
+  // The effects of lens and zenith mostly cancel.
   EXPECT_LT((offset - offset_said).norm(), 0.02 * zenith.norm());
 }
 
-/// Turns at yaws that just determine the circles. With an error of the lens other circles are
-/// determined, which moves their mean by up to 14 times as much as the error does.
-TEST(StepsInARow, CirclesMoveWithTheLensAsTheSameSightingsDo) {
+/// Rotations at yaws that barely determine the circles. A lens error changes the set of determined
+/// circles, which moves their mean by up to 14 times the effect of the error itself.
+TEST(SolveRotation, CircleLensJacobianMatchesJointFit) {
   constexpr double spread_rad = 6e-4;  // a few times what the noise turns a lamp by
   for (const unsigned seed : {44U, 127U, 144U, 223U, 227U}) {
     Random random(seed);
@@ -140,8 +140,8 @@ TEST(StepsInARow, CirclesMoveWithTheLensAsTheSameSightingsDo) {
   }
 }
 
-/// A drive, levelled by its lamps.
-TEST(StepsInARow, ALevellingMovesWithTheLensAsItSays) {
+/// Tilt calibration from the lamps of a drive.
+TEST(SolveLevelling, LensJacobianPredictsChange) {
   Random random(4);
   Survey survey(kExactMap_m);
   for (int k = 0; k < 40; ++k) {
@@ -175,9 +175,9 @@ TEST(StepsInARow, ALevellingMovesWithTheLensAsItSays) {
   EXPECT_LT((moved - *exact.by_intrinsics * error).norm(), 0.05 * moved.norm());
 }
 
-class Recalibrated : public testing::TestWithParam<PlaceOf> {};
+class SequentialCalibrationFixes : public testing::TestWithParam<PlaceOf> {};
 
-TEST_P(Recalibrated, FixesSayWhatTheirErrorIs) {
+TEST_P(SequentialCalibrationFixes, CovarianceMatchesErrors) {
   constexpr int trials = 40;
   Random random(3);
   Judged whole, common;
@@ -209,15 +209,15 @@ TEST_P(Recalibrated, FixesSayWhatTheirErrorIs) {
                  without_noise.estimate.covariance - without_noise.noise_covariance);
     }
   }
-  // Fixes of one trial go together: three standard errors of so few.
+  // Fixes of one trial are correlated: three standard errors for `trials` trials.
   for (const Judged& judged : {whole, common}) {
     EXPECT_NEAR(judged.mean(), 1, 0.3);
     EXPECT_GT(judged.share(), 0.88);
   }
   EXPECT_NEAR(zenith, 1, 0.45);
   EXPECT_NEAR(offset, 1, 0.45);
-  // Of a place of the camera the offset takes back what the zenith does, which its captures do not
-  // know.
+  // For a place of the camera, the offset compensates the zenith error, which its captures cannot
+  // determine.
   if (GetParam() == PlaceOf::camera) {
     EXPECT_GT(offset_alone, 2);
   }
@@ -227,8 +227,8 @@ TEST_P(Recalibrated, FixesSayWhatTheirErrorIs) {
               common.mean(), 100 * common.share());
 }
 
-INSTANTIATE_TEST_SUITE_P(StepsInARow, Recalibrated, testing::Values(PlaceOf::camera, PlaceOf::axis),
-                         [](const auto& one) {
+INSTANTIATE_TEST_SUITE_P(Places, SequentialCalibrationFixes,
+                         testing::Values(PlaceOf::camera, PlaceOf::axis), [](const auto& one) {
                            return one.param == PlaceOf::camera ? "FromAPlaceOfTheCamera"
                                                                : "FromAPlaceOfTheAxis";
                          });

@@ -25,7 +25,7 @@ struct Places {
     double from, to;
     double any(Random& random) const { return random.uniform(from, to); }
   };
-  /// Where the board's middle is, as shares of the image from its middle.
+  /// Center of the board relative to that of the image, as fractions of the image size.
   Range u{-0.5, 0.5}, v{-0.5, 0.5};
   Range tilt_deg{0, 45};
   /// Distance over what fills the image with the board.
@@ -34,13 +34,13 @@ struct Places {
   Range axis_rad{-3.2, 3.2};
 };
 
-/// How a set of views tells little: its places in turn, and views of each place.
+/// Kind of an insufficient set of views: its places, used cyclically, and views of each place.
 struct Thin {
   const char* name;
   int least_places, most_places;
   std::vector<Places> places;
   int copies = 1;
-  /// How far apart the views of a place are, in degrees and hundredths of the image.
+  /// Variation of the views of a place, in degrees and in hundredths of the image.
   double shake = 0;
 };
 
@@ -80,7 +80,8 @@ inline Lens lens_of_thin_set(Random& random) {
                      -3e-4 * bent, -0.012 * bent, 0.01 * bent, 0.002 * bent, 1e-4 * bent}};
 }
 
-/// Of a plain board with its tags shrunk, or of Kalibr's, which squares keep from shrinking.
+/// Makes a set of views of a plain board, its tags shrunk if `shrinks`, or of a Kalibr board, whose
+/// squares prevent shrinking.
 inline ThinSet thin_set(const Thin& thin, bool kalibr, bool shrinks, Random& random) {
   constexpr double noise_px = 0.05, rad = std::numbers::pi / 180;
   const Lens lens = lens_of_thin_set(random);
@@ -123,8 +124,8 @@ inline ThinSet thin_set(const Thin& thin, bool kalibr, bool shrinks, Random& ran
   return {std::move(input), lens};
 }
 
-/// The worst error over the region in which the lens is claimed to be known, over the worst that is
-/// stated there; nothing of a lens that is not found or that misses a gate.
+/// Returns the largest error in the calibrated region divided by the largest reported one. Returns
+/// std::nullopt if no lens is found or a gate fails.
 inline std::optional<double> error_over_stated(const ThinSet& set) {
   const LensResult result = solve_lens(set.input, {});
   if (!result.ok() || !words_of_missed(check_gates(lens_gates(), result.metrics)).empty()) {

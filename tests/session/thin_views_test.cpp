@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Sets of board views that do not tell enough, as people take them: no gate may be met where the
-/// lens is worse than it says. Benchmark thin_trials tries more of them.
+/// Insufficient sets of board views, as taken in practice: gates must fail if the errors of the
+/// lens exceed the reported ones. Benchmark thin_trials runs more of them.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -14,7 +14,7 @@
 namespace vlp {
 namespace {
 
-/// What became of sets that tell little for one reason, of three boards: plain, shrunk, Kalibr's.
+/// Outcome of the sets of one kind for three boards: plain, shrunk, Kalibr.
 struct Outcome {
   int passed = 0;
   double worst = 0;  // the largest error over what is stated
@@ -36,8 +36,8 @@ std::map<std::string, Outcome> outcomes() {
   return outcomes;
 }
 
-TEST(ThinViews, AreNotCalledGoodWhereTheyAreNot) {
-  // Of these sets; of more, one in some hundreds is a little beyond three.
+TEST(SolveLens, DoesNotPassInsufficientViews) {
+  // Limit for these sets; of several hundred sets, one slightly exceeds three.
   constexpr double most = 2.5;
   int passed = 0;
   const auto all = outcomes();

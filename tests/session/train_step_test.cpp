@@ -14,7 +14,7 @@ using testing::HasSubstr;
 
 const std::string kSample = VLP_SOURCE_DIR "/datasets/paper-rig/rendered/sample";
 
-/// Two images, labelled, as if they were of so many folders.
+/// Two labeled images, repeated as several folders.
 struct Training {
   LampMap lamps = read_lamp_map(VLP_SOURCE_DIR "/datasets/paper-rig/rendered/lamps.yaml");
   SeenLights seen;
@@ -30,13 +30,13 @@ struct Training {
   TrainStepResult trained() const { return train_lamps(seen, labels, lamps, "sample"); }
 };
 
-TEST(TrainStep, NeedsSeveralLightsOfEachLamp) {
+TEST(TrainLamps, RequiresSeveralLightsOfEachLamp) {
   const TrainStepResult result = Training(1).trained();
   EXPECT_EQ(result.failure, StepFailure::undetermined);
   EXPECT_THAT(result.why, HasSubstr("too few labelled lights of lamps 1 (has 2), 2 (has 2)"));
 }
 
-TEST(TrainStep, TellsHowLightsThatWereHeldOutAreAnswered) {
+TEST(TrainLamps, ReportsCrossValidatedConfusion) {
   const TrainStepResult result = Training(kMinExamples).trained();
   ASSERT_TRUE(result.ok()) << result.why;
   EXPECT_EQ(result.classifier.lamps.size(), 6U);
@@ -45,7 +45,7 @@ TEST(TrainStep, TellsHowLightsThatWereHeldOutAreAnswered) {
   EXPECT_EQ(result.confusion.wrong(), 0);
 }
 
-TEST(TrainStep, RefusesLabelsOfNoImageAndOfNoLamp) {
+TEST(TrainLamps, ThrowsForUnknownImageOrLamp) {
   Training training(1);
   training.lamps.lamps.pop_back();
   EXPECT_THAT(refusal_of<std::invalid_argument>([&] { training.trained(); }),

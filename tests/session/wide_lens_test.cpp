@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// What is said of a wide lens when LENSMODEL_OPENCVn is asked for.
+/// Failures and warnings for a wide lens with LENSMODEL_OPENCVn.
 #include <gmock/gmock.h>
 
 #include "calibration/intrinsics/wide_views.h"
@@ -17,7 +17,7 @@ using testing::Contains;
 using testing::HasSubstr;
 using testing::Not;
 
-/// Views of the board up to so far off the axis of a lens of 190 degrees.
+/// Views of the board up to `reach_deg` off the axis of a 190-degree lens.
 LensInput wide_set(double reach_deg, LensModel model) {
   constexpr std::size_t count = 30;
   constexpr double noise_px = 0.05;
@@ -37,9 +37,9 @@ LensInput wide_set(double reach_deg, LensModel model) {
   return input;
 }
 
-class WideLens : public testing::TestWithParam<LensModel> {};
+class SolveLensWideField : public testing::TestWithParam<LensModel> {};
 
-TEST_P(WideLens, IsRefusedWhereTheModelHasNoRays) {
+TEST_P(SolveLensWideField, FailsWhereModelHasNoRays) {
   const LensResult result = solve_lens(wide_set(180, GetParam()), {});
   EXPECT_EQ(result.failure, StepFailure::undetermined);
   EXPECT_THAT(result.why,
@@ -49,8 +49,9 @@ TEST_P(WideLens, IsRefusedWhereTheModelHasNoRays) {
                     Not(HasSubstr("add views"))));
 }
 
-/// Up to 87 degrees: a lens that passes is as good as it says where it says so.
-TEST_P(WideLens, IsToldAndStatedWhereTheModelHardlyHasRays) {
+/// Up to 87 degrees: the errors of a lens that passes match the reported ones in the calibrated
+/// region.
+TEST_P(SolveLensWideField, WarnsAndCoversErrorsNearLimitOfModel) {
   constexpr double sigmas = 3;
   int compared = 0;
   for (const double reach_deg : {60, 75, 87}) {
@@ -77,13 +78,14 @@ TEST_P(WideLens, IsToldAndStatedWhereTheModelHardlyHasRays) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Models, WideLens, testing::Values(LensModel::opencv8, LensModel::opencv12),
+INSTANTIATE_TEST_SUITE_P(Models, SolveLensWideField,
+                         testing::Values(LensModel::opencv8, LensModel::opencv12),
                          [](const auto& instance) {
                            return instance.param == LensModel::opencv8 ? "Opencv8" : "Opencv12";
                          });
 
-/// OPENCV5 fits no lens so wide, which takes seconds to find.
-TEST(WideLensOfFewParameters, IsNotBlamedOnTheBoard) {
+/// OPENCV5 does not fit a lens of this width; detecting this takes seconds.
+TEST(SolveLens, DoesNotBlameBoardForUnsuitableModel) {
   const LensResult result = solve_lens(wide_set(87, LensModel::opencv5), {});
   ASSERT_EQ(result.failure, StepFailure::undetermined);
   EXPECT_THAT(result.why, AllOf(HasSubstr("OPENCV_FISHEYE fits to 0.05 px"),
@@ -91,7 +93,7 @@ TEST(WideLensOfFewParameters, IsNotBlamedOnTheBoard) {
                                 Not(HasSubstr("board.yaml")), Not(HasSubstr("cannot be"))));
 }
 
-TEST(LensThatIsNotWide, OfItsOwnModelKeepsTheMarginAroundItsCorners) {
+TEST(SolveLens, KeepsMarginAroundCornersForOwnModel) {
   constexpr int count = 30;
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   LensInput input{{}, views.board, "board.yaml", {}, 0, WarpChoice::automatic};

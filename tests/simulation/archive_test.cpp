@@ -24,7 +24,7 @@ Scene archive_scene(const std::string& spreads = kSpreads) {
 
 double tilt_rad(const Scene& scene) { return std::acos(scene.mount.level_from_camera(2, 2)); }
 
-TEST(Archive, ReadsItsSpreads) {
+TEST(ReadScene, ReadsArchiveVariation) {
   const auto spreads = archive_scene().archive;
   ASSERT_TRUE(spreads);
   EXPECT_EQ(spreads->sessions_per_camera, 2);
@@ -34,7 +34,7 @@ TEST(Archive, ReadsItsSpreads) {
   EXPECT_FALSE(scene_of(kSceneYaml).archive);
 }
 
-TEST(Archive, RefusesSpreadsThatCannotBe) {
+TEST(ReadScene, RejectsInvalidArchiveVariation) {
   const auto refusal = [](const std::string& from, const std::string& to) {
     std::string spreads = kSpreads;
     spreads.replace(spreads.find(from), from.size(), to);
@@ -47,7 +47,7 @@ TEST(Archive, RefusesSpreadsThatCannotBe) {
   EXPECT_THAT(refusal("tilt_deg: 1", "tilt_deg: 1, odd: 2"), HasSubstr("key 'odd' is unknown"));
 }
 
-TEST(Archive, DamagesTheStatedShareOfTheSessions) {
+TEST(ArchiveSession, DamagesGivenFractionOfSessions) {
   const Scene scene = archive_scene();
   std::size_t damaged = 0, faulty = 0;
   std::set<std::string> kinds, faults;
@@ -69,7 +69,7 @@ TEST(Archive, DamagesTheStatedShareOfTheSessions) {
   EXPECT_EQ(faults.size(), 4U);
 }
 
-TEST(Archive, DrawsWithinTheSpreadsACameraAtATime) {
+TEST(ArchiveSession, VariesCamerasWithinLimitsAndKeepsThemAcrossSessions) {
   const Scene scene = archive_scene();
   std::set<double> focal_lengths;
   std::set<std::uint64_t> seeds;
@@ -95,7 +95,7 @@ TEST(Archive, DrawsWithinTheSpreadsACameraAtATime) {
   EXPECT_EQ(seeds.size(), 100U);
 }
 
-TEST(Archive, MakesFaultsThatShow) {
+TEST(ArchiveSession, AppliesFaultToScene) {
   const Scene scene = archive_scene();
   for (std::size_t i = 0; i < 60; ++i) {
     const ArchiveSession session = archive_session(scene, i);
@@ -108,7 +108,7 @@ TEST(Archive, MakesFaultsThatShow) {
   }
 }
 
-TEST(Archive, WantsASceneThatCanBeCalibrated) {
+TEST(SimulateArchive, RejectsSceneThatCannotBeCalibrated) {
   const auto refusal = [](const Scene& scene) -> std::string {
     try {
       simulate_archive(scene, 1, "unused", {}, {});

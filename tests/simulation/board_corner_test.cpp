@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Where corners of boards are rendered: measured along the edges, against mrcal's projection.
+/// Rendered corners of boards, measured along their edges, against mrcal's projection.
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
@@ -17,7 +17,7 @@
 namespace vlp {
 namespace {
 
-/// A nearly straight edge near a corner: one coordinate as a square polynomial of the other.
+/// Nearly straight edge at a corner: one coordinate as a quadratic polynomial of the other.
 struct EdgeCurve {
   Eigen::Vector3d coefficients;
   double origin;
@@ -28,9 +28,9 @@ struct EdgeCurve {
   }
 };
 
-/// Of the black border's edge from `corner` to `next`, which runs more along x than along y. In
-/// each column the white pixels between two rows are counted, which is exact for a straight edge.
-/// `image` is 0 where black and 1 where white.
+/// Measures the black border's edge from `corner` to `next`, which runs more along x than along y.
+/// Counts the white pixels between two rows in each column, which is exact for a straight edge.
+/// `image` is 0 for black and 1 for white.
 EdgeCurve edge_of(const cv::Mat1d& image, const Eigen::Vector2d& corner,
                   const Eigen::Vector2d& next) {
   constexpr int reach_px = 2, skipped_px = 2;  // the black border is 3.5 px wide or more
@@ -57,7 +57,7 @@ EdgeCurve edge_of(const cv::Mat1d& image, const Eigen::Vector2d& corner,
   return {terms.colPivHouseholderQr().solve(values), corner.x()};
 }
 
-/// Where the two edges of a corner meet; `a` is its neighbour along x, `b` along y.
+/// Returns the intersection of the two edges of a corner; `a` is its neighbor along x, `b` along y.
 Eigen::Vector2d measured_corner(const cv::Mat1d& image, const cv::Mat1d& transposed,
                                 const Eigen::Vector2d& corner, const Eigen::Vector2d& a,
                                 const Eigen::Vector2d& b) {
@@ -80,20 +80,20 @@ struct View {
   friend void PrintTo(const View& view, std::ostream* out) { *out << view.name; }
 };
 
-class BoardCorners : public testing::TestWithParam<View> {
+class FrameRendererBoard : public testing::TestWithParam<View> {
  protected:
-  BoardCorners() {
+  FrameRendererBoard() {
     scene_.camera = GetParam().camera;
     scene_.board = plain_board();
     scene_.board->warp_m = GetParam().warp_m;
     if (GetParam().kalibr_border) scene_.board->print.border_bits = 2;
   }
   Scene scene_ = plain_scene();
-  // Turned so little that the tags' edges keep their directions.
+  // Small rotation, so that the edges of the tags keep their directions.
   CaptureSet views_ = board_views(6, 0.17, rad_from_deg(18), rad_from_deg(12), 0.4);
 };
 
-TEST_P(BoardCorners, AreRenderedWhereTheyProject) {
+TEST_P(FrameRendererBoard, RenderedCornersMatchTrueCorners) {
   const FrameRenderer renderer(scene_);
   double worst_px = 0, squares = 0;
   int corners = 0;
@@ -126,7 +126,7 @@ TEST_P(BoardCorners, AreRenderedWhereTheyProject) {
   EXPECT_LT(std::sqrt(squares / corners), 0.003);
 }
 
-TEST_P(BoardCorners, ProjectAsMrcalSays) {
+TEST_P(FrameRendererBoard, TrueCornersMatchMrcalProjection) {
   const FrameRenderer renderer(scene_);
   const MrcalOracle mrcal(std::string(name_of(scene_.camera.lens_model)), scene_.camera.intrinsics);
   const BoardShot shot = board_shot(scene_, views_, 1);
@@ -144,15 +144,15 @@ TEST_P(BoardCorners, ProjectAsMrcalSays) {
 }
 
 INSTANTIATE_TEST_SUITE_P(
-    Views, BoardCorners,
+    Views, FrameRendererBoard,
     testing::Values(View{paper_rig_camera(), {0, 0}, false, "Flat"},
                     View{paper_rig_camera(), {0.002, -0.001}, false, "Bent"},
                     View{wide_camera(), {0.001, 0.001}, true, "WideAndBorderOfTwoBits"},
                     View{stereographic_camera(), {0, 0}, false, "Stereographic"}),
     [](const auto& instance) { return std::string(instance.param.name); });
 
-/// What pixels gather of a straight edge that a Gaussian blurs: the integral of its distribution
-/// over a pixel.
+/// Returns the value of a pixel near a straight edge blurred by a Gaussian: the integral of its
+/// distribution function over the pixel.
 double white_share(double from_edge_px, double sigma_px) {
   const auto integral = [&](double x) {
     const double t = x / sigma_px;
@@ -162,7 +162,7 @@ double white_share(double from_edge_px, double sigma_px) {
   return integral(from_edge_px + 0.5) - integral(from_edge_px - 0.5);
 }
 
-TEST(BoardEdge, IsBlurredBeforePixelsGatherIt) {
+TEST(FrameRenderer, BlursBoardEdgeBeforePixelIntegration) {
   constexpr double sigma_px = 0.6;
   Scene scene = plain_scene();
   scene.camera = pinhole_camera();
@@ -188,7 +188,8 @@ TEST(BoardEdge, IsBlurredBeforePixelsGatherIt) {
   EXPECT_LT(worst, 0.012);  // of pixels that are blurred it would be 0.06
 }
 
-/// The level of a white wall at a pixel, through a fisheye that sees to 104 degrees off its axis.
+/// Returns the level of a white wall at a pixel, for a fisheye lens with rays up to 104 degrees off
+/// its axis.
 double level_at(const Eigen::Vector2d& pixel, double vignetting_power) {
   Scene scene = plain_scene();
   scene.camera = {
@@ -202,7 +203,7 @@ double level_at(const Eigen::Vector2d& pixel, double vignetting_power) {
 }
 
 // 350 px from the centre are 95 degrees, 360 px beyond the last ray.
-TEST(BoardWall, IsSeenBeyondNinetyDegreesByALensWithoutVignetting) {
+TEST(FrameRenderer, RendersBoardBeyondNinetyDegreesWithoutVignetting) {
   const double on_axis = level_at({400, 100}, 0);
   EXPECT_GT(on_axis, 0);
   EXPECT_EQ(level_at({749, 400}, 0), on_axis);

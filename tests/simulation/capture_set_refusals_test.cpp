@@ -14,7 +14,7 @@ std::string without_board() {
   return yaml.erase(begin, yaml.find("captures:\n") - begin);
 }
 
-TEST(CaptureSetRefusals, NameTheSpotOutsideTheRoom) {
+TEST(ReadCaptureSet, RejectsSpotOutsideRoom) {
   const std::string problem = "takes the camera outside the room";
   EXPECT_EQ(refusal_with("[-0.2, 0.3]", "[-0.2, 0.6]"),
             "scene.yaml:25: captures[0].spots_m[1]: " + problem);
@@ -30,7 +30,7 @@ TEST(CaptureSetRefusals, NameTheSpotOutsideTheRoom) {
             "scene.yaml:26: captures[1].heights_m[0]: " + problem);
 }
 
-TEST(CaptureSetRefusals, KeepTheLeverArmInTheRoomAtEachYaw) {
+TEST(ReadCaptureSet, RejectsLeverArmOutsideRoomAtAnyYaw) {
   const std::string problem = "takes the camera outside the room";
   EXPECT_EQ(refusal_with("[-0.2, 0.3]", "[0.949, -0.449]"), "");
   EXPECT_EQ(refusal_with("[-0.2, 0.3]", "[0.951, -0.449]"),
@@ -43,14 +43,14 @@ TEST(CaptureSetRefusals, KeepTheLeverArmInTheRoomAtEachYaw) {
             "scene.yaml:27: captures[2].drive.to_m: " + problem);
 }
 
-TEST(CaptureSetRefusals, NameTheLampThatIsNotAboveTheCamera) {
+TEST(ReadCaptureSet, RejectsHeightNotBelowLamp) {
   EXPECT_EQ(refusal_with("[0, 0.2]", "[0, 1.5]"),
             "scene.yaml:25: captures[0].heights_m[1]: lamp 5 is not above the camera");
   EXPECT_EQ(refusal_with("[0, 0.2]", "[0, 1.65]"),
             "scene.yaml:25: captures[0].heights_m[1]: lamp 1 is not above the camera");
 }
 
-TEST(CaptureSetRefusals, NameFiguresThatCannotBe) {
+TEST(ReadCaptureSet, RejectsValuesOutOfRange) {
   EXPECT_EQ(refusal_with("exposure_s: 5.0e-5", "exposure_s: -0.5"),
             "scene.yaml:25: captures[0].exposure_s: -0.5 s is not within 1.0e-07 and 1 s: is "
             "it in the right unit?");
@@ -75,7 +75,7 @@ TEST(CaptureSetRefusals, NameFiguresThatCannotBe) {
             "is it in the right unit?");
 }
 
-TEST(CaptureSetRefusals, AskForOneWayToPlaceTheCamera) {
+TEST(ReadCaptureSet, RequiresExactlyOneKeyForPositions) {
   const std::string problem = "needs one of the keys spots_m, grid, drive, views";
   EXPECT_EQ(refusal_with("spots_m: [[0.1, -0.05], [-0.2, 0.3]], ", ""),
             "scene.yaml:25: captures[0]: " + problem);
@@ -88,14 +88,14 @@ TEST(CaptureSetRefusals, AskForOneWayToPlaceTheCamera) {
             "exposure_s, views");
 }
 
-TEST(CaptureSetRefusals, AskForOneWayToTurnTheCamera) {
+TEST(ReadCaptureSet, RequiresExactlyOneKeyForYaws) {
   const std::string problem = "needs one of the keys yaws_deg and turn";
   EXPECT_EQ(refusal_with("yaws_deg: [20, -90], ", ""), "scene.yaml:25: captures[0]: " + problem);
   EXPECT_EQ(refusal_with("folder: grid,", "folder: grid, yaws_deg: [0],"),
             "scene.yaml:26: captures[1]: " + problem);
 }
 
-TEST(CaptureSetRefusals, NameAListWithNothingInIt) {
+TEST(ReadCaptureSet, RejectsEmptyList) {
   EXPECT_EQ(refusal_with("[[0.1, -0.05], [-0.2, 0.3]]", "[]"),
             "scene.yaml:25: captures[0].spots_m: holds no spot");
   EXPECT_EQ(refusal_with("heights_m: [0, 0.2]", "heights_m: []"),
@@ -106,19 +106,19 @@ TEST(CaptureSetRefusals, NameAListWithNothingInIt) {
   EXPECT_EQ(scene_refusal(before + "captures: []\n"), "scene.yaml:24: captures: holds no captures");
 }
 
-TEST(CaptureSetRefusals, NameALineThatGoesNowhere) {
+TEST(ReadCaptureSet, RejectsDriveWithoutLength) {
   EXPECT_EQ(refusal_with("to_m: [0.5, 0.4]", "to_m: [-0.3, 0]"),
             "scene.yaml:27: captures[2].drive: has no length");
 }
 
-TEST(CaptureSetRefusals, NameMoreCapturesThanAnyoneTakes) {
+TEST(ReadCaptureSet, RejectsTooManyCaptures) {
   EXPECT_EQ(refusal_with("speed_m_per_s: 0.5", "speed_m_per_s: 1.0e-6"),
             "scene.yaml:27: captures[2].drive: makes more than 1000000 captures");
   EXPECT_EQ(refusal_with("repeat: 3", "repeat: 1000000"),
             "scene.yaml:25: captures[0]: makes more than 1000000 captures");
 }
 
-TEST(CaptureSetRefusals, NameAFolderThatIsNoPlainName) {
+TEST(ReadCaptureSet, RejectsInvalidFolderName) {
   for (const std::string name : {"../spots", "..", ".", "a/b", "/tmp", "''", "a.b", "a b", "ä"}) {
     EXPECT_EQ(refusal_with("folder: spots", "folder: " + name),
               "scene.yaml:25: captures[0].folder: should be a name of letters, digits, - and _");
@@ -126,12 +126,12 @@ TEST(CaptureSetRefusals, NameAFolderThatIsNoPlainName) {
   EXPECT_EQ(refusal_with("folder: spots", "folder: Spots-2_b"), "");
 }
 
-TEST(CaptureSetRefusals, NameTheFolderThatStandsTwice) {
+TEST(ReadCaptureSet, RejectsRepeatedFolder) {
   EXPECT_EQ(refusal_with("folder: line", "folder: spots"),
             "scene.yaml:27: captures[2]: folder 'spots' stands twice");
 }
 
-TEST(CaptureSetRefusals, AskForWhatIsToBeCaptured) {
+TEST(ReadCaptureSet, RejectsSetWithoutItsLampsOrBoard) {
   EXPECT_EQ(scene_refusal(without_board()),
             "scene.yaml:21: captures[3]: views are of a board, and the scene has none");
   std::string dark = kSceneYaml;

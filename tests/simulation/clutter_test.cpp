@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Lights that are no lamps, and things in the way.
+/// Lights other than lamps, and occluders.
 #include <gtest/gtest.h>
 
 #include <numbers>
@@ -12,9 +12,9 @@ namespace vlp {
 namespace {
 
 /// A level pinhole camera of f = 500 px, 1.5 m below the lamp: 1 cm is 3.33 px.
-class ClutterTest : public testing::Test {
+class FrameRendererClutter : public testing::Test {
  protected:
-  ClutterTest() { scene_.camera = pinhole_camera(); }
+  FrameRendererClutter() { scene_.camera = pinhole_camera(); }
 
   cv::Mat1f rendered(double duty = 1) {
     const FrameRenderer renderer(scene_);
@@ -29,7 +29,7 @@ class ClutterTest : public testing::Test {
   Scene scene_ = plain_scene();
 };
 
-TEST_F(ClutterTest, AmbientLightIsEverywhere) {
+TEST_F(FrameRendererClutter, AmbientLightCoversWholeImage) {
   scene_.lamps.clear();
   scene_.ambient_e_per_s = 2e7;
   const cv::Mat1f image = rendered();
@@ -39,7 +39,7 @@ TEST_F(ClutterTest, AmbientLightIsEverywhere) {
   EXPECT_NEAR(most, 1000, 1e-2);
 }
 
-TEST_F(ClutterTest, VignettingIsThePowerOfTheCosine) {
+TEST_F(FrameRendererClutter, VignettingIsPowerOfCosine) {
   scene_.lamps.clear();
   scene_.ambient_e_per_s = 2e7;
   scene_.optics.vignetting_power = 4;
@@ -50,7 +50,7 @@ TEST_F(ClutterTest, VignettingIsThePowerOfTheCosine) {
   }
 }
 
-TEST_F(ClutterTest, AWindowIsARectangleOfItsRadiance) {
+TEST_F(FrameRendererClutter, WindowIsRectangleOfItsRadiance) {
   scene_.lamps.clear();
   scene_.ambient_e_per_s = 1e6;
   scene_.clutter.windows = {{{0.3, 0.1, 1.6}, {0, 0.3, 0}, {0.15, 0, 0}, 5e7}};
@@ -61,7 +61,7 @@ TEST_F(ClutterTest, AWindowIsARectangleOfItsRadiance) {
   EXPECT_NEAR(brightness_of(cv::Mat1f(image - 50)).sum, 5000 * 2450, 5000 * 2450 * 1e-4);
 }
 
-TEST_F(ClutterTest, SteadyLampsHaveNoStripesAndReflectionsTheirLamps) {
+TEST_F(FrameRendererClutter, ReflectionHasStripesOfItsLampAndSteadyLampNone) {
   scene_.clutter.steady_lamps = {{{-0.3, 0, 1.6}, make_disc(0.12), 3e7, 1}};
   scene_.clutter.reflections = {{{{0.3, 0, 1.6}, make_disc(0.12), 2e7, 0}, 0}};
   const cv::Mat1f always = rendered(), switched = rendered(0.5);
@@ -75,13 +75,13 @@ TEST_F(ClutterTest, SteadyLampsHaveNoStripesAndReflectionsTheirLamps) {
   EXPECT_LT(always(300, 517), 250) << "a reflection fades";
 }
 
-TEST_F(ClutterTest, ReflectionsOfRectanglesFadeTowardsTheirSides) {
+TEST_F(FrameRendererClutter, RectangularReflectionFadesTowardsItsSides) {
   const LampShape shape{ShapeKind::rectangle, Eigen::Vector2d(0.12, 0.06), std::numbers::pi / 2};
   const Glow glow{{0.3, 0, 1.6}, shape, 2e7, 0};
   scene_.lamps[0].glow.radiance_e_per_s = 0;
   scene_.clutter.reflections = {{glow, 0}};
   const cv::Mat1f image = rendered();
-  // 20 px wide and 40 px high; of parabolas two thirds are left each way.
+  // 20 px wide and 40 px high; a parabola keeps two thirds along each axis.
   EXPECT_NEAR(brightness_of(image).sum, 800 * 1000 * 4 / 9.0, 1500);
   EXPECT_NEAR(image(299, 499), 1000, 4);
   EXPECT_NEAR(image(299, 504) / image(299, 499), 0.75, 0.06) << "half way to a long side";
@@ -91,7 +91,7 @@ TEST_F(ClutterTest, ReflectionsOfRectanglesFadeTowardsTheirSides) {
   EXPECT_EQ(image(322, 499), 0);
 }
 
-TEST_F(ClutterTest, AnOccluderHidesWhatIsBehindIt) {
+TEST_F(FrameRendererClutter, OccluderHidesLampBehindIt) {
   const double whole = brightness_of(rendered()).sum;
   // From the lamp's middle to the left, half way up.
   scene_.clutter.occluders = {{{-0.2, -0.2, 0.85}, {0.2, 0, 0}, {0, 0.4, 0}, 0}};
@@ -102,7 +102,7 @@ TEST_F(ClutterTest, AnOccluderHidesWhatIsBehindIt) {
   EXPECT_NEAR(in_view(), 0.5, 0.02);
 }
 
-TEST_F(ClutterTest, AnOccluderIsSeenAgainstTheCeiling) {
+TEST_F(FrameRendererClutter, OccluderReplacesCeilingRadiance) {
   scene_.lamps.clear();
   scene_.ambient_e_per_s = 1e7;
   scene_.clutter.occluders = {{{0.1, 0.1, 0.85}, {0.1, 0, 0}, {0, 0.1, 0}, 2e6}};
@@ -111,7 +111,7 @@ TEST_F(ClutterTest, AnOccluderIsSeenAgainstTheCeiling) {
   EXPECT_NEAR(image(200, 500), 500, 1e-3);
 }
 
-TEST_F(ClutterTest, ALampCutByTheImagesEdgeIsPartlyInView) {
+TEST_F(FrameRendererClutter, TrueLampIsPartlyInViewAtImageEdge) {
   scene_.lamps[0].glow.position_m.x() = 1.2;  // 400 px to the right
   EXPECT_NEAR(in_view(), 0.5, 0.02);
   scene_.lamps[0].glow.position_m.x() = 0;

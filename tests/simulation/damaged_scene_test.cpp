@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// A damaged scene is read or refused with an InputError; anything else thrown fails the test.
+/// A damaged scene is read or rejected with an InputError; any other exception fails the test.
 #include <gmock/gmock.h>
 
 #include "simulation/scene_sample.h"
@@ -8,7 +8,8 @@
 namespace vlp {
 namespace {
 
-/// How often a scene is read when it is cut after each `step` bytes and after each line.
+/// Returns how often a scene is read if it is truncated after each `step` bytes and after each
+/// line.
 int times_read_when_cut(const std::string& whole, std::size_t step) {
   const TemporaryFolder folder;
   const auto file = folder.file("scene.yaml", whole);
@@ -24,12 +25,12 @@ int times_read_when_cut(const std::string& whole, std::size_t step) {
   return times_read;
 }
 
-// Nothing in the format tells how many captures there are, or that a picture follows.
-TEST(SceneCutShort, IsASceneOnlyWhenTheCutIsAfterWholeCaptures) {
+// The format does not declare the number of captures or the presence of a picture.
+TEST(ReadScene, AcceptsTruncationOnlyAfterCompleteCaptures) {
   EXPECT_EQ(times_read_when_cut(kSceneYaml, 1), 4);
 }
 
-TEST(SceneCutShort, IsReadOrRefusedWhicheverOfTheDatasets) {
+TEST(ReadScene, HandlesTruncatedScenesOfDatasets) {
   for (const std::string name :
        {"paper-rig", "paper-rig-faulty", "wide", "clutter", "downlights", "recessed", "foreign"}) {
     const std::string whole =
@@ -38,7 +39,7 @@ TEST(SceneCutShort, IsReadOrRefusedWhicheverOfTheDatasets) {
   }
 }
 
-TEST(SceneWithAnotherFigure, IsReadOrRefusedWhicheverItIs) {
+TEST(ReadScene, HandlesAnyReplacedNumber) {
   const TemporaryFolder folder;
   const std::string figure = "0123456789.-+e";
   const auto is_figure = [&](std::size_t at) {

@@ -15,9 +15,9 @@ namespace {
 
 /// A level pinhole camera of f = 500 px, 1.5 m below the lamp, whose rim has a radius of 9 cm:
 /// 1 cm is 3.33 px, and a lit pixel 50,000 electrons.
-class Downlight : public testing::Test {
+class FrameRendererDownlight : public testing::Test {
  protected:
-  Downlight() { scene_.camera = pinhole_camera(); }
+  FrameRendererDownlight() { scene_.camera = pinhole_camera(); }
 
   Glow& glow() { return scene_.lamps[0].glow; }
   cv::Mat1f rendered(const Eigen::Vector3d& eye_m = {0, 0, 0.1}, double duty = 1) const {
@@ -26,7 +26,8 @@ class Downlight : public testing::Test {
     shot.waves[0].duty = duty;
     return renderer.lamp_electrons(shot);
   }
-  /// Where the middle of a pixel is in the rim's plane, from the lamp; from straight below.
+  /// Returns the intersection of a pixel's ray with the rim's plane, from the lamp, for a camera
+  /// straight below.
   static Eigen::Vector2d at_m(int u, int v) {
     return Eigen::Vector2d(u - 399.5, v - 299.5) / 500 * 1.5;
   }
@@ -39,14 +40,14 @@ class Downlight : public testing::Test {
   Scene scene_ = plain_scene();
 };
 
-TEST_F(Downlight, WithWallsAsBrightAsItsSourceIsADisc) {
+TEST_F(FrameRendererDownlight, IsDiscIfWallsEqualSource) {
   const Eigen::Vector3d eye_m(0.21, -0.4, 0.1);
   const cv::Mat1f disc = rendered(eye_m);
   glow().recess = Recess{0.05, 0.03, 1, {}};
   EXPECT_LT(cv::norm(rendered(eye_m), disc, cv::NORM_INF), 1e-6 * kFull) << "rim and all";
 }
 
-TEST_F(Downlight, ShowsItsSourceDepthTimesSlopeFromTheCentreOfTheRim) {
+TEST_F(FrameRendererDownlight, SourceIsOffsetByDepthTimesSlope) {
   glow().recess = Recess{0.05, 0.02, 0, {}};
   const Eigen::Vector3d eye_m(0.31, -0.155, 0.1);
   const Eigen::Vector3d slope(-0.2, 0.1, 0);  // of the ray to the source, 1.55 m above
@@ -60,14 +61,14 @@ TEST_F(Downlight, ShowsItsSourceDepthTimesSlopeFromTheCentreOfTheRim) {
       << "the truth is the rim's centre";
 }
 
-TEST_F(Downlight, IsHalfAsBrightAtItsSourcesDiameter) {
+TEST_F(FrameRendererDownlight, IsHalfAsBrightAtSourceDiameter) {
   glow().recess = Recess{0, 0.06, 0, {}};
   const cv::Mat1f image = rendered({0.0015, 0.0015, 0.1});  // the lamp is at (399, 299)
   EXPECT_NEAR(image(299, 399) / kFull, 1, 1e-6);
   EXPECT_NEAR(image(299, 409) / kFull, 0.5, 1e-6) << "3 cm are 10 px";
 }
 
-TEST_F(Downlight, HasTheBrightnessOfItsEquationAllOverItsInside) {
+TEST_F(FrameRendererDownlight, MatchesRecessEquationInsideRim) {
   glow().recess = Recess{0.06, 0.05, 0.1, DarkSide{0.02, M_PI}};
   const cv::Mat1f image = rendered();
   for (const cv::Point& at : {cv::Point(399, 299), cv::Point(405, 310), cv::Point(375, 299),
@@ -82,7 +83,7 @@ TEST_F(Downlight, HasTheBrightnessOfItsEquationAllOverItsInside) {
   EXPECT_LT(image(299, 373), 0.3 * image(299, 426)) << "dark towards -x";
 }
 
-TEST_F(Downlight, LightsTheCeilingAroundIt) {
+TEST_F(FrameRendererDownlight, HaloMatchesItsEquation) {
   const cv::Mat1f without = rendered();
   glow().halo = Halo{0.02, 0.03};
   const cv::Mat1f image = rendered();
@@ -96,7 +97,7 @@ TEST_F(Downlight, LightsTheCeilingAroundIt) {
   EXPECT_NEAR(reach_m(glow()), 0.09 + 0.24, 1e-12);
 }
 
-TEST_F(Downlight, FlickersWithItsHalo) {
+TEST_F(FrameRendererDownlight, HaloFlickersWithLamp) {
   glow().recess = Recess{0.05, 0.04, 0.1, {}};
   glow().halo = Halo{0.02, 0.03};
   const cv::Mat1f always = rendered(), switched = rendered({0, 0, 0.1}, 0.5);
@@ -111,7 +112,7 @@ TEST_F(Downlight, FlickersWithItsHalo) {
   EXPECT_TRUE(dark && lit);
 }
 
-TEST_F(Downlight, ShowsTheChipsBehindItsDiffuser) {
+TEST_F(FrameRendererDownlight, ChipsMatchTheirEquation) {
   const Eigen::Vector3d eye_m(0.0015, 0.0015, 0.1);  // the lamp is at (399, 299)
   const cv::Mat1f even = rendered(eye_m);
   glow().chips = Chips{0.4, 0.03, 0.015};
@@ -132,7 +133,7 @@ TEST_F(Downlight, ShowsTheChipsBehindItsDiffuser) {
   }
 }
 
-TEST_F(Downlight, HasTheBrightnessOfItsEquationFromAside) {
+TEST_F(FrameRendererDownlight, MatchesRecessEquationInObliqueView) {
   Recess recess{0.06, 0.03, 0.1, {}};
   recess.source_power = 1.5;
   recess.rim_power = 3;
@@ -147,7 +148,7 @@ TEST_F(Downlight, HasTheBrightnessOfItsEquationFromAside) {
       const Eigen::Vector2d pixel =
           projected(glow().position_m + Eigen::Vector3d(x_m, y_m, 0), shot_at(scene_, eye_m, 0));
       const cv::Point at(int(std::lround(pixel.x())), int(std::lround(pixel.y())));
-      // The place that the middle of that pixel shows, from the lamp.
+      // Intersection of that pixel's ray with the rim's plane, from the lamp.
       const Eigen::Vector2d p = at_m(at.x, at.y) + eye_m.head<2>();
       const Eigen::Vector2d s = at_m(at.x, at.y) / 1.5;
       if (p.norm() > kRadiusM - 0.006) continue;
@@ -164,7 +165,7 @@ TEST_F(Downlight, HasTheBrightnessOfItsEquationFromAside) {
   EXPECT_GE(inside, 8);
 }
 
-TEST_F(Downlight, ShowsACrescentWhereItsRimHidesTheSource) {
+TEST_F(FrameRendererDownlight, RendersCrescentWhereRimHidesSource) {
   glow().recess = Recess{0.2, 0.05, 0, {}};
   const Eigen::Vector3d eye_m(0.75, 0, 0.1);  // the source is 0.1 m beyond the rim's centre
   const Eigen::Vector2d rim_px = projected(glow().position_m, shot_at(scene_, eye_m, 0));
@@ -179,7 +180,7 @@ TEST_F(Downlight, ShowsACrescentWhereItsRimHidesTheSource) {
   EXPECT_LT((lamps[0].pixel - rim_px).norm(), 1e-6) << "the truth is the rim's centre";
 }
 
-TEST_F(Downlight, ShowsHotSpotsOfTheirEquation) {
+TEST_F(FrameRendererDownlight, HotSpotsMatchTheirEquation) {
   const Eigen::Vector3d eye_m(0.0015, 0.0015, 0.1);  // the lamp is at (399, 299)
   const cv::Mat1f even = rendered(eye_m);
   glow().hot_spots = {{{0.03, 0}, 0.012, 0.5}, {{-0.03, 0.03}, 0.009, 0.8}};
@@ -192,7 +193,7 @@ TEST_F(Downlight, ShowsHotSpotsOfTheirEquation) {
   EXPECT_EQ(more(435, 299), 0) << "beyond the rim";
 }
 
-TEST(DrawRandomParts, DrawsHotSpotsWithinTheirBoundsByTheSeed) {
+TEST(DrawRandomParts, DrawsSeededHotSpotsWithinBounds) {
   Scene scene = plain_scene();
   scene.lamps.push_back(scene.lamps[0]);
   scene.lamps[1].id = 2;
@@ -219,7 +220,7 @@ TEST(DrawRandomParts, DrawsHotSpotsWithinTheirBoundsByTheSeed) {
   EXPECT_NE(again.lamps[1].glow.hot_spots[0].center_m, spots[0].center_m) << "another seed";
 }
 
-TEST_F(Downlight, MayBeASteadyLampBehindSomething) {
+TEST_F(FrameRendererDownlight, OccluderHidesSteadyDownlight) {
   scene_.lamps[0].glow.radiance_e_per_s = 0;
   scene_.clutter.steady_lamps = {
       {{0, 0, 1.6}, make_disc(0.18), 1e9, 0, Recess{0.05, 0.04, 0.2, {}}, Halo{0.1, 0.02}}};

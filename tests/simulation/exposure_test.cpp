@@ -14,7 +14,7 @@ struct Statistics {
   double mean, variance;
 };
 
-/// Of a flat field with that mean.
+/// Returns mean and variance of an image of a flat field with this mean.
 Statistics measured(const Sensor& sensor, double electrons, std::uint64_t seed = 1) {
   const cv::Mat image = expose(sensor, cv::Mat1f(500, 500, float(electrons)), seed);
   cv::Scalar mean, deviation;
@@ -22,9 +22,9 @@ Statistics measured(const Sensor& sensor, double electrons, std::uint64_t seed =
   return {mean[0], deviation[0] * deviation[0]};
 }
 
-class PhotonTransfer : public testing::TestWithParam<double> {};
+class ExposeNoise : public testing::TestWithParam<double> {};
 
-TEST_P(PhotonTransfer, MeanAndVarianceAreAsSpecified) {
+TEST_P(ExposeNoise, MeanAndVarianceMatchSensorModel) {
   const double electrons = GetParam();
   for (const double read_noise_e : {0.0, 7.0}) {
     const Sensor sensor{16, 2, 100, 1e6, read_noise_e, true, {}};
@@ -37,42 +37,42 @@ TEST_P(PhotonTransfer, MeanAndVarianceAreAsSpecified) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Means, PhotonTransfer,
+INSTANTIATE_TEST_SUITE_P(Means, ExposeNoise,
                          testing::Values(0.05, 0.7, 3, 10, 15.9, 16.1, 40, 300, 10000));
 
-TEST(PhotonTransferCurve, HasTheSlopeOfTheGain) {
+TEST(Expose, PhotonTransferSlopeIsGain) {
   const Sensor sensor{8, 0.02, 4, 13000, 8, true, {}};
   const Statistics low = measured(sensor, 3000), high = measured(sensor, 12000);
   EXPECT_NEAR((high.variance - low.variance) / (high.mean - low.mean) / 0.02, 1, 0.015);
 }
 
-TEST(Exposure, WithoutNoiseIsExact) {
+TEST(Expose, IsExactWithoutNoise) {
   const Sensor sensor{16, 0.5, 10, 60000, 0, false, {}};
   EXPECT_EQ(expose(sensor, cv::Mat1f(1, 1, 1000.0f), 1).at<std::uint16_t>(0, 0), 510);
   const Sensor eight{8, 0.01, 3, 60000, 0, false, {}};
   EXPECT_EQ(expose(eight, cv::Mat1f(1, 1, 1000.0f), 1).at<std::uint8_t>(0, 0), 13);
 }
 
-TEST(Exposure, EndsAtTheFullWellAndAtWhite) {
+TEST(Expose, ClipsAtFullWellAndWhite) {
   const Sensor sensor{16, 1, 0, 5000, 0, false, {}};
   EXPECT_EQ(expose(sensor, cv::Mat1f(1, 1, 9000.0f), 1).at<std::uint16_t>(0, 0), 5000);
   const Sensor narrow{8, 1, 0, 5000, 0, false, {}};
   EXPECT_EQ(expose(narrow, cv::Mat1f(1, 1, 9000.0f), 1).at<std::uint8_t>(0, 0), 255);
 }
 
-TEST(Exposure, SpillsTheShareOfTheChargeAboveTheFullWell) {
+TEST(Expose, BloomSpreadsFractionOfOverflow) {
   cv::Mat1f electrons(101, 101, 0.0f);
   electrons(50, 50) = 15000;
   const Sensor sensor{16, 1, 0, 5000, 0, false, Bloom{0.4, 2}};
   const cv::Mat image = expose(sensor, electrons, 1);
   EXPECT_EQ(image.at<std::uint16_t>(50, 50), 5000);
-  // The Gaussian's own share at the middle, 1 / (2 pi sigma^2), stays in the full pixel.
+  // The central value of the Gaussian, 1 / (2 pi sigma^2), stays in the full pixel.
   EXPECT_NEAR(cv::sum(image)[0] - 5000, 0.4 * 10000 * (1 - 1 / (2 * M_PI * 4)), 60);
   EXPECT_GT(image.at<std::uint16_t>(50, 53), image.at<std::uint16_t>(50, 55));
   EXPECT_EQ(image.at<std::uint16_t>(50, 53), image.at<std::uint16_t>(47, 50));
 }
 
-TEST(Exposure, DependsOnTheSeedAlone) {
+TEST(Expose, DependsOnSeedOnly) {
   const Sensor sensor{16, 1, 100, 60000, 5, true, {}};
   const cv::Mat1f flat(100, 100, 50.0f);
   const cv::Mat one = expose(sensor, flat, 1), again = expose(sensor, flat, 1);
@@ -81,7 +81,7 @@ TEST(Exposure, DependsOnTheSeedAlone) {
   EXPECT_GT(cv::countNonZero(one != other), 9000);
 }
 
-TEST(Exposure, GivesNeighboursNoiseOfTheirOwn) {
+TEST(Expose, NoiseOfNeighborsIsUncorrelated) {
   const Sensor sensor{16, 1, 1000, 60000, 20, true, {}};
   const cv::Mat1f levels(expose(sensor, cv::Mat1f(500, 500, 100.0f), 3));
   const cv::Mat1f noise(levels - 1100);

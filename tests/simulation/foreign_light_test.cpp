@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Lights that flicker and are no lamps, blinds and signs.
+/// Flickering lights other than lamps, blinds and signs.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -14,9 +14,9 @@ namespace vlp {
 namespace {
 
 /// A level pinhole camera of f = 500 px, 1.5 m below the ceiling: 1 cm is 3.33 px, a row 30 us.
-class ForeignLightTest : public testing::Test {
+class FrameRendererForeignLight : public testing::Test {
  protected:
-  ForeignLightTest() {
+  FrameRendererForeignLight() {
     scene_.camera = pinhole_camera();
     scene_.lamps[0].glow.radiance_e_per_s = 0;
   }
@@ -29,7 +29,7 @@ class ForeignLightTest : public testing::Test {
   Scene scene_ = plain_scene();
 };
 
-/// The mean of a function of the time over the exposure of a line, by many samples.
+/// Returns the mean of a function of time over the exposure of a line, by dense sampling.
 template <typename Function>
 double mean_over_line(int line, double exposure_s, const Function& function) {
   constexpr int samples = 2000;
@@ -41,7 +41,7 @@ double mean_over_line(int line, double exposure_s, const Function& function) {
   return sum / samples;
 }
 
-TEST(RectifiedSine, IsTheMeanOfItsEquation) {
+TEST(RectifiedSine, MeanMatchesNumericalIntegral) {
   const RectifiedSine wave{100, 0.4, 0.3};
   const auto mean_until = [&](double end_s) {
     constexpr int samples = 100000;
@@ -57,7 +57,7 @@ TEST(RectifiedSine, IsTheMeanOfItsEquation) {
   }
 }
 
-TEST_F(ForeignLightTest, DimmedByASquareWaveHasItsFrequencyAndDutyInRows) {
+TEST_F(FrameRendererForeignLight, StripesMatchFrequencyDutyAndPhaseOfPwm) {
   // 500 Hz are 66.7 rows; the light is 400 rows high.
   scene_.clutter.foreign_lights = {
       {{{0, 0, 1.6}, make_disc(1.2), 1e9, 1}, SquareWave{500, 0.3, 0}, 0.25}};
@@ -77,7 +77,7 @@ TEST_F(ForeignLightTest, DimmedByASquareWaveHasItsFrequencyAndDutyInRows) {
   EXPECT_NEAR(lit, 0.3, 0.001) << "three periods";
 }
 
-TEST_F(ForeignLightTest, OnTheMainsHasTheBrightnessOfItsEquationInEachRow) {
+TEST_F(FrameRendererForeignLight, RowBrightnessMatchesMainsEquation) {
   scene_.clutter.foreign_lights = {
       {{{0, 0, 1.6}, make_disc(1.2), 1e9, 1}, RectifiedSine{100, 0.6, 0}, 0.2}};
   LampShot long_shot = shot();
@@ -91,13 +91,13 @@ TEST_F(ForeignLightTest, OnTheMainsHasTheBrightnessOfItsEquationInEachRow) {
   }
 }
 
-TEST_F(ForeignLightTest, MayBeARectangle) {
+TEST_F(FrameRendererForeignLight, RendersRectangle) {
   const Glow tube{{0.1, 0, 1.6}, {ShapeKind::rectangle, Eigen::Vector2d(0.9, 0.06)}, 1e9, 1};
   scene_.clutter.foreign_lights = {{tube, RectifiedSine{120, 0, 0}, {}}};
   EXPECT_NEAR(brightness_of(rendered()).sum, 300 * 20 * 5e4, 1e-4 * 300 * 20 * 5e4);
 }
 
-TEST_F(ForeignLightTest, AmbientLightOnTheMainsIsAGradientOverTheRows) {
+TEST_F(FrameRendererForeignLight, AmbientFlickerVariesByRowOnly) {
   scene_.ambient_e_per_s = 2e7;
   scene_.clutter.ambient_flicker = RectifiedSine{100, 0.5, 0};
   scene_.clutter.windows = {{{0.3, 0.1, 1.6}, {0, 0.3, 0}, {0.15, 0, 0}, 5e7}};
@@ -114,7 +114,7 @@ TEST_F(ForeignLightTest, AmbientLightOnTheMainsIsAGradientOverTheRows) {
   EXPECT_NEAR(image(370, 520), 2500, 1e-2) << "daylight does not flicker";
 }
 
-TEST_F(ForeignLightTest, ABlindIsBarsOfItsWindow) {
+TEST_F(FrameRendererForeignLight, BlindRendersBarsOfWindow) {
   // 80 px along x, 100 px along y: ten bars of 5 px along x.
   scene_.ambient_e_per_s = 1e6;
   scene_.clutter.blinds = {{{{0.1, 0.1, 1.6}, {0.24, 0, 0}, {0, 0.3, 0}, 6e7}, 10, 0.5}};
@@ -127,7 +127,7 @@ TEST_F(ForeignLightTest, ABlindIsBarsOfItsWindow) {
   EXPECT_NEAR(brightness_of(cv::Mat1f(image - 50)).sum, 4000 * 2950, 4000 * 2950 * 1e-4);
 }
 
-TEST_F(ForeignLightTest, ASlantedBlindIsBarsAlongItsFirstEdge) {
+TEST_F(FrameRendererForeignLight, SlantedBlindRendersBarsAlongFirstEdge) {
   const double c = std::cos(0.5), s = std::sin(0.5);
   scene_.clutter.blinds = {
       {{{0, 0, 1.6}, {0.3 * c, 0.3 * s, 0}, {-0.3 * s, 0.3 * c, 0}, 6e7}, 3, 0.5}};
@@ -145,7 +145,7 @@ TEST_F(ForeignLightTest, ASlantedBlindIsBarsAlongItsFirstEdge) {
   }
 }
 
-TEST_F(ForeignLightTest, ASignHasLettersOfItsRadianceByTheSeed) {
+TEST_F(FrameRendererForeignLight, SignRendersSeededLettersOfItsRadiance) {
   scene_.ambient_e_per_s = 1e6;
   scene_.clutter.signs = {{{{-0.3, -0.15, 1.6}, {0.6, 0, 0}, {0, 0.3, 0}, 6e7}, 2, 5, {}}};
   draw_random_parts(scene_);
@@ -172,7 +172,7 @@ TEST_F(ForeignLightTest, ASignHasLettersOfItsRadianceByTheSeed) {
   EXPECT_FALSE(same) << "another seed";
 }
 
-TEST_F(ForeignLightTest, IsInTheTruthOfOtherLightsOnly) {
+TEST_F(FrameRendererForeignLight, IsListedInTrueOtherLightsOnly) {
   scene_.clutter.foreign_lights = {
       {{{0.3, 0, 1.6}, make_disc(0.12), 1e9, 1}, SquareWave{500, 0.3, 0}, {}},
       {{{-0.3, 0, 1.6}, make_disc(0.12), 1e9, 1}, RectifiedSine{100, 1, 0}, {}},
@@ -189,7 +189,7 @@ TEST_F(ForeignLightTest, IsInTheTruthOfOtherLightsOnly) {
   EXPECT_EQ(lamp_map_of(scene_, true).lamps.size(), 1U);
 }
 
-TEST_F(ForeignLightTest, IsInATableOfItsOwn) {
+TEST_F(FrameRendererForeignLight, WriteTruthListsItInTrueOtherLightsTable) {
   CaptureSet set{"check", 5e-5, LampShots{}, {}};
   set.lamps->heights_m = {0.1};
   set.lamps->spots_m = {Eigen::Vector2d::Zero()};
@@ -212,7 +212,7 @@ TEST_F(ForeignLightTest, IsInATableOfItsOwn) {
             "0000.png,pwm,,499.500000,299.500000,1\n");
 }
 
-TEST(ShotsOfForeignLights, HaveFreePhasesAndLeaveTheOtherDrawsAsTheyAre) {
+TEST(LampShot, ForeignLightPhasesDoNotChangeOtherRandomValues) {
   Scene scene = plain_scene();
   scene.lamps[0].phase.reset();
   CaptureSet set{"check", 5e-5, LampShots{}, {}};

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Where lamps are rendered, against mrcal's projection of them.
+/// Rendered lamps against mrcal's projection of them.
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -31,16 +31,16 @@ struct Seen {
   friend void PrintTo(const Seen& seen, std::ostream* out) { *out << seen.name; }
 };
 
-class LampCenter : public testing::TestWithParam<Seen> {
+class FrameRendererDisc : public testing::TestWithParam<Seen> {
  protected:
-  LampCenter() {
+  FrameRendererDisc() {
     scene_.camera = GetParam().camera;
     scene_.mount.level_from_camera =
         level_from_inclination({GetParam().tilt_rad, -GetParam().tilt_rad / 2});
     scene_.optics.blur_px = GetParam().blur_px;
   }
 
-  /// From image, blur and quantisation included.
+  /// Returns the image of a capture, with blur and quantization.
   cv::Mat1f image_of(const FrameRenderer& renderer, const LampShot& shot) const {
     const cv::Mat image = expose(scene_.sensor, renderer.lamp_electrons(shot), 1);
     return cv::Mat1f(image);
@@ -55,7 +55,7 @@ class LampCenter : public testing::TestWithParam<Seen> {
     return mrcal.project(rays);
   }
 
-  /// The lamp in all parts of the image, with its blur.
+  /// Returns captures with the lamp in all parts of the image, with its blur.
   std::vector<LampShot> shots(const FrameRenderer& renderer) const {
     std::vector<LampShot> shots;
     for (const double x_m : {-0.7, -0.31, 0.003, 0.45, 0.8}) {
@@ -75,7 +75,7 @@ class LampCenter : public testing::TestWithParam<Seen> {
   Scene scene_ = plain_scene();
 };
 
-TEST_P(LampCenter, OfTheRenderedAreaIsThatOfTheProjectedOutline) {
+TEST_P(FrameRendererDisc, CentroidMatchesProjectedOutline) {
   constexpr int rim_points = 20000;
   const FrameRenderer renderer(scene_);
   const Glow& glow = scene_.lamps[0].glow;
@@ -102,14 +102,14 @@ TEST_P(LampCenter, OfTheRenderedAreaIsThatOfTheProjectedOutline) {
   }
 }
 
-TEST_P(LampCenter, CarriedBackToTheCeilingIsTheLampsPlace) {
+TEST_P(FrameRendererDisc, CentroidOnCeilingMatchesLampPosition) {
   const FrameRenderer renderer(scene_);
   const Eigen::Vector3d lamp_m = scene_.lamps[0].glow.position_m;
   for (const LampShot& shot : shots(renderer)) {
     const Eigen::Vector2d truth = projected(shot, {lamp_m})[0];
     EXPECT_LT((true_lamps(scene_, renderer, shot)[0].pixel - truth).norm(), 1e-6);
 
-    // Each pixel weighs as much as it covers of the ceiling.
+    // The weight of a pixel is the area of the ceiling that it covers.
     const cv::Mat1f image = image_of(renderer, shot);
     const Eigen::Isometry3d world_from_camera = shot.motion.world_from_camera(0);
     const auto ceiling_m = [&](double u, double v) {
@@ -136,7 +136,7 @@ TEST_P(LampCenter, CarriedBackToTheCeilingIsTheLampsPlace) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Lenses, LampCenter,
+INSTANTIATE_TEST_SUITE_P(Lenses, FrameRendererDisc,
                          testing::Values(Seen{paper_rig_camera(), 0, 0, "PaperRig"},
                                          Seen{paper_rig_camera(), 0.03, 0.7, "PaperRigTilted"},
                                          Seen{wide_camera(), 0.05, 0, "Wide"},

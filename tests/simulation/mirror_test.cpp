@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Panes that show lamps as mirrors do.
+/// Panes that reflect lamps.
 #include "simulation/mirror.h"
 
 #include <gtest/gtest.h>
@@ -15,9 +15,9 @@ namespace {
 
 /// A level pinhole camera of f = 500 px, 1.5 m below the lamp: 1 cm is 3.33 px. A vertical pane 0.4
 /// m from both towards x, high enough for the whole image, reflects a fifth.
-class MirrorTest : public testing::Test {
+class FrameRendererMirror : public testing::Test {
  protected:
-  MirrorTest() {
+  FrameRendererMirror() {
     scene_.camera = pinhole_camera();
     scene_.clutter.mirrors = {{{{0.4, -1, 0}, {0, 2, 0}, {0, 0, 1.7}, 0}, 0.2}};
   }
@@ -29,7 +29,7 @@ class MirrorTest : public testing::Test {
     for (SquareWave& wave : shot.waves) wave = {wave.frequency_hz, duty, phase};
     return renderer.lamp_electrons(shot);
   }
-  /// The part of the image that shows the pane.
+  /// Returns the part of the image in which the pane appears.
   static cv::Mat1f behind_pane(const cv::Mat1f& image) {
     cv::Mat1f part = image.clone();
     part.colRange(0, 480) = 0;
@@ -50,7 +50,7 @@ TEST(ReflectionAbout, MovesPointsByTwiceTheirDistance) {
   EXPECT_LT((slanted * Eigen::Vector3d::Zero() - Eigen::Vector3d(1, 1, 0)).norm(), 1e-12);
 }
 
-TEST_F(MirrorTest, ShowsALampAtItsMirroredPlaceByTheReflectance) {
+TEST_F(FrameRendererMirror, ReflectsLampAtMirroredPositionTimesReflectance) {
   // The mirror image of the lamp over the camera is 0.8 m aside: 266.7 px.
   const Brightness lamp = brightness_of(cv::Mat1f(rendered().colRange(0, 480)));
   const Brightness image = brightness_of(behind_pane(rendered()));
@@ -61,7 +61,7 @@ TEST_F(MirrorTest, ShowsALampAtItsMirroredPlaceByTheReflectance) {
   EXPECT_NEAR(rendered()(299, 666), 0.2 * 5e4, 1);
 }
 
-TEST_F(MirrorTest, FlickersInPhaseWithItsLamp) {
+TEST_F(FrameRendererMirror, ReflectionFlickersInPhaseWithLamp) {
   const cv::Mat1f always = rendered(), switched = rendered(0.4, 0.3);
   bool dark = false, lit = false;
   for (int line = 280; line < 320; ++line) {
@@ -73,9 +73,9 @@ TEST_F(MirrorTest, FlickersInPhaseWithItsLamp) {
   EXPECT_TRUE(dark && lit);
 }
 
-TEST_F(MirrorTest, ShowsNothingBesideItsPane) {
-  // The rays to the mirror image cross the pane's plane half way up, at 0.85 m, from y = -4.5 to
-  // 4.5 cm: a pane from y = 0 shows half of it.
+TEST_F(FrameRendererMirror, ReflectsNothingOutsidePane) {
+  // The rays to the mirror image cross the plane of the pane half way up, at 0.85 m, from y = -4.5
+  // to 4.5 cm: a pane from y = 0 reflects half of it.
   pane() = {{0.4, 0, 0}, {0, 1, 0}, {0, 0, 1.7}, 0};
   const Brightness half = brightness_of(behind_pane(rendered()));
   const auto lights = truth();
@@ -89,7 +89,7 @@ TEST_F(MirrorTest, ShowsNothingBesideItsPane) {
   EXPECT_TRUE(truth().empty());
 }
 
-TEST_F(MirrorTest, ShowsNoLampBehindIt) {
+TEST_F(FrameRendererMirror, DoesNotReflectLampBehindPane) {
   // Its mirror image would be before the pane, in line with the upper part of the pane.
   pane() = {{0.4, -1, 0}, {0, 2, 0}, {0, 0, 4}, 0};
   scene_.lamps[0].glow.position_m.x() = 0.6;
@@ -99,11 +99,11 @@ TEST_F(MirrorTest, ShowsNoLampBehindIt) {
   EXPECT_EQ(cv::norm(with, rendered(), cv::NORM_INF), 0);
 }
 
-TEST_F(MirrorTest, MirrorsRecessesWithTheirDarkSides) {
+TEST_F(FrameRendererMirror, ReflectsDarkSideOfRecess) {
   const double dark_azimuth_rad = 0.3;
   scene_.lamps[0].glow.recess = Recess{0.05, 0.04, 0.2, DarkSide{0.02, dark_azimuth_rad}};
   const cv::Mat1f image = behind_pane(rendered());
-  // The same as a lamp 0.8 m aside that is dark on the mirrored side.
+  // Equivalent to a lamp 0.8 m aside with the dark side mirrored.
   scene_.clutter.mirrors.clear();
   scene_.lamps[0].glow.position_m.x() = 0.8;
   scene_.lamps[0].glow.recess->dark_side->azimuth_rad = M_PI - dark_azimuth_rad;
@@ -112,7 +112,7 @@ TEST_F(MirrorTest, MirrorsRecessesWithTheirDarkSides) {
   EXPECT_LT(cv::norm(image, cv::Mat1f(0.2 * moved), cv::NORM_INF), 0.01);
 }
 
-TEST_F(MirrorTest, ShowsTheUpperFacesOfDiscsInTheCeilingAndNoRecess) {
+TEST_F(FrameRendererMirror, CeilingReflectsUpperFaceOfDiscButNotOfRecess) {
   // A glossy ceiling 20 cm above the lamp: its mirror image is at 1.8 + 0.2 m, 1.9 m above.
   scene_.clutter.mirrors = {{{{-1, -1, 1.8}, {2, 0, 0}, {0, 2, 0}, 0}, 0.2}};
   scene_.lamps[0].glow.position_m.x() = 0.5;
@@ -125,7 +125,7 @@ TEST_F(MirrorTest, ShowsTheUpperFacesOfDiscsInTheCeilingAndNoRecess) {
   EXPECT_EQ(rendered()(299, int(std::lround(u_px)) - 10), 0);
 }
 
-TEST_F(MirrorTest, IsInTheTruthOfOtherLightsOnly) {
+TEST_F(FrameRendererMirror, MirrorImageIsListedInTrueOtherLightsOnly) {
   const auto lights = truth();
   ASSERT_EQ(lights.size(), 1U);
   EXPECT_EQ(lights[0].kind, OtherLightKind::mirror_image);

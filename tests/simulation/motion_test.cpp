@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Lamps and boards that move while the shutter reads.
+/// Lamps and boards that move during the readout.
 #include <gtest/gtest.h>
 
 #include "geometry/angles.h"
@@ -10,7 +10,7 @@
 namespace vlp {
 namespace {
 
-/// The centroid of each line from first on.
+/// Returns the centroid of each line, beginning with `first`.
 std::vector<double> middles(const cv::Mat1f& image, int first, int count) {
   std::vector<double> middles;
   for (int line = first; line < first + count; ++line) {
@@ -31,7 +31,7 @@ double slope_of(const std::vector<double>& values) {
   return moment / square;
 }
 
-TEST(MotionSkew, IsRowTimeTimesSpeed) {
+TEST(FrameRendererMotion, SkewMatchesRowTimeTimesSpeed) {
   Scene scene = plain_scene();
   scene.camera = pinhole_camera();
   scene.lamps[0].glow.shape = make_disc(0.3);  // 100 px
@@ -40,13 +40,13 @@ TEST(MotionSkew, IsRowTimeTimesSpeed) {
   ASSERT_NEAR(slope_of(middles(renderer.lamp_electrons(shot), 260, 80)), 0, 1e-6);
   for (const double speed_m_per_s : {0.04, 1.0, -3.0}) {
     shot.motion.velocity_m_per_s = {speed_m_per_s, 0};
-    // The lamp goes the other way, by f / H = 500 / 1.5 pixels a metre.
+    // The lamp moves in the opposite direction, by f / H = 500 / 1.5 pixels per meter.
     const double expected = -speed_m_per_s * 3e-5 * 500 / 1.5;
     EXPECT_NEAR(slope_of(middles(renderer.lamp_electrons(shot), 260, 80)) / expected, 1, 0.01);
   }
 }
 
-TEST(MotionSkew, OfATurningCameraIsRowTimeTimesTurnRate) {
+TEST(FrameRendererMotion, SkewMatchesRowTimeTimesYawRate) {
   Scene scene = plain_scene();
   scene.camera = pinhole_camera();
   scene.lamps[0].glow.shape = make_disc(0.3);
@@ -70,7 +70,7 @@ TEST(MotionSkew, OfATurningCameraIsRowTimeTimesTurnRate) {
   EXPECT_NEAR(slope_of(at) / expected, 1, 0.01);
 }
 
-TEST(Motion, MovesTheTrueCentreAsTheImage) {
+TEST(FrameRendererMotion, TrueLampMovesWithRenderedLamp) {
   Scene scene = plain_scene();
   scene.lamps[0].glow.shape = make_disc(0.1);
   const FrameRenderer renderer(scene);
@@ -88,21 +88,22 @@ TEST(Motion, MovesTheTrueCentreAsTheImage) {
   }
 }
 
-TEST(Motion, LosesNoLightOfATurningLamp) {
+TEST(FrameRendererMotion, KeepsTotalLightUnderRotation) {
   Scene scene = plain_scene();
   scene.camera = pinhole_camera();
   scene.lamps[0].glow.position_m = {0.55, 0, 1.6};  // 183 px from the middle
   const FrameRenderer renderer(scene);
   LampShot shot = shot_at(scene, {0, 0, 0.1}, 0.33);
   const double at_rest = brightness_of(renderer.lamp_electrons(shot)).sum;
-  // A whole turn: where the lamp moves with the lines they see more of it, where against them less.
+  // Full rotation: lines are lit longer where the lamp moves with the readout, shorter where it
+  // moves against it.
   shot.motion.turn_rate_rad_per_s = rad_from_deg(720);
   shot.exposure_s = 0.5;
   const double smeared = brightness_of(renderer.lamp_electrons(shot)).sum;
   EXPECT_NEAR(smeared / at_rest, 0.5 / 5e-5, 0.5 / 5e-5 * 3e-3);
 }
 
-TEST(ExposureSmear, FollowsAFullTurn) {
+TEST(FrameRendererMotion, SmearIsUniformOverFullRotation) {
   Scene scene = plain_scene();
   scene.camera = pinhole_camera();
   scene.lamps[0].glow.position_m = {0.5, 0, 1.6};
@@ -117,7 +118,7 @@ TEST(ExposureSmear, FollowsAFullTurn) {
   }
 }
 
-TEST(ExposureSmear, SpreadsALampAlongItsMotion) {
+TEST(FrameRendererMotion, SmearVarianceMatchesDisplacement) {
   Scene scene = plain_scene();
   scene.camera = pinhole_camera();
   LampShot shot = shot_at(scene, {0, 0, 0.1}, 0);
@@ -141,7 +142,7 @@ TEST(ExposureSmear, SpreadsALampAlongItsMotion) {
   EXPECT_NEAR(variance() - at_rest, 100.0 / 12 + 0.0009 * 900 / 4, 0.03);
 }
 
-TEST(ExposureSmear, OfABoardKeepsItsLight) {
+TEST(FrameRendererMotion, KeepsTotalLightOfMovingBoard) {
   Scene scene = plain_scene();
   scene.board = plain_board();
   scene.board->surround_e_per_s = 0;

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// What an output of vlp-simulate says that it was made from.
+/// Provenance that vlp-simulate writes into its output.
 #include <gmock/gmock.h>
 
 #include "simulation/board_pdf.h"
@@ -11,25 +11,25 @@
 namespace vlp {
 namespace {
 
-TEST(Origin, IsTheSceneBelowItsProgram) {
+TEST(MakeProvenance, PrependsProgramAndReplacesSeed) {
   const TemporaryFolder folder;
   const auto scene = folder.file("scene.yaml", "format: vlp-scene/1\nseed: 1  # any\nlamps: []\n");
   const std::string same = origin_of(scene, {}, "vlp-simulate", "0.1.0");
   EXPECT_EQ(same, "# vlp-simulate 0.1.0\nformat: vlp-scene/1\nseed: 1  # any\nlamps: []\n");
-  // That of an output is that of its scene.
+  // The provenance of an output is that of its scene.
   const auto output = folder.file("output.yaml", same);
   EXPECT_EQ(origin_of(output, 7, "vlp-simulate", "0.2.0"),
             "# vlp-simulate 0.2.0\nformat: vlp-scene/1\nseed: 7\nlamps: []\n");
 }
 
-TEST(Origin, NeedsALineOfTheSeed) {
+TEST(MakeProvenance, RejectsSeedWithoutLineOfItsOwn) {
   const TemporaryFolder folder;
   const auto scene = folder.file("scene.yaml", "{format: vlp-scene/1, seed: 1}\n");
   EXPECT_THAT(refusal_of([&] { origin_of(scene, 7, "vlp-simulate", "0.1.0"); }),
               testing::HasSubstr("--seed needs the scene's seed on a line of its own"));
 }
 
-TEST(Paper, IsKnownByItsName) {
+TEST(FindPageSize, ReturnsPageSizeOrThrowsForUnknownName) {
   EXPECT_EQ(paper_named("A3").size_m.x(), 0.297);
   EXPECT_EQ(refusal_of<std::invalid_argument>([] { paper_named("B5"); }),
             "there is no paper 'B5', only A4, A3, A2, A1, A0, Letter");

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// What a camera makes of the levels of its sensor.
+/// In-camera processing of the sensor's levels.
 #include "simulation/picture.h"
 
 #include <gtest/gtest.h>
@@ -16,7 +16,7 @@ namespace {
 
 const Sensor kSensor{8, 0.5, 0, 60000, 0, false, {}};
 
-/// So many electrons on the left and on the right of column 20.
+/// Returns electrons with one value to the left of column 20 and another from there on.
 cv::Mat1f step(double left, double right) {
   cv::Mat1f electrons(20, 40, float(left));
   electrons.colRange(20, 40) = right;
@@ -25,13 +25,13 @@ cv::Mat1f step(double left, double right) {
 
 bool same(const cv::Mat& a, const cv::Mat& b) { return cv::norm(a, b, cv::NORM_INF) == 0; }
 
-TEST(ToneCurve, OfAStepRaisesItsSharesOfWhiteToOneByGamma) {
+TEST(Expose, AppliesToneCurveToStep) {
   const cv::Mat image = expose(kSensor, step(20, 200), 1, Picture{2.2, {}, {}});
   EXPECT_EQ(image.at<std::uint8_t>(10, 19), std::lround(255 * std::pow(10 / 255.0, 1 / 2.2)));
   EXPECT_EQ(image.at<std::uint8_t>(10, 20), std::lround(255 * std::pow(100 / 255.0, 1 / 2.2)));
 }
 
-TEST(ToneCurve, BeginsAtTheBlackLevelAndEndsAtWhite) {
+TEST(ApplyToneCurve, MapsBlackLevelToZeroAndClipsAtWhite) {
   Sensor sensor = kSensor;
   sensor.black_level_dn = 15;
   const Picture picture{2, {}, {}};
@@ -43,7 +43,7 @@ TEST(ToneCurve, BeginsAtTheBlackLevelAndEndsAtWhite) {
   EXPECT_EQ(coded_level(picture, sensor, 65535), 65535);
 }
 
-TEST(ToneCurve, OfGammaOneIsNone) {
+TEST(Expose, IsUnchangedByGammaOne) {
   const Sensor noisy{16, 0.5, 0, 60000, 0, true, {}};
   const cv::Mat1f electrons = step(300, 3000);
   EXPECT_TRUE(same(expose(noisy, electrons, 1, Picture{1, {}, {}}), expose(noisy, electrons, 1)));
@@ -51,18 +51,18 @@ TEST(ToneCurve, OfGammaOneIsNone) {
 
 const Picture kBayer{1, {}, {}, Bayer{0.5, 0.25}};
 
-TEST(Bayer, OfAnEvenLightIsGrey) {
+TEST(ExposeBayer, ReturnsGrayForUniformLight) {
   const cv::Mat image = expose(kSensor, cv::Mat1f(20, 40, 200), 1, kBayer);
   ASSERT_EQ(image.type(), CV_8UC3);
   EXPECT_TRUE(same(image, cv::Mat(image.size(), CV_8UC3, cv::Scalar::all(100))));
 }
 
-TEST(Bayer, ShowsAPixelInTheColourOfItsFilter) {
+TEST(ExposeBayer, LitPixelAppearsInColorOfItsFilter) {
   struct Lit {
     int line, place, colour;
     float electrons;
   };
-  // Half and a quarter of the light pass red and blue filters.
+  // Red filters pass half of the light, blue ones a quarter.
   for (const auto& [line, place, colour, electrons] :
        {Lit{10, 20, 2, 80.F}, {10, 21, 1, 80.F}, {11, 20, 1, 80.F}, {11, 21, 0, 80.F}}) {
     cv::Mat1f light(20, 40, 0.F);
@@ -79,7 +79,7 @@ TEST(Bayer, ShowsAPixelInTheColourOfItsFilter) {
   }
 }
 
-TEST(Bayer, KeepsAPlane) {
+TEST(ExposeBayer, ReproducesLinearGradient) {
   cv::Mat1f light(20, 40);
   for (int line = 0; line < light.rows; ++line) {
     for (int place = 0; place < light.cols; ++place) {
@@ -98,12 +98,13 @@ TEST(Bayer, KeepsAPlane) {
   }
 }
 
-TEST(Sharpening, OvershootsAStepAsAnUnsharpMask) {
+TEST(Develop, OvershootsStepLikeUnsharpMask) {
   const double amount = 0.8, radius_px = 1.5, low = 50, high = 100;
   const Picture picture{1, Sharpening{amount, radius_px}, {}};
   cv::Mat1f levels = step(low, high);
   develop(picture, kSensor, levels);
-  // Beside the edge the blur has (1 + g) / 2 of the step, with g its kernel's largest weight.
+  // Next to the edge the blurred image has (1 + g) / 2 of the step, with g the kernel's largest
+  // weight.
   double sum = 0;
   for (int i = -6; i <= 6; ++i) sum += std::exp(-i * i / (2 * radius_px * radius_px));
   const double overshoot = amount * (high - low) * (1 - 1 / sum) / 2;
@@ -113,7 +114,7 @@ TEST(Sharpening, OvershootsAStepAsAnUnsharpMask) {
   EXPECT_NEAR(levels(10, 39), high, 1e-3);
 }
 
-TEST(Sharpening, ComesAfterTheToneCurveAndBeforeRounding) {
+TEST(Expose, SharpensAfterToneCurveAndBeforeRounding) {
   const Picture curve{2, {}, {}}, both{2, Sharpening{1, 1}, {}};
   const double low = coded_level(curve, kSensor, 10), high = coded_level(curve, kSensor, 100);
   const cv::Mat image = expose(kSensor, step(20, 200), 1, both);
@@ -125,7 +126,7 @@ TEST(Sharpening, ComesAfterTheToneCurveAndBeforeRounding) {
   }
 }
 
-TEST(PictureFile, IsAPngWithoutLossUnlessItIsAJpeg) {
+TEST(EncodeImage, ReturnsLosslessPngWithoutJpegQuality) {
   const Sensor noisy{8, 0.5, 5, 60000, 8, true, {}};
   const cv::Mat image = expose(noisy, step(50, 400), 1);
   for (const auto& picture : {std::optional<Picture>(), std::optional<Picture>({2.2, {}, {}})}) {
@@ -134,7 +135,7 @@ TEST(PictureFile, IsAPngWithoutLossUnlessItIsAJpeg) {
   }
 }
 
-TEST(PictureFile, IsAJpegOfItsQuality) {
+TEST(EncodeImage, ReturnsJpegOfGivenQuality) {
   const Sensor noisy{8, 0.5, 5, 60000, 8, true, {}};
   const cv::Mat image = expose(noisy, step(50, 400), 1);
   const Picture coarse{1, {}, 30}, fine{1, {}, 95};
@@ -153,7 +154,7 @@ TEST(PictureFile, IsAJpegOfItsQuality) {
   EXPECT_LT(loss, 0.5 * coarse_loss);
 }
 
-TEST(PictureFile, IsNamedByItsKind) {
+TEST(LampShot, ImageNameHasExtensionOfPictureFormat) {
   Scene scene = plain_scene();
   const LampShots captures{{0}, {{0, 0}}, {}, {0}, 0, 0, 1, 0.5, false};
   const CaptureSet set{"one", 5e-5, captures, {}};

@@ -10,27 +10,28 @@
 
 namespace vlp {
 
-/// A scene with nothing that blurs, weakens or disturbs: one lamp of even brightness that is always
-/// on, seen by a level camera. Tests add what they are about.
+/// Returns a scene without blur, vignetting and noise: one uniformly bright lamp that is always on,
+/// above a level camera. Tests add the properties they need.
 Scene plain_scene();
 
-/// The lenses of the scenes in datasets, and a stereographic one.
+/// Return the lenses of the scenes in datasets, and a stereographic one.
 Camera paper_rig_camera();
 Camera wide_camera();
 Camera stereographic_camera();
-/// No distortion, f = 500 px, the centre in the middle.
+/// Returns a camera without distortion, f = 500 px, the principal point at the image center.
 Camera pinhole_camera();
 
-/// The camera at rest; the lamps of the scene are lit from time 0 with phase 0.
+/// Returns a capture of the camera at rest. The lamps of the scene are lit from time 0 with phase
+/// 0.
 LampShot shot_at(const Scene& scene, const Eigen::Vector3d& position_m, double yaw_rad);
 
-/// A board of 6 x 5 tags with gaps as wide as a tag, white 1e6 and black 0 e/s on white.
+/// Returns a board of 6 x 5 tags with gaps as wide as a tag, white 1e6 and black 0 e/s on white.
 SceneBoard plain_board();
-/// So many views of the scene's board.
+/// Returns a set with `count` views of the scene's board.
 CaptureSet board_views(int count, double distance_m, double tilt_rad, double roll_rad,
                        double spread);
 
-/// The sum of the light, and its centroid (u, v), over all pixels.
+/// Sum of the light and its centroid (u, v), over all pixels.
 struct Brightness {
   double sum;
   Eigen::Vector2d centroid_px;

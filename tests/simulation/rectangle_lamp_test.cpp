@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Where panels and tubes are rendered, against mrcal's projection of them.
+/// Rendered panels and tubes against mrcal's projection of them.
 #include <gtest/gtest.h>
 
 #include <string>
@@ -14,10 +14,10 @@
 namespace vlp {
 namespace {
 
-/// A panel and a tube, turned, and what a camera that leans by two degrees sees of each.
-class RectangleLamp : public testing::TestWithParam<LampShape> {
+/// Rotated panel and tube, with a camera tilted by two degrees.
+class FrameRendererRectangle : public testing::TestWithParam<LampShape> {
  protected:
-  RectangleLamp() {
+  FrameRendererRectangle() {
     scene_.mount.level_from_camera = level_from_inclination({rad_from_deg(2), rad_from_deg(-1)});
     scene_.lamps[0].glow.shape = GetParam();
   }
@@ -34,11 +34,11 @@ class RectangleLamp : public testing::TestWithParam<LampShape> {
   Scene scene_ = plain_scene();
 };
 
-TEST_P(RectangleLamp, CoversWhatItsProjectedSidesEnclose) {
+TEST_P(FrameRendererRectangle, CoversProjectedOutline) {
   constexpr int per_side = 4000;
   const FrameRenderer renderer(scene_);
   const Glow& glow = scene_.lamps[0].glow;
-  // Written out, not taken from what the renderer uses.
+  // Computed independently of the renderer.
   const Eigen::Vector2d size_m = *GetParam().size_m;  // Clang 14 captures no binding
   const double yaw_rad = GetParam().yaw_rad;
   const Eigen::Vector3d along(std::cos(yaw_rad), std::sin(yaw_rad), 0);
@@ -90,7 +90,7 @@ TEST_P(RectangleLamp, CoversWhatItsProjectedSidesEnclose) {
   }
 }
 
-TEST_P(RectangleLamp, HasTheImageOfItsCentreForATruth) {
+TEST_P(FrameRendererRectangle, TrueLampIsImageOfCenter) {
   const FrameRenderer renderer(scene_);
   const LampShot shot = shot_at(scene_, {0.35, -0.2, 0.1}, 0.4);
   const auto truth = true_lamps(scene_, renderer, shot);
@@ -100,7 +100,7 @@ TEST_P(RectangleLamp, HasTheImageOfItsCentreForATruth) {
   EXPECT_LT((truth[0].pixel - center).norm(), 1e-6);
 }
 
-TEST_P(RectangleLamp, IsPartlyInViewWhereTheImageEnds) {
+TEST_P(FrameRendererRectangle, TrueLampIsPartlyInViewAtImageEdge) {
   const FrameRenderer renderer(scene_);
   const LampShot shot = shot_at(scene_, {1.2, 0, 0.1}, 0);
   const auto truth = true_lamps(scene_, renderer, shot);
@@ -110,7 +110,7 @@ TEST_P(RectangleLamp, IsPartlyInViewWhereTheImageEnds) {
 }
 
 INSTANTIATE_TEST_SUITE_P(
-    Shapes, RectangleLamp,
+    Shapes, FrameRendererRectangle,
     testing::Values(LampShape{ShapeKind::rectangle, Eigen::Vector2d(0.5, 0.4), 0.3},
                     LampShape{ShapeKind::rectangle, Eigen::Vector2d(0.7, 0.08), -0.6}),
     [](const auto& instance) { return instance.index == 0 ? "Panel" : "Tube"; });

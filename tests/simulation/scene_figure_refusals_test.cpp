@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Scenes of the right shape with figures that cannot be.
+/// Scenes with valid structure and invalid values.
 #include <gmock/gmock.h>
 
 #include "simulation/scene_sample.h"
@@ -8,7 +8,7 @@
 namespace vlp {
 namespace {
 
-TEST(SceneFigures, AskForTheUnitOfARadiance) {
+TEST(ReadScene, RejectsRadianceOutOfRange) {
   const std::string range =
       " electrons per second is not within 0 and 1.0e+12 electrons per second: is it in the right "
       "unit?";
@@ -30,7 +30,7 @@ TEST(SceneFigures, AskForTheUnitOfARadiance) {
             "scene.yaml:22: board.black_e_per_s: -2" + range);
 }
 
-TEST(SceneFigures, OfTheSensorAreChecked) {
+TEST(ReadScene, RejectsInvalidSensor) {
   EXPECT_EQ(refusal_with("bits: 8", "bits: 12"), "scene.yaml:6: sensor.bits: should be 8 or 16");
   EXPECT_EQ(refusal_with("bits: 8", "bits: 32"),
             "scene.yaml:6: sensor.bits: should be a whole number within 8 and 16, not '32'");
@@ -52,7 +52,7 @@ TEST(SceneFigures, OfTheSensorAreChecked) {
             "charge): is it in the right unit?");
 }
 
-TEST(SceneFigures, OfTheMountAndTheLensAreChecked) {
+TEST(ReadScene, RejectsInvalidMountOrLens) {
   EXPECT_EQ(refusal_with("tilt_deg: 2,", "tilt_deg: 100,"),
             "scene.yaml:7: mount.tilt_deg: 100 degrees is not within 0 and 45 degrees: is it in "
             "the right unit?");
@@ -64,12 +64,12 @@ TEST(SceneFigures, OfTheMountAndTheLensAreChecked) {
             "positive");
 }
 
-TEST(SceneFigures, OfAnImagerThatIsTooLargeAreRefused) {
+TEST(ReadScene, RejectsTooLargeImager) {
   EXPECT_EQ(refusal_with("imager_px: [160, 120]", "imager_px: [20000, 20000]"),
             "scene.yaml:4: camera.imager_px: has more than 64 million pixels");
 }
 
-TEST(SceneFigures, OfLightsKeepThemInTheRoomAndAboveTheCamera) {
+TEST(ReadScene, RejectsLightOutsideRoomOrBelowCamera) {
   EXPECT_EQ(refusal_with("[-0.6, -0.3, 1.6]", "[-0.6, -0.3, 16]"),
             "scene.yaml:10: lamps[0].position_m: is outside the room");
   EXPECT_EQ(refusal_with("position_m: [0.3, 0, 1.6]", "position_m: [3, 0, 1.6]"),
@@ -88,7 +88,7 @@ TEST(SceneFigures, OfLightsKeepThemInTheRoomAndAboveTheCamera) {
             "scene.yaml:24: captures[0].heights_m[1]: a reflection is not above the camera");
 }
 
-TEST(SceneFigures, OfTheLampsAreChecked) {
+TEST(ReadScene, RejectsInvalidLamp) {
   EXPECT_EQ(refusal_with("id: 5,", "id: 1,"), "scene.yaml:11: lamps[1]: id 1 stands twice");
   EXPECT_EQ(refusal_with("[0.6, 0.2, 1.5]", "[-0.6, -0.3, 1.6]"),
             "scene.yaml:11: lamps[1]: lamp 5 is where lamp 1 is");
@@ -99,7 +99,7 @@ TEST(SceneFigures, OfTheLampsAreChecked) {
             "scene.yaml:11: lamps[1].map_error_m: should be 3 numbers, not 2");
 }
 
-TEST(SceneFigures, OfARecessAndAHaloAreChecked) {
+TEST(ReadScene, RejectsInvalidRecessOrHalo) {
   const std::string recess = "scene.yaml:13: clutter.steady_lamps[1].recess.";
   const std::string unit = ": is it in the right unit?";
   EXPECT_EQ(refusal_with("depth_m: 0.07", "depth_m: -0.07"),
@@ -123,7 +123,7 @@ TEST(SceneFigures, OfARecessAndAHaloAreChecked) {
             "scene.yaml:11: lamps[1].halo.length_m: 0 m is not within 0.001 and 2 m" + unit);
 }
 
-TEST(SceneFigures, OfColourFiltersAreChecked) {
+TEST(ReadScene, RejectsInvalidColorFilters) {
   const auto with = [](const std::string& shares) {
     return refusal_with("jpeg_quality: 90}", "jpeg_quality: 90, bayer: {" + shares + "}}");
   };
@@ -134,7 +134,7 @@ TEST(SceneFigures, OfColourFiltersAreChecked) {
   EXPECT_THAT(with("red_share: 0.6"), testing::HasSubstr("blue_share"));
 }
 
-TEST(SceneFigures, OfChipsAreChecked) {
+TEST(ReadScene, RejectsInvalidChips) {
   const auto with = [](const std::string& chips) {
     return refusal_with("edge_share: 0.8}", "edge_share: 0.8, chips: {" + chips + "}}");
   };
@@ -150,7 +150,7 @@ TEST(SceneFigures, OfChipsAreChecked) {
             chips + "width_m: is more than twice pitch_m: such chips are an even disc");
 }
 
-TEST(SceneFigures, OfRandomChipsAreChecked) {
+TEST(ReadScene, RejectsInvalidRandomChips) {
   const auto with = [](const std::string& keys) {
     return refusal_with("edge_share: 0.8}", "edge_share: 0.8, " + keys + "}");
   };
@@ -169,7 +169,7 @@ TEST(SceneFigures, OfRandomChipsAreChecked) {
             chips + ": stands beside chips: a disc has one of them");
 }
 
-TEST(SceneFigures, OfARecessFromAsideAreChecked) {
+TEST(ReadScene, RejectsInvalidRecessExponents) {
   const auto with = [](const std::string& keys) {
     return refusal_with("depth_m: 0.07,", "depth_m: 0.07, " + keys + ",");
   };
@@ -178,7 +178,7 @@ TEST(SceneFigures, OfARecessFromAsideAreChecked) {
   EXPECT_THAT(with("beam_power: -1"), testing::HasSubstr("recess.beam_power: -1"));
 }
 
-TEST(SceneFigures, OfForeignLightsAreChecked) {
+TEST(ReadScene, RejectsInvalidForeignLight) {
   const auto with = [](const std::string& keys) {
     return refusal_with(
         "clutter:\n", "clutter:\n  foreign_lights: [{position_m: [0, 0.2, 1.6], " + keys + "}]\n");
@@ -199,7 +199,7 @@ TEST(SceneFigures, OfForeignLightsAreChecked) {
               testing::StartsWith(place + ".mains.depth: 1.3"));
 }
 
-TEST(SceneFigures, OfMirrorsBlindsAndSignsAreChecked) {
+TEST(ReadScene, RejectsInvalidMirrorBlindOrSign) {
   const auto with = [](const std::string& line) {
     return refusal_with("clutter:\n", "clutter:\n  " + line + "\n");
   };
@@ -219,7 +219,7 @@ TEST(SceneFigures, OfMirrorsBlindsAndSignsAreChecked) {
   EXPECT_THAT(with("ambient_flicker: {depth: 0.3}"), testing::HasSubstr("frequency_hz"));
 }
 
-TEST(SceneFigures, OfARectangleAreThoseOfTheLampMap) {
+TEST(ReadScene, RectangleLampTakesKeysOfLampMapOnly) {
   const std::string disc =
       "diameter_m: 0.18, frequency_hz: 1600, duty: 0.4, "
       "radiance_e_per_s: 2.0e+8, edge_share: 0.8}";
@@ -238,13 +238,13 @@ TEST(SceneFigures, OfARectangleAreThoseOfTheLampMap) {
   EXPECT_THAT(with("shape: rectangle, yaw_rad: 0"), testing::HasSubstr("size_m"));
 }
 
-TEST(SceneFigures, OfARecessStandInPlaceOfAnEdgeShare) {
+TEST(ReadScene, RejectsEdgeShareWithRecess) {
   EXPECT_EQ(refusal_with("recess: {", "edge_share: 1, recess: {"),
             "scene.yaml:13: clutter.steady_lamps[1]: key 'edge_share' is unknown here; the keys "
             "are: position_m, shape, diameter_m, size_m, yaw_rad, radiance_e_per_s, recess, halo");
 }
 
-TEST(SceneFigures, OfThePictureAreChecked) {
+TEST(ReadScene, RejectsInvalidPicture) {
   const std::string gamma = "scene.yaml:29: picture.gamma: ";
   EXPECT_EQ(refusal_with("gamma: 2.2", "gamma: 0"),
             gamma +
@@ -269,7 +269,7 @@ TEST(SceneFigures, OfThePictureAreChecked) {
             "scene.yaml:29: picture: needs levels between sensor.black_level_dn and white");
 }
 
-TEST(SceneFigures, OfAWindowOrOccluderMakeARectangle) {
+TEST(ReadScene, RejectsPanelThatIsNoRectangle) {
   const std::string problem = "should be at right angles to each other and not of length zero";
   EXPECT_EQ(refusal_with("[0, 0.3, 0]", "[0.01, 0.3, 0]"),
             "scene.yaml:14: clutter.windows[0].edges_m: " + problem);
@@ -282,7 +282,7 @@ TEST(SceneFigures, OfAWindowOrOccluderMakeARectangle) {
             "along each edge");
 }
 
-TEST(SceneFigures, OfAnOccluderKeepItBelowEveryLight) {
+TEST(ReadScene, RejectsOccluderNotBelowEveryLight) {
   const std::string problem =
       "scene.yaml:16: clutter.occluders[0]: is not below every lamp and other light";
   EXPECT_EQ(refusal_with("[-0.7, -0.2, 1.4]", "[-0.7, -0.2, 1.49]"), "");
@@ -294,7 +294,7 @@ TEST(SceneFigures, OfAnOccluderKeepItBelowEveryLight) {
   EXPECT_EQ(refusal_with("[0, 0.3, 0]", "[0, 0, -0.3]"), problem) << "the window";
 }
 
-TEST(SceneFigures, OfAReflectionNameALampThatIsThere) {
+TEST(ReadScene, RejectsReflectionOfUnknownLamp) {
   EXPECT_EQ(refusal_with("of_lamp: 5", "of_lamp: 2"),
             "scene.yaml:15: clutter.reflections[0].of_lamp: there is no lamp 2");
   EXPECT_EQ(refusal_with("of_lamp: 5", "of_lamp: -5"),
@@ -302,7 +302,7 @@ TEST(SceneFigures, OfAReflectionNameALampThatIsThere) {
             "2147483647, not '-5'");
 }
 
-TEST(SceneFigures, OfAReflectionAreThoseOfItsShape) {
+TEST(ReadScene, RejectsReflectionSizeOfOtherShape) {
   const std::string place = "scene.yaml:15: clutter.reflections[0]";
   EXPECT_EQ(refusal_with("diameter_m: 0.22", "shape: rectangle, size_m: [0.6, 0.1]"), "");
   EXPECT_EQ(refusal_with("diameter_m: 0.22", "size_m: [0.6, 0.1]"),
@@ -311,7 +311,7 @@ TEST(SceneFigures, OfAReflectionAreThoseOfItsShape) {
             place + ".diameter_m: is of a disc, and this is a rectangle: it has a size_m");
 }
 
-TEST(SceneFigures, OfSteadyLampsAndBoardsAreChecked) {
+TEST(ReadScene, RejectsInvalidSteadyLampOrBoard) {
   EXPECT_EQ(refusal_with("diameter_m: 0.12", "diameter_m: 120"),
             "scene.yaml:13: clutter.steady_lamps[0].diameter_m: 120 m is not within 0.001 and 10 "
             "m: is it in the right unit?");

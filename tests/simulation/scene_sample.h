@@ -10,18 +10,18 @@
 
 namespace vlp {
 
-/// A scene with every key there is. Tests count on its lines.
+/// Scene that contains every key. Tests depend on its line numbers.
 extern const std::string kSceneYaml;
 
-/// kSceneYaml with the first `from` replaced; throws when there is none.
+/// Returns kSceneYaml with the first `from` replaced; throws if there is none.
 std::string scene_with(const std::string& from, const std::string& to);
 
 Scene scene_of(const std::string& yaml);
 
-/// The message with which a scene is refused, as of scene.yaml in no folder; "" when it is not.
+/// Returns the error message for a scene, as from scene.yaml in no folder; "" if it is valid.
 std::string scene_refusal(const std::string& yaml);
 
-/// That of scene_with(from, to).
+/// Returns the error message for scene_with(from, to).
 std::string refusal_with(const std::string& from, const std::string& to);
 
 }  // namespace vlp

@@ -19,7 +19,7 @@ using testing::Pointwise;
 
 constexpr double kRounding = 1e-12;
 
-TEST(Scene, HasTheCameraAndItsSensor) {
+TEST(ReadScene, ReadsCameraAndSensor) {
   const Scene scene = scene_of(kSceneYaml);
   EXPECT_EQ(scene.seed, 7U);
   EXPECT_EQ(scene.camera.id, "small");
@@ -40,14 +40,14 @@ TEST(Scene, HasTheCameraAndItsSensor) {
   EXPECT_EQ(scene.sensor.bloom->sigma_px, 2.5);
 }
 
-TEST(Scene, HasAMountInRadians) {
+TEST(ReadScene, ConvertsMountToRadians) {
   const Mount mount = scene_of(kSceneYaml).mount;
   EXPECT_THAT(mount.level_from_camera,
               IsNear(level_from_zenith({0, std::tan(rad_from_deg(2)), 1}), kRounding));
   EXPECT_EQ(mount.lever_arm_m, Vector2d(0.03, -0.04));
 }
 
-TEST(Scene, HasTheLampsInTheirOrder) {
+TEST(ReadScene, ReadsLampsInOrderOfFile) {
   const Scene scene = scene_of(kSceneYaml);
   ASSERT_EQ(scene.lamps.size(), 2U);
   EXPECT_EQ(scene.ambient_e_per_s, 1e6);
@@ -66,7 +66,7 @@ TEST(Scene, HasTheLampsInTheirOrder) {
   EXPECT_EQ(lamp.map_error_m, Vector3d(0.001, 0.002, 0.003));
 }
 
-TEST(Scene, HasTheClutterAndTheBoard) {
+TEST(ReadScene, ReadsClutterAndBoard) {
   const Scene scene = scene_of(kSceneYaml);
   const Clutter& clutter = scene.clutter;
   EXPECT_EQ(clutter.steady_lamps.at(0).edge_share, 0.7);
@@ -83,7 +83,7 @@ TEST(Scene, HasTheClutterAndTheBoard) {
   EXPECT_EQ(scene.board->surround_e_per_s, 6e5);
 }
 
-TEST(Scene, HasReflectionsOfRectangles) {
+TEST(ReadScene, ReadsReflectionOfRectangle) {
   const Scene scene = scene_of(
       scene_with("diameter_m: 0.22", "shape: rectangle, size_m: [0.6, 0.1], yaw_rad: 0.2"));
   const Glow& glow = scene.clutter.reflections.at(0).glow;
@@ -93,7 +93,7 @@ TEST(Scene, HasReflectionsOfRectangles) {
   EXPECT_EQ(glow.edge_share, 0) << "it fades towards its sides";
 }
 
-TEST(Scene, HasRecessesAndHalos) {
+TEST(ReadScene, ReadsRecessesAndHalos) {
   const Scene scene = scene_of(kSceneYaml);
   EXPECT_FALSE(scene.lamps[0].glow.recess);
   EXPECT_FALSE(scene.lamps[0].glow.halo);
@@ -107,7 +107,7 @@ TEST(Scene, HasRecessesAndHalos) {
   EXPECT_NEAR(recess.dark_side->azimuth_rad, std::numbers::pi / 2, kRounding);
 }
 
-TEST(Scene, HasAPicture) {
+TEST(ReadScene, ReadsPicture) {
   const Picture picture = scene_of(kSceneYaml).picture.value();
   EXPECT_EQ(picture.gamma, 2.2);
   EXPECT_EQ(picture.sharpening->amount, 0.6);
@@ -116,7 +116,7 @@ TEST(Scene, HasAPicture) {
   EXPECT_FALSE(scene_of(scene_with("picture: ", "# ")).picture);
 }
 
-TEST(Scene, HasTheSpotsInTheOrderOfTheFile) {
+TEST(ReadScene, ReadsSpotsInOrderOfFile) {
   const CaptureSet set = scene_of(kSceneYaml).sets.at(0);
   EXPECT_EQ(set.folder, "spots");
   EXPECT_EQ(set.exposure_s, 5e-5);
@@ -132,7 +132,7 @@ TEST(Scene, HasTheSpotsInTheOrderOfTheFile) {
   EXPECT_EQ(shots_in(set), 2U * 2 * 2 * 3);
 }
 
-TEST(Scene, GoesThroughAGridRowByRowFromItsFirstCorner) {
+TEST(ReadScene, OrdersGridRowByRowFromFirstCorner) {
   const LampShots captures = *scene_of(kSceneYaml).sets.at(1).lamps;
   const std::vector<Vector2d> expected{{-0.6, 0.3},  {0, 0.3},  {0.6, 0.3},
                                        {-0.6, -0.3}, {0, -0.3}, {0.6, -0.3}};
@@ -149,7 +149,7 @@ TEST(Scene, GoesThroughAGridRowByRowFromItsFirstCorner) {
   EXPECT_FALSE(captures.known);
 }
 
-TEST(Scene, HasThePlacesAlongALineUpToItsEnd) {
+TEST(ReadScene, ComputesPositionsAlongDriveUpToItsEnd) {
   const LampShots captures = *scene_of(kSceneYaml).sets.at(2).lamps;
   EXPECT_EQ(captures.drive->speed_m_per_s, 0.5);
   // 0.894 m in steps of 0.125 m.
@@ -164,7 +164,7 @@ TEST(Scene, HasThePlacesAlongALineUpToItsEnd) {
               IsNear(Vector2d(0.7, 0), kRounding));
 }
 
-TEST(Scene, HasViewsOfTheBoard) {
+TEST(ReadScene, ReadsBoardViews) {
   const CaptureSet set = scene_of(kSceneYaml).sets.at(3);
   EXPECT_FALSE(set.lamps);
   EXPECT_EQ(shots_in(set), 5U);
@@ -175,7 +175,7 @@ TEST(Scene, HasViewsOfTheBoard) {
   EXPECT_EQ(set.board->velocity_m_per_s, Vector3d(0.1, 0, 0.2));
 }
 
-TEST(Scene, HasForeignLightsMirrorsBlindsAndSigns) {
+TEST(ReadScene, ReadsForeignLightsMirrorsBlindsAndSigns) {
   const std::string panel = "corner_m: [0.9, 0.1, 1.5], edges_m: [[0, 0.3, 0], [0, 0, 0.2]], ";
   const Clutter clutter =
       scene_of(
@@ -226,7 +226,7 @@ TEST(Scene, HasForeignLightsMirrorsBlindsAndSigns) {
   EXPECT_EQ(clutter.ambient_flicker->depth, 0.6);
 }
 
-TEST(Scene, HasRandomChipsAndRecessesFromAside) {
+TEST(ReadScene, ReadsRandomChipsAndRecessExponents) {
   const Scene chips = scene_of(scene_with(
       "edge_share: 0.8}",
       "edge_share: 0.8, random_chips: {count: 7, sigma_fraction: 0.12, within_fraction: 0.75, "
@@ -246,7 +246,7 @@ TEST(Scene, HasRandomChipsAndRecessesFromAside) {
   EXPECT_EQ(read.far_side_slope, 0.06);
 }
 
-TEST(ScenesOfTheDatasets, AreReadAndHaveASample) {
+TEST(ReadScene, ReadsScenesOfDatasets) {
   for (const std::string name :
        {"paper-rig", "paper-rig-faulty", "wide", "clutter", "downlights", "recessed", "foreign"}) {
     SCOPED_TRACE(name);

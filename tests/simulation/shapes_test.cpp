@@ -11,7 +11,7 @@
 namespace vlp {
 namespace {
 
-/// The integral over a triangle, by its edges.
+/// Returns the integral over a triangle from its edges.
 template <typename Shape>
 double integral_over(const Shape& shape, const std::array<Eigen::Vector2d, 3>& triangle) {
   double sum = 0;
@@ -21,7 +21,7 @@ double integral_over(const Shape& shape, const std::array<Eigen::Vector2d, 3>& t
   return sum;
 }
 
-/// The same from many points of the triangle.
+/// Returns the integral over a triangle from many sample points.
 template <typename Value>
 double sampled_integral(const Value& value, const std::array<Eigen::Vector2d, 3>& triangle) {
   constexpr int side = 1500;
@@ -46,7 +46,7 @@ std::array<Eigen::Vector2d, 3> random_triangle(Random& random, double reach) {
   return triangle;
 }
 
-TEST(Disc, IntegratesToItsWholeOverAnythingThatHoldsIt) {
+TEST(Disc, IntegralOverEnclosingTriangleIsTotal) {
   const std::array<Eigen::Vector2d, 3> triangle{{{-5, -4}, {7, -3}, {0, 9}}};
   EXPECT_NEAR(integral_over(Disc({1, 1}, 1), triangle), std::numbers::pi, 1e-12);
   // 1 - fall r^2 over the unit disc: pi (1 - fall / 2)
@@ -60,7 +60,7 @@ constexpr int kTriangles = 4;
 constexpr int kTriangles = 20;
 #endif
 
-TEST(Disc, IntegratesOverAnyTriangle) {
+TEST(Disc, IntegralOverRandomTriangleMatchesSampling) {
   Random random(1);
   const double edge_share = 0.3;
   const Disc disc({1, 1}, edge_share);
@@ -76,11 +76,11 @@ TEST(Disc, IntegratesOverAnyTriangle) {
   }
 }
 
-TEST(Disc, IsNothingElsewhere) {
+TEST(Disc, IntegralOutsideIsZero) {
   EXPECT_NEAR(integral_over(Disc({1, 1}, 1), {{{2, 0}, {3, 0}, {2, 50}}}), 0, 1e-14);
 }
 
-TEST(Mosaic, IntegratesOverAnyTriangle) {
+TEST(Mosaic, IntegralOverRandomTriangleMatchesSampling) {
   const Mosaic mosaic({{-1, -0.8, -0.4, 0, 7},  // covered by the next
                        {-1, -0.8, -0.4, 0, 2},
                        {-0.4, 0, 0.9, 0.7, -1},
@@ -97,7 +97,7 @@ TEST(Mosaic, IntegratesOverAnyTriangle) {
   }
 }
 
-TEST(Mosaic, IntegratesExactlyAlongItsLines) {
+TEST(Mosaic, IntegralIsExactAlongItsLines) {
   const Mosaic square({{0, 0, 2, 3, 0.5}});
   EXPECT_DOUBLE_EQ(integral_over(square, {{{0, 0}, {2, 0}, {2, 3}}}), 1.5);
   EXPECT_DOUBLE_EQ(integral_over(square, {{{2, 3}, {0, 3}, {0, 0}}}), 1.5);

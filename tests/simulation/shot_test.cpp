@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Captures as a scene plans them.
+/// Planned captures of a scene.
 #include "simulation/shot.h"
 
 #include <gmock/gmock.h>
@@ -19,7 +19,7 @@ CaptureSet turning() {
   return {"turning", 5e-5, captures, {}};
 }
 
-TEST(LampShots, GoThroughRepeatsThenYawsThenSpotsThenHeights) {
+TEST(LampShot, IteratesRepeatsThenYawsThenSpotsThenHeights) {
   const Scene scene = plain_scene();
   const CaptureSet set = turning();
   ASSERT_EQ(shots_in(set), 2 * 2 * 3 * 2);
@@ -37,7 +37,7 @@ TEST(LampShots, GoThroughRepeatsThenYawsThenSpotsThenHeights) {
   EXPECT_EQ(lamp_shot(scene, set, 7).image, "0007.png");
 }
 
-TEST(LampShots, DependOnSeedFolderAndIndexAlone) {
+TEST(LampShot, DependsOnSeedFolderAndIndexOnly) {
   Scene scene = plain_scene();
   CaptureSet set = turning();
   std::set<double> yaws{lamp_shot(scene, set, 3).motion.yaw_rad};
@@ -50,7 +50,7 @@ TEST(LampShots, DependOnSeedFolderAndIndexAlone) {
   EXPECT_EQ(yaws.size(), 4);
 }
 
-TEST(LampShots, KeepThePhaseOfALampThatHasOneAndLetOthersRun) {
+TEST(LampShot, KeepsGivenPhaseAndDrawsMissingOnes) {
   Scene scene = plain_scene();
   scene.lamps[0].frequency_hz = 1000.5;
   scene.lamps[0].phase = 0.25;
@@ -64,7 +64,7 @@ TEST(LampShots, KeepThePhaseOfALampThatHasOneAndLetOthersRun) {
   EXPECT_GT(*phases.rbegin(), 0.7);
 }
 
-TEST(LampShots, MoveAlongALineAtItsSpeed) {
+TEST(LampShot, MovesAlongDriveAtItsSpeed) {
   const Scene scene = plain_scene();
   CaptureSet set = turning();
   set.lamps->drive = StraightDrive{{0, 0}, {0.3, 0.4}, 0.1};
@@ -73,7 +73,7 @@ TEST(LampShots, MoveAlongALineAtItsSpeed) {
   EXPECT_TRUE((after.position_m - before.position_m).isApprox(Eigen::Vector3d(0.12, 0.16, 0)));
 }
 
-TEST(LampShots, OfADriveAreWhereTheCaptureBeforeGoes) {
+TEST(LampShot, ContinuesMotionOfPreviousCaptureOnDrive) {
   const Scene scene = plain_scene();
   const StraightDrive drive{{0, 0}, {0.3, 0.4}, 0.1};
   LampShots captures{{0, 0.3}, {}, drive, {0, 2}, 0, 0.4, 2, 0.5, false};
@@ -92,7 +92,7 @@ TEST(LampShots, OfADriveAreWhereTheCaptureBeforeGoes) {
   EXPECT_EQ(lamp_shot(scene, set, 44).motion.axis_m, Eigen::Vector3d(0, 0, 0.3));
 }
 
-TEST(CarrierMotion, TurnsTheCameraAboutTheAxis) {
+TEST(BaseMotion, PoseRotatesCameraAboutAxis) {
   const Mount mount{Eigen::Matrix3d::Identity(), {0.1, 0}};
   const CarrierMotion motion{{1, 2, 0.5}, {0, 0}, 0, rad_from_deg(90), mount};
   EXPECT_TRUE(motion.pose(0).position_m.isApprox(Eigen::Vector3d(1.1, 2, 0.5)));
@@ -100,7 +100,7 @@ TEST(CarrierMotion, TurnsTheCameraAboutTheAxis) {
   EXPECT_NEAR(motion.pose(1).yaw_rad, rad_from_deg(90), 1e-15);
 }
 
-TEST(BoardShots, StayWithinTheLimitsOfTheirViews) {
+TEST(BoardShot, StaysWithinLimitsOfViews) {
   Scene scene = plain_scene();
   scene.board = plain_board();
   CaptureSet set = board_views(300, 0, rad_from_deg(40), rad_from_deg(30), 0.5);
@@ -129,7 +129,7 @@ TEST(BoardShots, StayWithinTheLimitsOfTheirViews) {
 }
 
 // A circle of 353 px in an image of 800 x 600, whose corners have no ray.
-TEST(BoardShots, GoToTheLastRayOfALensThatDoesNotFillTheImage) {
+TEST(BoardShot, UsesLastRayWhereLensHasNone) {
   Scene scene = plain_scene();
   scene.camera = {
       "fisheye", {800, 600}, LensModel::fisheye, {290, 290, 399.5, 299.5, -0.1, 0, 0, 0},
@@ -152,7 +152,7 @@ TEST(BoardShots, GoToTheLastRayOfALensThatDoesNotFillTheImage) {
   EXPECT_LT(at_the_rim, 0.27 * 300);
 }
 
-TEST(CarrierMotion, LeansTheCameraAndVibrates) {
+TEST(BaseMotion, AddsRollPitchAndVibration) {
   const Mount mount{Eigen::Matrix3d::Identity(), {0.1, 0}};
   CarrierMotion motion{{1, 2, 0.5}, {0.5, 0}, 0.3, 0.2, mount};
   EXPECT_TRUE(motion.is_level());
@@ -171,7 +171,7 @@ TEST(CarrierMotion, LeansTheCameraAndVibrates) {
   EXPECT_NEAR(motion.inclination(0.01).pitch_rad, -0.1, 1e-15);
 }
 
-TEST(CarrierMotion, VelocityOfTheCameraIsThatOfItsPlace) {
+TEST(BaseMotion, CameraVelocityMatchesDerivativeOfPose) {
   const CarrierMotion motion{
       {1, 2, 0.5}, {0.5, -1}, 0.3, 0.7, {Eigen::Matrix3d::Identity(), {0.1, 0.2}}};
   constexpr double step_s = 1e-6;

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Stripes of switched lamps: period, duty and contrast as the theory has them.
+/// Stripes of switched lamps: period, duty cycle and contrast against theory.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -11,7 +11,8 @@
 namespace vlp {
 namespace {
 
-/// The lit share of each line that crosses a large lamp: switched / always on, along the middle.
+/// Returns the lit fraction of each line that crosses a large lamp: switched / always on, along the
+/// middle.
 std::vector<double> lit_lines(Scene scene, double frequency_hz, double duty, double exposure_s) {
   scene.camera = pinhole_camera();
   scene.lamps[0].glow.shape = make_disc(1.2);
@@ -29,7 +30,7 @@ std::vector<double> lit_lines(Scene scene, double frequency_hz, double duty, dou
   return lit;
 }
 
-/// Where the lit share rises through one half.
+/// Returns the positions at which the lit fraction rises through one half.
 std::vector<double> rises_of(const std::vector<double>& lit) {
   std::vector<double> rises;
   for (std::size_t i = 1; i < lit.size(); ++i) {
@@ -44,9 +45,9 @@ struct Wave {
   double frequency_hz, duty;
 };
 
-class Stripes : public testing::TestWithParam<Wave> {};
+class FrameRendererStripes : public testing::TestWithParam<Wave> {};
 
-TEST_P(Stripes, HaveThePeriodAndDutyOfTheWave) {
+TEST_P(FrameRendererStripes, PeriodAndDutyMatchWave) {
   const auto [frequency_hz, duty] = GetParam();
   const auto lit = lit_lines(plain_scene(), frequency_hz, duty, 2e-5);
   const auto rises = rises_of(lit);
@@ -55,7 +56,7 @@ TEST_P(Stripes, HaveThePeriodAndDutyOfTheWave) {
   const double expected = 1 / (frequency_hz * 3e-5);
   EXPECT_NEAR(period / expected, 1, 0.01);
 
-  // Lines between the first rise and the last, those at the ends by their share.
+  // Lines between the first and the last rise; those at the ends by their fraction.
   double sum = 0;
   for (std::size_t i = 0; i < lit.size(); ++i) {
     const double inside =
@@ -65,18 +66,19 @@ TEST_P(Stripes, HaveThePeriodAndDutyOfTheWave) {
   EXPECT_NEAR(sum / (rises.back() - rises.front()) / duty, 1, 0.01);
 }
 
-INSTANTIATE_TEST_SUITE_P(Waves, Stripes,
+INSTANTIATE_TEST_SUITE_P(Waves, FrameRendererStripes,
                          testing::Values(Wave{1000, 0.5}, Wave{1600, 0.3}, Wave{2500, 0.5},
                                          Wave{3100, 0.7}, Wave{4700, 0.5}),
                          [](const auto& instance) {
                            return std::to_string(int(instance.param.frequency_hz)) + "Hz";
                          });
 
-TEST(StripeContrast, FallsWithTheExposureAsASinc) {
+TEST(FrameRenderer, StripeContrastIsSincOfExposure) {
   const double frequency_hz = 2500;
   const auto amplitude = [&](double exposure_s) {
     const auto lit = lit_lines(plain_scene(), frequency_hz, 0.5, exposure_s);
-    // The wave's fundamental, over whole periods: 380 lines hold 28.5 of 13.33; 360 hold 27.
+    // Fundamental of the wave over whole periods: 380 lines contain 28.5 periods of 13.33; 360
+    // contain 27.
     double re = 0, im = 0;
     for (int i = 0; i < 360; ++i) {
       const double angle = 2 * std::numbers::pi * frequency_hz * 3e-5 * i;
@@ -94,7 +96,7 @@ TEST(StripeContrast, FallsWithTheExposureAsASinc) {
   }
 }
 
-TEST(StripeTiming, IsThatOfTheLinesExposure) {
+TEST(FrameRenderer, StripesMatchExposureTimeOfEachLine) {
   // At 1 kHz half a period is 16.67 lines; the middle line's exposure is centred at time 0.
   Scene scene = plain_scene();
   scene.camera = pinhole_camera();
@@ -116,7 +118,7 @@ TEST(StripeTiming, IsThatOfTheLinesExposure) {
   }
 }
 
-TEST(StripeDirection, IsAlongTheReadOut) {
+TEST(FrameRenderer, StripesFollowReadoutDirection) {
   Scene scene = plain_scene();
   scene.camera.readout = Readout::columns;
   scene.lamps[0].duty = 0.5;

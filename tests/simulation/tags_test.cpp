@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Rendered boards as libapriltag reads them.
+/// Rendered boards as detected by libapriltag.
 #include <apriltag/apriltag.h>
 #include <apriltag/tag36h11.h>
 #include <apriltag/tagStandard41h12.h>
@@ -19,7 +19,7 @@ namespace {
 
 using Corners = std::map<std::pair<int, int>, Eigen::Vector2d>;
 
-/// Tag and corner in libapriltag's order, with the centre of the top left pixel at (0, 0).
+/// Tag and corner in libapriltag's order, with the center of the top left pixel at (0, 0).
 Corners detected(cv::Mat image, apriltag_family_t* family) {
   apriltag_detector_t* detector = apriltag_detector_create();
   detector->quad_decimate = 1;
@@ -56,9 +56,9 @@ void expect_all_read(const Scene& scene, apriltag_family_t* family) {
   }
 }
 
-class Tags : public testing::Test {
+class FrameRendererTags : public testing::Test {
  protected:
-  Tags() {
+  FrameRendererTags() {
     scene_.board = plain_board();
     scene_.sensor = {8, 0.2, 5, 60000, 0, false, {}};
     scene_.optics.blur_px = 0.5;
@@ -66,14 +66,14 @@ class Tags : public testing::Test {
   Scene scene_ = plain_scene();
 };
 
-TEST_F(Tags, OfPlainBoardsAreReadWhereTheyAre) {
+TEST_F(FrameRendererTags, PlainTagsAreDetectedAtTrueCorners) {
   scene_.board->print.id_order = {true, BoardCorner::bottom_right};
   apriltag_family_t* family = tag36h11_create();
   expect_all_read(scene_, family);
   tag36h11_destroy(family);
 }
 
-TEST_F(Tags, WithBitsOutsideTheirBorderAreReadWhereTheyAre) {
+TEST_F(FrameRendererTags, TagsWithOuterBitsAreDetectedAtTrueCorners) {
   scene_.board->print.family = "tagStandard41h12";
   scene_.board->print.first_id = 100;
   apriltag_family_t* family = tagStandard41h12_create();
@@ -81,7 +81,7 @@ TEST_F(Tags, WithBitsOutsideTheirBorderAreReadWhereTheyAre) {
   tagStandard41h12_destroy(family);
 }
 
-TEST(TagPattern, HasASecondBlackRingWhenTheBorderHasTwoBits) {
+TEST(TagPattern, HasSecondBlackRingForTwoBorderBits) {
   const TagPattern plain = tag_pattern("tag36h11", 17, 1), wide = tag_pattern("tag36h11", 17, 2);
   ASSERT_EQ(plain.width(), 8);
   ASSERT_EQ(wide.width(), 10);
@@ -94,7 +94,7 @@ TEST(TagPattern, HasASecondBlackRingWhenTheBorderHasTwoBits) {
   }
 }
 
-TEST(TagPattern, IsRefusedWhenTheFamilyDoesNotHaveIt) {
+TEST(TagPattern, ThrowsForUnknownIdOrBorder) {
   EXPECT_THROW(tag_pattern("tag36h11", 587, 1), std::invalid_argument);
   EXPECT_NO_THROW(tag_pattern("tag36h11", 586, 1));
   EXPECT_THROW(tag_pattern("tag36h11", -1, 1), std::invalid_argument);

@@ -18,7 +18,7 @@ using testing::HasSubstr;
 using testing::Not;
 using testing::StartsWith;
 
-/// What libpq takes where a connection string says nothing.
+/// Defaults of libpq for missing parts of a connection string.
 struct IdentityOfDatabase : testing::Test {
   IdentityOfDatabase() {
     for (const char* name : {"PGHOST", "PGHOSTADDR", "PGPORT", "PGDATABASE", "PGSERVICE"}) {
@@ -33,12 +33,12 @@ struct IdentityOfDatabase : testing::Test {
   std::string here;
 };
 
-TEST_F(IdentityOfDatabase, OfAFileHasMachineAndWholePath) {
+TEST_F(IdentityOfDatabase, ReturnsMachineAndAbsolutePathForFile) {
   EXPECT_EQ(identity_of_database("/var/lib/vlp/records.db"), here + "/var/lib/vlp/records.db");
   EXPECT_EQ(identity_of_database("/var/lib/../lib/records.db"), here + "/var/lib/records.db");
 }
 
-TEST_F(IdentityOfDatabase, TellsServersApart) {
+TEST_F(IdentityOfDatabase, DiffersBetweenServers) {
   const auto of = [](const std::string& where) { return identity_of_database(where); };
   EXPECT_EQ(of("postgresql://u@db/vlp"), "postgresql://db/vlp");
   EXPECT_EQ(of("postgres://other:secret@db:5432/vlp?connect_timeout=2"), of("postgresql://db/vlp"));
@@ -53,8 +53,8 @@ TEST_F(IdentityOfDatabase, TellsServersApart) {
   EXPECT_EQ(of("postgresql://db"), of("postgresql://db/vlp"));
 }
 
-/// Two machines that share a folder have each a server of their own.
-TEST_F(IdentityOfDatabase, OfAServerWithoutANetworkHasTheMachine) {
+/// Two machines that share a folder, each with its own server.
+TEST_F(IdentityOfDatabase, IncludesMachineForLocalServer) {
   for (const char* where :
        {"postgresql:///vlp", "postgresql://localhost/vlp", "postgresql://127.0.0.1:5544/vlp",
         "postgresql:///vlp?host=/run/postgresql", "postgresql://db/vlp?hostaddr=127.0.0.1"}) {
@@ -63,7 +63,7 @@ TEST_F(IdentityOfDatabase, OfAServerWithoutANetworkHasTheMachine) {
   EXPECT_THAT(identity_of_database("postgresql:///vlp?hostaddr=10.0.0.1"), Not(StartsWith(here)));
 }
 
-TEST_F(IdentityOfDatabase, HasNoPassword) {
+TEST_F(IdentityOfDatabase, OmitsPassword) {
   for (const char* where : {"postgresql://u:secret@db", "postgresql://u@db/vlp?password=secret"}) {
     EXPECT_THAT(identity_of_database(where), Not(HasSubstr("secret")));
   }

@@ -38,8 +38,8 @@ inline std::string run_of(int number) {
   return "20261121T13450" + std::to_string(number % 10) + "Z-" + std::to_string(1000 + number);
 }
 
-/// The answer of a database to a client that knows nothing of Records. SQL has a statement to a
-/// line; a line that begins with "\! " is for the shell.
+/// Returns the output of a database client that is independent of Records. `sql` has one statement
+/// per line; lines that begin with "\! " are shell commands.
 inline std::string answer_of(const std::string& where, const std::string& sql) {
   const TemporaryFolder folder;
   const std::string script = folder.file("script.sql", sql).string();

@@ -17,9 +17,9 @@ using testing::AllOf;
 using testing::HasSubstr;
 using testing::SizeIs;
 
-class StationYaml : public testing::Test {
+class ReadStation : public testing::Test {
  protected:
-  StationYaml() {
+  ReadStation() {
     for (const char* name : {"station.yaml", "camera_type.yaml", "board.yaml", "lamps.yaml"}) {
       folder.file(name, TemporaryFolder::content_of(std::filesystem::path(VLP_SOURCE_DIR) /
                                                     "datasets/station" / name));
@@ -37,7 +37,7 @@ class StationYaml : public testing::Test {
   TemporaryFolder folder;
 };
 
-TEST_F(StationYaml, IsReadWithTheFilesThatItNames) {
+TEST_F(ReadStation, ReadsReferencedFiles) {
   const StationConfig config = read_station(folder / "station.yaml");
   EXPECT_EQ(config.station, "station-1");
   EXPECT_EQ(config.type.imager_px[0], 800);
@@ -48,8 +48,8 @@ TEST_F(StationYaml, IsReadWithTheFilesThatItNames) {
   EXPECT_FALSE(config.golden);
 }
 
-/// What stands there behind a '#' is right as it stands.
-TEST_F(StationYaml, ShowsWhatAShiftMayWant) {
+/// The keys commented out with '#' are valid.
+TEST_F(ReadStation, AcceptsOptionalKeysOfExample) {
   folder.file("golden.yaml", TemporaryFolder::content_of(kExample + "calibration.yaml"));
   folder.file(
       "station.yaml",
@@ -70,24 +70,24 @@ TEST_F(StationYaml, ShowsWhatAShiftMayWant) {
   EXPECT_EQ(config.keep.images_days, 90);
 }
 
-TEST_F(StationYaml, RefusesAnUnknownGateWithItsLine) {
+TEST_F(ReadStation, RejectsUnknownGateWithLine) {
   change("station.yaml", "  rms_px: 0.014", "  rms_mm: 0.014");
   EXPECT_THAT(refusal(), AllOf(HasSubstr("station.yaml:"), HasSubstr("rms_mm")));
 }
 
-TEST_F(StationYaml, RefusesWhatNoStationCanMean) {
+TEST_F(ReadStation, RejectsImplausibleValues) {
   change("station.yaml", "\n  coverage: 0.7", "\n  coverage: 7");
   EXPECT_THAT(refusal(), HasSubstr("gates.coverage: should be a share from 0 to 1, not 7"));
   change("station.yaml", "board_coverage: 0.7", "board_coverage: 70");
   EXPECT_THAT(refusal(), HasSubstr("enough.board_coverage"));
 }
 
-TEST_F(StationYaml, RefusesATypeWithoutRowTime) {
+TEST_F(ReadStation, RejectsCameraTypeWithoutRowTime) {
   change("camera_type.yaml", "  row_time_s: 3.0e-05\n", "");
   EXPECT_THAT(refusal(), AllOf(HasSubstr("camera_type"), HasSubstr("row_time_s")));
 }
 
-TEST_F(StationYaml, HasGuardBandsWhereUncertaintiesAreStated) {
+TEST_F(ReadStation, ReadsGuardBands) {
   change("station.yaml", "\nrecords: records.db",
          "\nguard_bands: {k: 1.645, standard_uncertainties: {check_mean_mm: 0.02}}"
          "\nrecords: records.db");
@@ -116,7 +116,7 @@ TEST_F(StationYaml, HasGuardBandsWhereUncertaintiesAreStated) {
               HasSubstr("leaves nothing within the gate"));
 }
 
-TEST_F(StationYaml, HasAHook) {
+TEST_F(ReadStation, ReadsHook) {
   EXPECT_FALSE(read_station(folder / "station.yaml").hook);
   change("station.yaml", "records: records.db",
          "records: records.db\nhook: {command: [./label, --to, it's]}");
@@ -133,7 +133,7 @@ TEST_F(StationYaml, HasAHook) {
   EXPECT_THAT(refusal(), HasSubstr("hook.command: should be a program and its arguments"));
 }
 
-TEST_F(StationYaml, HasAPatternOfSerials) {
+TEST_F(ReadStation, ReadsSerialPattern) {
   StationConfig config = read_station(folder / "station.yaml");
   EXPECT_EQ(serial_problem(config, "anything"), "");
   EXPECT_THAT(serial_problem(config, "a/b"), HasSubstr("a camera's id has letters"));
@@ -147,8 +147,8 @@ TEST_F(StationYaml, HasAPatternOfSerials) {
   EXPECT_THAT(refusal(), HasSubstr("serial_pattern: is no regular expression"));
 }
 
-/// Nested repetitions have exponentially many ways to match.
-TEST(SerialProblem, EndsWhateverThePattern) {
+/// Nested repetitions can match in exponentially many combinations.
+TEST(SerialProblem, LimitsTimeOfPatternMatch) {
   StationConfig config{};
   config.serial_pattern = "(a+)+b";
   EXPECT_EQ(serial_problem(config, "aaab"), "");
@@ -158,7 +158,7 @@ TEST(SerialProblem, EndsWhateverThePattern) {
   EXPECT_EQ(serial_problem(config, std::string(64, 'a')), "");
 }
 
-TEST_F(StationYaml, SaysWhenTheGoldenUnitIsDueAndWhatIsKept) {
+TEST_F(ReadStation, ReadsVerifyDueAndRetention) {
   change("station.yaml", "records: records.db",
          "records: records.db\nkeep: {images_days: 90}\nverify_due: {hours: 24, units: 200}");
   EXPECT_THAT(refusal(), HasSubstr("verify_due: needs a golden unit"));
@@ -182,7 +182,7 @@ TEST_F(StationYaml, SaysWhenTheGoldenUnitIsDueAndWhatIsKept) {
   EXPECT_THAT(refusal(), HasSubstr("keep.images_days"));
 }
 
-TEST_F(StationYaml, RefusesAGoldenUnitWithoutRowTime) {
+TEST_F(ReadStation, RejectsGoldenUnitWithoutRowTime) {
   folder.file("golden.yaml", TemporaryFolder::content_of(kExample + "calibration.yaml"));
   change("station.yaml", "records: records.db",
          "records: records.db\n"
@@ -192,12 +192,12 @@ TEST_F(StationYaml, RefusesAGoldenUnitWithoutRowTime) {
   EXPECT_THAT(refusal(), AllOf(HasSubstr("golden.calibration"), HasSubstr("row_time_s")));
 }
 
-TEST_F(StationYaml, RefusesAnUnknownDatabase) {
+TEST_F(ReadStation, RejectsUnknownDatabase) {
   change("station.yaml", "records: records.db", "records: mysql://server/records");
   EXPECT_THAT(refusal(), AllOf(HasSubstr("records"), HasSubstr("postgresql://")));
 }
 
-TEST_F(StationYaml, HasAnotherDigestWhenAFileThatItNamesChanges) {
+TEST_F(ReadStation, ChangesDigestWithReferencedFiles) {
   const std::string before = read_station(folder / "station.yaml").sha256;
   EXPECT_EQ(read_station(folder / "station.yaml").sha256, before);
   change("lamps.yaml", "-0.32", "-0.33");

@@ -15,7 +15,8 @@
 
 namespace vlp {
 
-/// A camera, or a robot with one, that drives, turns and leans under lamps while its shutter reads.
+/// A camera, or a robot with a camera, that moves and is tilted under lamps while the shutter
+/// reads.
 struct BodyRig {
   LampMap map;
   Calibration calibration;
@@ -30,7 +31,7 @@ struct BodyRig {
   Positioner positioner() const { return {map, calibration, options()}; }
 };
 
-/// The lens of the synthetic rig, read in rows of 55 us.
+/// Returns a calibration with the lens of the synthetic rig, read in rows of 55 us.
 inline Calibration rolling_calibration() {
   Calibration calibration{synthetic_camera(), {}, {}, {}, {}};
   calibration.camera.row_time_s = 55e-6;
@@ -60,15 +61,14 @@ inline Eigen::Isometry3d body_from_camera(const BodyRig& rig) {
   return body_from_camera;
 }
 
-/// When a pixel is read, after the middle row at `start_s`.
+/// Returns the readout time of a pixel, relative to the middle row at `start_s`.
 inline double read_s(const Camera& camera, const Eigen::Vector2d& pixel, double start_s = 0) {
   const bool rows = camera.readout == Readout::rows;
   const double middle = (camera.imager_px[rows ? 1 : 0] - 1) / 2.0;
   return start_s + *camera.row_time_s * ((rows ? pixel.y() : pixel.x()) - middle);
 }
 
-/// Where each lamp is seen, computed forwards: at the time at which its own row is read. Lamps that
-/// the camera does not see in its image are left out.
+/// Projects the lamps at the readout times of their rows. Omits lamps outside the image.
 inline std::vector<Detection> seen_from(const BodyRig& rig, double sigma_px, double start_s = 0) {
   const Camera& camera = rig.calibration.camera;
   const Lens lens(camera.lens_model, camera.intrinsics);
@@ -90,8 +90,8 @@ inline std::vector<Detection> seen_from(const BodyRig& rig, double sigma_px, dou
   return detections;
 }
 
-/// Lamps where the camera of the rig sees them when the image's middle is read, all over the image,
-/// `least_rad` above the horizon or more: at one height of the ceiling, or at many.
+/// Draws lamps all over the image that the camera takes at time 0, at least `least_rad` above the
+/// horizon. The ceiling has one height or many.
 inline LampMap lamps_in_view(const BodyRig& rig, std::size_t count, bool one_height,
                              double least_rad, Random& random) {
   const Camera& camera = rig.calibration.camera;
@@ -106,7 +106,7 @@ inline LampMap lamps_in_view(const BodyRig& rig, std::size_t count, bool one_hei
     if (ray.z() < std::sin(least_rad)) continue;
     const Eigen::Vector3d from_m = world_from_camera.translation();
     const Eigen::Vector3d lamp_m = from_m + ray * ((ceiling_m - from_m.z()) / ray.z());
-    // Far apart in the image, so that they determine what they are to determine.
+    // Far apart in the image, so that they determine the state.
     bool apart = true;
     for (const Eigen::Vector3d& other_m : positions_m) {
       const auto pixel = lens.project(world_from_camera.inverse() * other_m);

@@ -13,7 +13,7 @@
 
 namespace vlp {
 
-/// Starts a child that does `action` and ends, with 1 when it throws; returns its process id.
+/// Starts a child process that runs `action` and exits, with 1 if it throws. Returns its id.
 template <typename Action>
 pid_t start_child(Action action) {
   const pid_t child = ::fork();
@@ -29,28 +29,28 @@ pid_t start_child(Action action) {
   ::_exit(0);
 }
 
-/// Waits until a child has ended; how, 0 when it did well.
+/// Waits until a child has ended. Returns its status; 0 for success.
 inline int status_of(pid_t child) {
   int status = 0;
   ::waitpid(child, &status, 0);
   return status;
 }
 
-/// Waits until all have ended; whether each did well.
+/// Waits until all children have ended. Returns true if all succeeded.
 inline bool end_well(const std::vector<pid_t>& children) {
   bool well = true;
   for (const pid_t child : children) well = status_of(child) == 0 && well;
   return well;
 }
 
-/// Kills a child as no program can see coming, and waits until it is gone.
+/// Kills a child with SIGKILL, which it cannot handle, and waits until it has ended.
 inline void kill_child(pid_t child) {
   ::kill(child, SIGKILL);
   status_of(child);
 }
 
-/// What `action` throws in a process of its own, for what changes the whole process: its user,
-/// its limits, its mounts. "" when it throws nothing.
+/// Runs `action` in a child process, for changes of the process: its user, limits or mounts.
+/// Returns the message of its exception; "" if it does not throw.
 template <typename Action>
 std::string thrown_in_child(Action action) {
   int channel[2];

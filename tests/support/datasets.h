@@ -6,7 +6,7 @@
 
 namespace vlp {
 
-/// Folders of the project's data, for tests that know its place (VLP_SOURCE_DIR).
+/// Folders of the project's data, for tests with VLP_SOURCE_DIR.
 inline const std::string kExample = VLP_SOURCE_DIR "/datasets/example/";
 inline const std::string kRig = VLP_SOURCE_DIR "/datasets/paper-rig/rendered";
 

@@ -13,7 +13,7 @@
 
 namespace vlp {
 
-/// The example: five lamps seen from 36 places with 0.05 px of noise.
+/// The example data: five lamps from 36 positions with 0.05 px noise.
 struct ExampleRig : testing::Test {
   LampMap map = read_lamp_map(kExample + "lamps.yaml");
   Calibration calibration = read_calibration(kExample + "calibration.yaml");

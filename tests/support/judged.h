@@ -10,8 +10,9 @@
 
 namespace vlp {
 
-/// Errors of fixes against their covariances, over trials: the mean of e' cov^-1 e per state, and
-/// how often it is within 95 % of chi-squared of four.
+/// Statistics of errors of fixes against their covariances: the mean of e' cov^-1 e per state, and
+/// the fraction within the 95 % quantile. The quantile is that of chi-squared with four degrees of
+/// freedom.
 struct Judged {
   double sum = 0;
   int count = 0, inside = 0;
@@ -27,7 +28,7 @@ struct Judged {
   double share() const { return static_cast<double>(inside) / count; }
 };
 
-/// X, Y, Z in metres, yaw in radians.
+/// Returns the error of X, Y, Z in meters and of the yaw in radians.
 inline Eigen::Vector4d error_of(const Fix& fix, const Pose& truth) {
   Eigen::Vector4d error;
   error << fix.estimate.pose.position_m - truth.position_m,

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Makes datasets/example: what a camera sees of five lamps from 36 places, while it turns on the
-/// spot, and while it turns at a known station, computed, with noise.
+/// Generates datasets/example: computed detections with noise of five lamps from 36 positions,
+/// during a rotation in place, and during a rotation at a known reference point.
 #include <algorithm>
 #include <array>
 #include <cstdio>
@@ -29,7 +29,7 @@ LampMap example_lamps() {
 
 constexpr double kNoise_px = 0.05;
 
-/// What the camera of `rig` sees of the lamps that are wholly in its image, by that name.
+/// Returns the detections of the lamps that are fully in the image, as the frame `image`.
 Frame frame_of(const SyntheticRig& rig, const char* name, int number, Random& random) {
   std::array<char, 32> image{};
   std::snprintf(image.data(), image.size(), "%s_%02d.png", name, number);
@@ -42,8 +42,7 @@ Frame frame_of(const SyntheticRig& rig, const char* name, int number, Random& ra
   return {image.data(), with_noise(detections, random)};
 }
 
-/// Twelve captures of a turn at each of two heights, the camera beside the axis that it turns
-/// about.
+/// Returns twelve captures of a rotation in place at each of two heights, with a lever arm.
 std::vector<Frame> turn(SyntheticRig rig, Random& random) {
   const Eigen::Vector2d axis_m(0.05, 0.02);
   const Eigen::Vector3d lever_arm_m(0.004, -0.002, 0);
@@ -57,7 +56,7 @@ std::vector<Frame> turn(SyntheticRig rig, Random& random) {
   return frames;
 }
 
-/// Twelve captures at one place, turned.
+/// Returns twelve captures at one position with different yaws.
 std::vector<Frame> at_station(SyntheticRig rig, Random& random) {
   std::vector<Frame> frames;
   for (int i = 0; i < 12; ++i) {

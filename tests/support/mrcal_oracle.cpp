@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "support/mrcal_oracle.h"
 
-// mrcal 2.2's headers lack extern "C"; what they include in turn must come before it.
+// Headers of mrcal 2.2 lack extern "C"; the headers that they include must come first.
 #include <stdbool.h>
 #include <stdint.h>
 extern "C" {

@@ -9,23 +9,23 @@
 
 namespace vlp {
 
-/// A lens as mrcal itself evaluates it, to compare with. Model names and parameters are
-/// mrcal's. Throws std::runtime_error where mrcal reports a failure.
+/// A lens evaluated by mrcal, for comparison. Model names and parameters are mrcal's. Throws
+/// std::runtime_error if mrcal reports a failure.
 class MrcalOracle {
  public:
   MrcalOracle(std::string model, std::vector<double> parameters);
 
-  /// mrcal_project of each point.
+  /// Returns mrcal_project() of each point.
   std::vector<Eigen::Vector2d> project(std::span<const Eigen::Vector3d> points) const;
 
   struct Gradients {
     Eigen::Matrix<double, 2, 3> d_pixel_d_point;
     Eigen::Matrix<double, 2, Eigen::Dynamic> d_pixel_d_parameters;
   };
-  /// The gradients of mrcal_project.
+  /// Returns the gradients of mrcal_project().
   Gradients gradients(const Eigen::Vector3d& point) const;
 
-  /// mrcal_unproject of each pixel: rays of any length.
+  /// Returns mrcal_unproject() of each pixel: rays of any length.
   std::vector<Eigen::Vector3d> unproject(std::span<const Eigen::Vector2d> pixels) const;
 
  private:

@@ -8,7 +8,7 @@
 
 namespace vlp {
 
-/// Matches an Eigen vector or matrix whose every entry is within `tolerance` of `expected`'s.
+/// Matches an Eigen vector or matrix whose entries are all within `tolerance` of `expected`.
 MATCHER_P2(IsNear, expected, tolerance, "is near the expected matrix") {
   const double worst = (arg - expected).cwiseAbs().maxCoeff();
   *result_listener << "worst difference " << worst;

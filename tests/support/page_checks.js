@@ -44,7 +44,7 @@
     if (scrolls && box.tabIndex < 0) problems.push(`scrolls, but not by keyboard: ${name(box)}`);
   }
 
-  // Pictures: there, and not of one colour.
+  // Images: loaded, and not of a single color.
   for (const image of all("img")) {
     const what = image.alt || name(image);
     if (!image.alt.trim()) problems.push(`a picture without a text: ${name(image)}`);

@@ -8,7 +8,7 @@
 
 namespace vlp {
 
-/// The nearest point of a polyline.
+/// Returns the nearest point of a polyline.
 inline Eigen::Vector2d nearest_on(const std::vector<Eigen::Vector2d>& polyline,
                                   const Eigen::Vector2d& point) {
   Eigen::Vector2d nearest = polyline.front();
@@ -21,7 +21,7 @@ inline Eigen::Vector2d nearest_on(const std::vector<Eigen::Vector2d>& polyline,
   return nearest;
 }
 
-/// Distance of a point from it.
+/// Returns the distance of a point from a polyline.
 inline double distance_from(const std::vector<Eigen::Vector2d>& polyline,
                             const Eigen::Vector2d& point) {
   return (nearest_on(polyline, point) - point).norm();

@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The folder of initdb and pg_ctl; empty when there is none.
+/// Returns the folder of initdb and pg_ctl; empty if there is none.
 fs::path programs() {
   std::vector<fs::path> versions;
   std::error_code none;
@@ -30,7 +30,7 @@ fs::path programs() {
   return versions.empty() ? fs::path() : *std::max_element(versions.begin(), versions.end());
 }
 
-/// One that nobody listens to.
+/// Returns a free port.
 int free_port() {
   const int socket = ::socket(AF_INET, SOCK_STREAM, 0);
   sockaddr_in address{};

@@ -7,37 +7,37 @@
 
 namespace vlp {
 
-/// A PostgreSQL server of a test's own, of the newest version that Debian's packages have
-/// installed, as user postgres when the test runs as root; it listens to a socket in its own folder
-/// only.
+/// A PostgreSQL server for a test, of the newest version installed from Debian's packages. Runs as
+/// user postgres if the test runs as root. It listens only to a socket in its own folder.
 class PostgresServer {
  public:
   enum class Tls { none, required };
-  /// With a password it also listens to a port of 127.0.0.1, where user vlp needs it, without TLS,
-  /// or with nothing else, by a certificate of its own for localhost.
+  /// With a password the server also listens to a port of 127.0.0.1, where user vlp needs the
+  /// password. `tls` selects connections without TLS, or only with TLS, by the server's own
+  /// certificate for localhost.
   explicit PostgresServer(const std::string& password = "", Tls tls = Tls::none);
   ~PostgresServer();
   PostgresServer(const PostgresServer&) = delete;
   PostgresServer& operator=(const PostgresServer&) = delete;
 
   static bool installed();
-  /// postgresql://...; empty when it did not start.
+  /// Returns postgresql://...; empty if the server did not start.
   const std::string& uri() const { return uri_; }
-  /// The same without a parameter: the socket's folder stands for the host.
+  /// Returns the same without a parameter, with the socket's folder as the host.
   std::string plain_uri() const;
 
-  /// 127.0.0.1:PORT, if it listens there.
+  /// Returns 127.0.0.1:PORT, if the server listens there.
   std::string address() const { return "127.0.0.1:" + port(); }
   std::string port() const { return std::to_string(port_); }
-  /// That by which it shows who it is.
+  /// Returns the file of the server's certificate.
   std::filesystem::path certificate() const { return folder_ / "server.crt"; }
-  /// What it has said.
+  /// Returns the server's log.
   std::string log() const;
 
-  /// At once, as by a power cut; and again.
+  /// Stops the server immediately, as a power failure, and starts it again.
   void stop() const;
   void start() const;
-  /// Its processes stand still (SIGSTOP), or go on.
+  /// Suspends the server's processes (SIGSTOP), or resumes them.
   void freeze() const;
   void thaw() const;
 

@@ -12,7 +12,7 @@
 namespace vlp {
 namespace {
 
-/// How far a program is, which only slow machines get to read, is left out.
+/// Removes lines of progress, which appear on slow machines only.
 std::string without_progress(const std::string& messages) {
   static const std::regex progress("[^\n]*, [0-9.]+ a second, [0-9]+:[0-9]+ left\n");
   return std::regex_replace(messages, progress, "");

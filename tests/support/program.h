@@ -7,13 +7,13 @@
 namespace vlp {
 
 struct ProgramResult {
-  int exit_code;  // 128 + the signal when one ended it
+  int exit_code;  // 128 + the number of the signal that ended the program
   std::string output;
   std::string errors;
 };
 
-/// Runs a shell command line; `vlp-...` programs are found in the build. Lines of progress are left
-/// out of the errors.
+/// Runs a shell command line. Programs `vlp-...` are found in the build. `errors` excludes lines of
+/// progress.
 ProgramResult run_program(const std::string& command);
 
 }  // namespace vlp

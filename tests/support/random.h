@@ -9,16 +9,16 @@
 
 namespace vlp {
 
-/// Random numbers that are the same with every standard library.
+/// Random numbers that are identical for every standard library.
 class Random {
  public:
   explicit Random(std::uint64_t seed) : engine_(seed) {}
 
-  /// In [min, max).
+  /// Returns a number in [min, max).
   double uniform(double min, double max) {
     return min + (max - min) * static_cast<double>(engine_() >> 11) * 0x1p-53;
   }
-  /// In [0, count).
+  /// Returns an index in [0, count).
   std::size_t index(std::size_t count) { return engine_() % count; }
   double normal() {  // Box and Muller
     const double radius = std::sqrt(-2 * std::log(1 - uniform(0, 1)));

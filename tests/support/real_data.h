@@ -6,7 +6,7 @@
 
 namespace vlp {
 
-/// A folder of real captures; empty when it is not there.
+/// Returns a folder of real captures; empty if it does not exist.
 inline std::filesystem::path real_data(const char* folder) {
   const std::filesystem::path all = VLP_REAL_DATA_DIR;
   const bool there = !all.empty() && std::filesystem::is_directory(all / folder);

@@ -10,7 +10,7 @@
 
 namespace vlp {
 
-/// The message with which `read` is refused; empty when it is not.
+/// Returns the message of the exception that `read` throws; empty if it does not throw.
 template <typename Error = InputError, typename Read>
 std::string refusal_of(const Read& read) {
   try {

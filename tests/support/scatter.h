@@ -11,7 +11,7 @@
 
 namespace vlp {
 
-/// What many estimates of one pose with one covariance show, against that covariance.
+/// Statistics of many estimates of one pose against their covariance.
 class Scatter {
  public:
   Scatter(const Pose& truth, const Eigen::Matrix4d& covariance)
@@ -27,16 +27,16 @@ class Scatter {
     ++count_;
   }
 
-  /// Standard deviations found over those of the covariance, less one: X, Y, Z, yaw.
+  /// Returns found over expected standard deviations, minus one: X, Y, Z, yaw.
   Eigen::Vector4d excess() const {
     const Eigen::Vector4d variance = squares_ / count_ - mean().cwiseAbs2();
     return (variance.array() / covariance_.diagonal().array()).sqrt() - 1;
   }
-  /// Mean errors over the standard deviations of the mean.
+  /// Returns the mean errors over the standard deviations of the mean.
   Eigen::Vector4d bias() const {
     return mean().array() / (covariance_.diagonal().array() / count_).sqrt();
   }
-  /// Share of the errors outside the 95 % ellipsoid.
+  /// Returns the fraction of the errors outside the 95 % ellipsoid.
   double share_beyond_95() const { return beyond_95_ / count_; }
 
  private:

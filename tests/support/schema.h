@@ -10,8 +10,8 @@
 
 namespace vlp {
 
-/// In what files of JSON are not as datasets/schemas/NAME.schema.json says, or, where they are,
-/// what it would not notice if it were wrong (schema_check.py); empty when there is nothing.
+/// Returns the violations of datasets/schemas/NAME.schema.json in JSON files. Without violations,
+/// returns the changes that the schema would not detect (schema_check.py); empty if there are none.
 inline std::string problems_by_schema(const std::string& name,
                                       const std::vector<std::filesystem::path>& files) {
   std::string command = VLP_SOURCE_DIR "/tests/support/schema_check.py " + name;

@@ -1,9 +1,9 @@
 #!/usr/bin/python3
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
-"""schema_check.py NAME FILE...: whether documents are as datasets/schemas/NAME.schema.json says, and whether the schema
-would tell if they were not: with a key more in any object, or a value of another type anywhere, none is valid. Says
-what is not so; exit code 1 then, 2 when it cannot tell."""
+"""schema_check.py NAME FILE...: checks that documents conform to datasets/schemas/NAME.schema.json, and that the schema
+detects errors: an additional key in any object, or a value of another type anywhere, must be invalid. Prints the
+problems. Exit code: 1 if there are any, 2 if the check is not possible."""
 import copy
 import json
 import sys
@@ -17,7 +17,7 @@ except ImportError:
 
 SCHEMAS = Path(__file__).resolve().parents[2] / "datasets/schemas"
 WRONG = {"no such key": None}
-ALIKE = 2  # So many of a list, whose members are alike, are made wrong.
+ALIKE = 2  # number of elements of a list, which are alike, that are modified
 
 
 def validator_of(name):
@@ -29,7 +29,7 @@ def validator_of(name):
 
 
 def places(value, place=()):
-    """Of all that is in a document: (keys and numbers that lead to it, what is there)."""
+    """Yields (path of keys and indices, value) for each value of a document."""
     yield place, value
     inside = value.items() if isinstance(value, dict) else []
     if isinstance(value, list):
@@ -39,7 +39,7 @@ def places(value, place=()):
 
 
 def with_wrong(document, place):
-    """With another value there, or, where an object is, with a key more."""
+    """Returns the document with another value at a path, or, in an object, with another key."""
     wrong = copy.deepcopy(document)
     at = wrong
     for key in place[:-1]:

@@ -9,7 +9,7 @@
 
 namespace vlp {
 
-/// Lamps, a camera and a place to see them from, made up for a test.
+/// Synthetic lamps, camera and pose for a test.
 struct SyntheticRig {
   LampMap map;
   Calibration calibration;
@@ -17,29 +17,29 @@ struct SyntheticRig {
   std::optional<Inclination> inclination;
 };
 
-/// 800 x 600, 520 px, with a lens that distorts (LENSMODEL_OPENCV8).
+/// Returns a camera of 800 x 600 px, 520 px, with a distorting lens (LENSMODEL_OPENCV8).
 Camera synthetic_camera();
 
-/// Of the same size, with a splined lens of 130 degrees.
+/// Returns a camera of the same size with a splined lens of 130 degrees.
 Camera splined_camera();
 
-/// Of the same size, with OPENCV_FISHEYE: its lens sees to 95 degrees off the axis and beyond.
+/// Returns a camera of the same size with OPENCV_FISHEYE, to 95 degrees off the axis and beyond.
 Camera fisheye_camera();
 
-/// Lamps with ids 1, 2, ...
+/// Returns lamps with ids 1, 2, ...
 LampMap lamp_map_of(const std::vector<Eigen::Vector3d>& positions_m);
 
-/// Eight lamps over 2 x 1.1 m at 1.6 m, the first four of them the corners.
+/// Returns eight lamps over 2 x 1.1 m at 1.6 m; the first four are the corners.
 LampMap synthetic_lamps();
 
-/// A rotation centre of model `tilt`: the camera leans by this angle towards this azimuth.
+/// Returns a rotation center of model `tilt`: the camera is tilted by `tilt_rad` to this azimuth.
 RotationCenter tilted_by(const Camera& camera, double tilt_rad, double azimuth_rad);
 
-/// Where the camera of `rig` sees its lamps, computed forwards: world, level, camera, pixel.
-/// Lamps that the lens does not see are left out.
+/// Projects the lamps of `rig`: world, level, camera, pixel. Omits lamps that the lens does not
+/// image.
 std::vector<Detection> seen_from(const SyntheticRig& rig, double sigma_px = 1);
 
-/// `detections` with normal noise of their sigma_px, which they state, added.
+/// Adds normal noise of sigma_px, which all detections have.
 std::vector<Detection> with_noise(std::vector<Detection> detections, Random& random);
 
 }  // namespace vlp

@@ -13,7 +13,7 @@
 
 namespace vlp {
 
-/// A folder of the running test's own, removed with it.
+/// A folder for the running test, removed by the destructor.
 class TemporaryFolder {
  public:
   TemporaryFolder() {

@@ -9,8 +9,8 @@
 
 namespace vlp {
 
-/// Writes grey images as a video of 20 frames a second without loss (FFV1), by a codec of four
-/// letters otherwise; false where OpenCV has no such codec.
+/// Writes gray images as a video of 20 frames a second, by a lossless codec (FFV1) or that with the
+/// four letters `codec`. Returns false if OpenCV lacks the codec.
 inline bool write_video(const std::filesystem::path& file, const std::vector<cv::Mat>& images,
                         const char* codec = "FFV1") {
   constexpr double rate_hz = 20;

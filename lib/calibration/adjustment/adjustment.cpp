@@ -29,14 +29,16 @@ namespace vlp {
 namespace {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
-/// Chi-squared of three beyond which a lamp has moved: 1e-4 of those that have not.
+/// Chi-squared with three degrees of freedom beyond which a lamp counts as moved: 1e-4 of the
+/// unmoved lamps exceed it.
 constexpr double kMovedChiSquared = 21.1;
-/// Standard deviations beyond which a place is wrong, and a detection an outlier.
+/// Number of standard deviations beyond which a known position is wrong, and a detection an
+/// outlier.
 constexpr double kWrongPlace = 5, kOutlier = 4.5;
-/// Least noise of detections that state none, in pixels.
+/// Smallest noise of detections without sigma_px, in pixels.
 constexpr double kMinNoise_px = 1e-4;
 
-/// All that is read from the input and does not change.
+/// Problem with the constant data of the input.
 struct Assembled {
   AdjustmentProblem problem;
   Eigen::Vector3d origin_m;
@@ -53,8 +55,9 @@ Eigen::Vector3d mean_of(const LampMap& map) {
   return map.lamps.front().position_m + sum / static_cast<double>(map.lamps.size());
 }
 
-/// Of two lamps or more, whatever a map that is a little off makes of it; and if that is far off,
-/// of those that agree.
+/// Estimates an approximate pose from two lamps or more, even if the map has small errors. With
+/// more than three lamps, tries the lamps that agree with each other first. Returns std::nullopt
+/// for fewer than two lamps, or if there is no pose.
 std::optional<Pose> rough_pose(const std::vector<Sighting>& sightings,
                                const std::vector<std::size_t>& lamps,
                                const std::vector<Eigen::Vector3d>& lamps_m) {
@@ -81,8 +84,8 @@ std::optional<Pose> rough_pose(const std::vector<Sighting>& sightings,
   return status == FixStatus::ok ? std::optional(fix.pose) : std::nullopt;
 }
 
-/// Returns the translations, the yaw and the scale of the lamps seen, orthonormal, over the
-/// standard deviation with which they are held.
+/// Returns an orthonormal basis of translation, yaw and scale of the detected lamps, divided by the
+/// standard deviation of the constraint.
 Eigen::MatrixXd map_gauge(const std::vector<Eigen::Vector3d>& lamps_m,
                           const std::vector<bool>& seen) {
   constexpr double held_sd_m = 1e-6;  // far below the sd of lamps, and far above rounding
@@ -104,7 +107,7 @@ Eigen::MatrixXd map_gauge(const std::vector<Eigen::Vector3d>& lamps_m,
   return qr.householderQ() * Eigen::MatrixXd::Identity(gauge.rows(), 5) / held_sd_m;
 }
 
-/// Returns the derivative of a pixel of the undistorted image by the pixel of the ray.
+/// Returns the derivative of a pixel of the undistorted image with respect to the pixel of the ray.
 Eigen::Matrix2d undistorted_from_pixel(const Lens& lens, const Lens::Ray& ray) {
   const Eigen::Vector2d z = ray.direction.hnormalized();
   return lens.focal_px().asDiagonal() *
@@ -112,7 +115,7 @@ Eigen::Matrix2d undistorted_from_pixel(const Lens& lens, const Lens::Ray& ray) {
          ray.direction.z();
 }
 
-/// A key by which captures share a place: their spot, or the place itself.
+/// Key of a known position that captures have in common: their spot, or the position itself.
 using PlaceKey = std::tuple<std::string, double, double, double, PlaceOf>;
 
 Assembled assemble(const AdjustmentInput& input) {
@@ -230,7 +233,7 @@ Assembled assemble(const AdjustmentInput& input) {
   return all;
 }
 
-/// Lengths of the whitened residuals; infinite where the lens has no such ray.
+/// Returns the norms of the whitened residuals; infinite if the lens cannot project the point.
 std::vector<double> lengths_of(const AdjustmentProblem& problem) {
   std::vector<double> lengths;
   lengths.reserve(problem.sightings.size());
@@ -242,8 +245,8 @@ std::vector<double> lengths_of(const AdjustmentProblem& problem) {
   return lengths;
 }
 
-/// Rejects detections beyond the scatter of the residuals, of which the median is used, and
-/// reinstates those within. Returns true if that changes anything.
+/// Rejects detections beyond the scatter of the residuals, estimated from their median, and
+/// reinstates the other ones. Returns true if the set of used detections changes.
 bool leave_out_outliers(AdjustmentProblem& problem, bool noise_is_stated,
                         double degrees_of_freedom) {
   constexpr double rounding = 1e-6;  // standard deviations
@@ -265,7 +268,8 @@ bool leave_out_outliers(AdjustmentProblem& problem, bool noise_is_stated,
   return changed;
 }
 
-/// Found less stated, the mean over a place's captures.
+/// Computes the residuals of the known positions, adjusted minus measured, as means over their
+/// captures.
 void measure_places(Assembled& all) {
   for (auto& place : all.places) place.misfit_m.setZero();
   for (const auto& seen : all.problem.places) {
@@ -279,8 +283,8 @@ double misfit_of(const Assembled& all, std::size_t place) {
   return all.places[place].misfit_m.norm() / all.place_sd_m[place];
 }
 
-/// The correction of a lamp over what its survey and everything else let expect: with r = found
-/// less surveyed, r' (sd^2 - C)^-1 r when the survey counts, r' (sd^2 + C)^-1 r when it does not.
+/// Returns the squared correction r of a lamp, adjusted minus surveyed, normalized by its expected
+/// covariance: r' (sd^2 - C)^-1 r if the survey is used, r' (sd^2 + C)^-1 r if it is not.
 double moved_chi_squared(const AdjustmentProblem& problem, const Eigen::MatrixXd& covariance,
                          std::size_t lamp, double sd_m, bool counts) {
   const Eigen::Index at = problem.layout().lamp(lamp);
@@ -289,7 +293,8 @@ double moved_chi_squared(const AdjustmentProblem& problem, const Eigen::MatrixXd
   const Eigen::Matrix3d survey = sd_m * sd_m * Eigen::Matrix3d::Identity();
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(
       counts ? Eigen::Matrix3d(survey - found) : Eigen::Matrix3d(survey + found));
-  // Where nothing but the survey says where the lamp is, nothing contradicts it.
+  // Skips directions in which only the survey determines the lamp, because no data contradict it
+  // there.
   constexpr double told = 1e-6;
   double sum = 0;
   for (int i = 0; i < 3; ++i) {
@@ -301,7 +306,7 @@ double moved_chi_squared(const AdjustmentProblem& problem, const Eigen::MatrixXd
   return sum;
 }
 
-/// Survey and places that the rest contradicts, found one at a time.
+/// Outliers among surveyed lamps and known positions, identified one at a time.
 class Contradictions {
  public:
   explicit Contradictions(Assembled& all) : all_(all) {
@@ -310,11 +315,12 @@ class Contradictions {
   }
 
   const std::vector<bool>& moved() const { return moved_; }
-  /// Where most lamps contradict their survey, which of them did is not to be told.
+  /// Returns true if most lamps contradict their survey, so that the moved ones cannot be
+  /// identified.
   bool most() const { return most_; }
   double sd_m(std::size_t lamp) const { return sd_m_[lamp]; }
 
-  /// What the robust solution, which it does not spoil, is far from at once.
+  /// Rejects everything far from the robust solution, which outliers do not bias.
   void leave_out_the_worst() {
     constexpr double far = 8;  // standard deviations
     for (std::size_t i = 0; i < sd_m_.size(); ++i) {
@@ -331,8 +337,8 @@ class Contradictions {
     }
   }
 
-  /// Leaves out the worst of those that count, or takes back what is not contradicted after all.
-  /// Whether that changes anything.
+  /// Rejects the worst lamp or known position, or reinstates one that no longer contradicts the
+  /// solution. Returns true if anything changes.
   bool settle(const Eigen::MatrixXd& covariance) {
     measure_places(all_);
     for (std::size_t i = 0; i < all_.places.size(); ++i) {
@@ -394,16 +400,18 @@ class Contradictions {
   bool most_ = false;
 };
 
-/// Variance factor of the detections: root of their squared whitened residuals over their degrees
-/// of freedom.
+/// Noise of the detections.
 struct Noise {
+  /// Square root of the variance factor: RMS whitened residual.
   double ratio;
+  /// Degrees of freedom.
   double freedom;
 };
 
 /// Estimates the noise of the detections. Their degrees of freedom are the number of their
-/// coordinates minus the trace of their hat matrix, which is the number of unknowns minus the
-/// fraction of each that priors determine: 1 - sd_after^2 / sd_prior^2 is left to the detections.
+/// coordinates minus the trace of their hat matrix. The trace is the number of unknowns minus the
+/// fraction of each that priors determine. The detections determine 1 - sd_after^2 / sd_prior^2 of
+/// an unknown.
 Noise noise_of(const Assembled& all, const AdjustmentProblem::SharedCovariance& shared) {
   const Eigen::MatrixXd& covariance = shared.matrix;
   const AdjustmentProblem& problem = all.problem;
@@ -445,7 +453,8 @@ Noise noise_of(const Assembled& all, const AdjustmentProblem::SharedCovariance& 
   return {std::sqrt(squares / std::max(freedom, 1.0)), freedom};
 }
 
-/// Until the same detections, lamps and places agree, and their noise is known.
+/// Solves until the sets of used detections, lamps and known positions and the noise are unchanged,
+/// at most 40 times. Returns false if a solution fails.
 bool settle(Assembled& all, Contradictions& contradictions, Eigen::MatrixXd& covariance,
             double& freedom) {
   AdjustmentProblem& problem = all.problem;
@@ -475,7 +484,7 @@ bool settle(Assembled& all, Contradictions& contradictions, Eigen::MatrixXd& cov
 }
 
 /// Returns the covariance for equal noise in the image, and estimates that noise. The estimates
-/// stay, with the weights that they were solved with.
+/// keep the weights that they were solved with.
 Eigen::MatrixXd covariance_of_image_noise(Assembled& all) {
   AdjustmentProblem& problem = all.problem;
   for (auto& sighting : problem.sightings) {
@@ -506,14 +515,14 @@ std::string undetermined_by(const AdjustmentProblem& problem, const Eigen::Matri
          "captures that see more lamps at other yaws";
 }
 
-/// Unknowns after convergence: their covariance, and the degrees of freedom of the detections.
+/// Covariance of the unknowns after convergence, and the degrees of freedom of the detections.
 struct AdjustedState {
   Eigen::MatrixXd covariance;
   double freedom = 0;
 };
 
-/// Moves the problem to its robust solution and leaves out everything far from it. Returns false if
-/// it does not converge.
+/// Moves the problem to its robust solution and rejects everything far from it. Returns false if
+/// the solution fails.
 bool start_robustly(Assembled& all, Contradictions& contradictions) {
   AdjustmentProblem& problem = all.problem;
   if (!problem.solve(true) || !problem.solve(true)) return false;
@@ -523,11 +532,11 @@ bool start_robustly(Assembled& all, Contradictions& contradictions) {
   return true;
 }
 
-/// Solves the problem, from a robust solution unless the captures are checked. Returns std::nullopt
-/// if it does not converge.
+/// Solves the problem, starting with a robust solution unless the captures are checked. Returns
+/// std::nullopt if it does not converge.
 std::optional<AdjustedState> solve_all(const AdjustmentInput& input, Assembled& all,
                                        Contradictions& contradictions) {
-  // A lamp taken for another can be where the lens has no image of it.
+  // A misidentified lamp may be at a point that the lens cannot project.
   const std::vector<double> at_start = lengths_of(all.problem);
   for (std::size_t i = 0; i < at_start.size(); ++i) {
     all.problem.sightings[i].used = at_start[i] < kInfinite;
@@ -541,7 +550,7 @@ std::optional<AdjustedState> solve_all(const AdjustmentInput& input, Assembled& 
   return adjusted;
 }
 
-/// Returns the mean height of the lamps used above the camera.
+/// Returns the mean height above the camera of the lamps used.
 double mean_height_m(const AdjustmentProblem& problem) {
   const AdjustmentLayout& at = problem.layout();
   const Eigen::VectorXd& state = problem.state();
@@ -557,7 +566,7 @@ double mean_height_m(const AdjustmentProblem& problem) {
   return sum_m / std::max(1, count);
 }
 
-/// Counts captures and detections, and states their residuals.
+/// Sets the counts of captures and detections, and their residuals.
 void report_detections(const AdjustmentProblem& problem, bool noise_is_stated, double freedom,
                        AdjustmentResult& result) {
   double squares_px = 0;
@@ -579,7 +588,7 @@ void report_detections(const AdjustmentProblem& problem, bool noise_is_stated, d
   result.noise_is_contradicted = noise_is_stated && problem.noise_scale > 1 + chance;
 }
 
-/// States lens, zenith and lever arm with their covariances.
+/// Sets lens, zenith and lever arm with their covariances.
 void report_center(const AdjustmentProblem& problem, const Eigen::MatrixXd& covariance,
                    bool has_lever_arm, AdjustmentResult& result) {
   const AdjustmentLayout& at = problem.layout();
@@ -602,8 +611,8 @@ void report_center(const AdjustmentProblem& problem, const Eigen::MatrixXd& cova
   }
 }
 
-/// States the joint covariance of intrinsics (from the directions of the lens), zenith, lever arm
-/// and lamps, without the spots. That with the surveyed map lacks the lamps.
+/// Sets the joint covariance of intrinsics (from the directions of the lens), zenith, lever arm and
+/// lamps, without the spots. The one for the surveyed map excludes the lamps.
 void report_joint_covariance(const AdjustmentProblem& problem, const Eigen::MatrixXd& covariance,
                              bool has_lever_arm, AdjustmentResult& result) {
   const AdjustmentLayout& at = problem.layout();
@@ -621,7 +630,7 @@ void report_joint_covariance(const AdjustmentProblem& problem, const Eigen::Matr
   result.surveyed_covariance.bottomRightCorner(rows - first_lamp, rows - first_lamp).setZero();
 }
 
-/// States the lamps with their covariances, in both joint covariances.
+/// Sets the lamps with their covariances, in both joint covariances.
 void report_map(const Assembled& all, const Contradictions& contradictions,
                 AdjustmentResult& result) {
   const AdjustmentProblem& problem = all.problem;
@@ -636,11 +645,11 @@ void report_map(const Assembled& all, const Contradictions& contradictions,
     const Eigen::Matrix3d found = result.refined_covariance.block<3, 3>(row, row);
     const bool moved = contradictions.moved()[i];
     if (moved) {
-      // What is wrong with its survey says nothing of the others.
+      // The error of its survey is independent of the errors of other lamps.
       result.surveyed_covariance.middleRows<3>(row).setZero();
       result.surveyed_covariance.middleCols<3>(row).setZero();
     }
-    // Of one that has moved, too: fixes with this map are to find that it is wrong.
+    // Applies to a moved lamp also, so that fixes with this map detect that its position is wrong.
     result.surveyed_covariance.block<3, 3>(row, row) =
         surveyed_sd_m * surveyed_sd_m * Eigen::Matrix3d::Identity();
     if (!all.lamp_seen[i]) {
@@ -659,7 +668,7 @@ void report_map(const Assembled& all, const Contradictions& contradictions,
   }
 }
 
-/// States the known places and what of the map they leave to the survey.
+/// Sets the known positions, and the properties of the map that only the survey determines.
 void report_places(Assembled& all, AdjustmentResult& result) {
   measure_places(all);
   result.places = all.places;
@@ -721,7 +730,7 @@ MatrixX stated_lens_covariance(const Camera& camera, double sd_px) {
       ++rays;
     }
   }
-  // A lens that shows no ray of the image stays as it is.
+  // An intrinsic that displaces no pixel has variance 0.
   const Eigen::ArrayXd variances = sd_px * sd_px * rays / squares.array();
   return Eigen::MatrixXd((squares.array() > 0).select(variances, 0).matrix().asDiagonal());
 }

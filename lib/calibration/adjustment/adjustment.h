@@ -14,134 +14,169 @@
 #include "rig/detection.h"
 #include "rig/lamp_map.h"
 
-/// One adjustment of all that captures share: least squares over every capture at once. A capture k
-/// whose camera stands at S with yaw g sees lamp P at
-///   project(camera_from_level(zenith) (Rz(-g) (P - S)); intrinsics),
-/// and where it turns on a spot about the axis A, S = A + Rz(g) e. Of a camera that drives with u
-/// and turns with w a lamp that is read at t after the middle of the image is where, in place of
-/// Rz(-g) (P - S), there is Rz(-w t) (Rz(-g) (P - S) - u t); on a spot it turns, too.
-///   unknown  zenith, lever arm e, the lamps' places, the lens as far as its covariance lets it,
-///            an axis A a spot, and a pose (on a spot: a yaw) a capture, with u and w where they
-///            are not known exactly;
-///   known    the lamps' centres with their sigma_px, the survey of the lamps with its sd_m, the
-///            lens with its covariance, places of the camera or of the axis with their sd.
+/// Adjustment of everything that captures have in common: least squares over all captures at once.
+///
+/// A capture k with its camera at S with yaw g sees lamp P at
+///   project(camera_from_level(zenith) (Rz(-g) (P - S)); intrinsics)
+/// If the base rotates in place about the axis A, S = A + Rz(g) e. If the camera moves with
+/// velocity u and yaw rate w, a lamp that is read out at time t after the middle of the image is at
+///   Rz(-w t) (Rz(-g) (P - S) - u t)
+/// in place of Rz(-g) (P - S). On a spot, the yaw rate applies in the same way.
+///
+/// Unknowns:
+///   - zenith, lever arm e, positions of the lamps
+///   - intrinsics, within their covariance
+///   - an axis A per spot
+///   - per capture a pose (on a spot: a yaw), with u and w if they are not known exactly
+///
+/// Observations:
+///   - lamp centers with their sigma_px
+///   - survey of the lamps with its sd_m
+///   - intrinsics with their covariance
+///   - positions of the camera or of the axis with their standard deviation
 namespace vlp {
 
-/// A place as somebody measured it.
+/// Measured position of the camera or of the rotation axis.
 struct KnownPlace {
   PlaceOf of;
   Eigen::Vector2d xy_m;
   std::optional<double> z_m;
-  /// Of each coordinate, positive. What was measured once counts once: the captures of one spot, or
-  /// of one and the same place, have the error in common.
+  /// Standard deviation of each coordinate; positive. A position that is measured once counts once:
+  /// captures of one spot, or with identical positions, have the same error.
   double sd_m;
 };
 
+/// One capture with its detections and sensor data.
 struct AdjustmentCapture {
   /// For messages.
   std::string name;
   std::vector<Detection> detections;
   std::optional<Inclination> inclination = {};
-  /// Captures of one name turn about one axis at one height; empty: the capture stands by itself.
+  /// Name of the spot. Captures of one spot rotate about one axis at one height; empty: the capture
+  /// has a position of its own.
   std::string spot = {};
   std::optional<KnownPlace> place = {};
-  /// Of the camera; on a spot the yaw rate alone. Wants the camera's row time and read-out.
+  /// Motion of the camera; on a spot only the yaw rate is used. Requires row time and readout
+  /// direction of the camera.
   KnownMotion motion = {};
 };
 
+/// Input of adjust_captures().
 struct AdjustmentInput {
   std::vector<AdjustmentCapture> captures;
-  /// Each with its sd_m; one with 0 stays where it is.
+  /// Surveyed lamps with their sd_m. A lamp with sd_m 0 is fixed.
   LampMap lamps;
-  /// Lens (IntrinsicsReport::covariance; without one it is exact) and where to start: the zenith,
-  /// or a level camera.
+  /// Lens with IntrinsicsReport::covariance (exact if absent), and initial zenith (level if
+  /// absent).
   Calibration calibration;
-  /// Estimates the shape of the map whatever its sd_m. Captures do not determine its translation,
-  /// yaw and scale, which stay: the corrections d of the lamps seen, at p from their mean, have
-  ///   sum d = 0,   sum (p x d)_z = 0,   sum p . d = 0.
+  /// Estimates the shape of the map independently of its sd_m. Captures do not determine its
+  /// translation, yaw and scale, which stay fixed. The corrections d of the detected lamps, at p
+  /// relative to their mean, satisfy
+  ///   sum d = 0,   sum (p x d)_z = 0,   sum p . d = 0
   /// AdjustmentResult::surveyed_covariance is then not defined.
   bool frees_map_shape = false;
-  /// Captures were checked one by one and have no gross outliers. Skips the robust start, which
-  /// rejects all detections of a lamp whose exact place in the map is wrong.
+  /// Set if the captures were checked separately and contain no gross outliers. Skips the robust
+  /// start, which rejects all detections of a lamp whose exact position in the map is wrong.
   bool captures_are_checked = false;
-  /// Weighs detections without sigma_px alike in the undistorted image, as positioning does, so
-  /// that errors of map and lens move zenith and fixes alike. Covariances are for equal noise in
-  /// the image, without the loss of efficiency by these weights.
+  /// Gives detections without sigma_px equal weights in the undistorted image, as positioning does.
+  /// Errors of map and lens then affect zenith and fixes equally. Covariances are those for equal
+  /// noise in the image; they ignore the loss of efficiency by these weights.
   bool weighs_in_undistorted_image = false;
 };
 
-/// Standard deviations beyond which something counts as not determined.
+/// Largest standard deviations of a quantity that counts as determined.
 struct AdjustmentLimits {
+  /// Limit of the zenith, in its worst direction.
   double zenith_rad = 0.005;
-  /// Of the lamps' height above the camera.
+  /// Limit of the lever arm, in its worst direction, as a fraction of the lamps' height above the
+  /// camera.
   double lever_arm_share = 0.005;
 };
 
+/// Result of adjust_captures().
 struct AdjustmentResult {
-  /// Why there is no answer, and what capture would determine it; empty when there is one.
+  /// Reason why there is no result, and the captures that would determine it, human-readable. Empty
+  /// if there is a result.
   std::string undetermined;
 
-  /// With the corrected lens.
+  /// Camera with the corrected intrinsics.
   Camera camera;
-  /// Model `tilt`. Without a lever arm where no spot, or not enough, tells it.
+  /// Rotation center with model `tilt`. It has no lever arm if the captures do not determine one
+  /// (AdjustmentLimits).
   RotationCenter center;
-  /// As adjusted; lamps that are not seen, or that are exact, stay. sd_m is the rms over the axes.
+  /// Adjusted lamp map. Lamps that are not detected, or that are exact, keep their positions. sd_m
+  /// is the RMS over the axes.
   LampMap refined;
+  /// Correction of one lamp and its standard deviation.
   struct LampCorrection {
     int id;
     Eigen::Vector3d correction_m, sd_m;
-    /// Stands elsewhere than the survey says, by more than all that is uncertain explains: its
-    /// survey counts for nothing.
+    /// True if the lamp contradicts its survey by more than all uncertainties explain. Its survey
+    /// is then ignored.
     bool moved;
   };
-  /// Of the lamps that are seen.
+  /// Corrections of the detected lamps.
   std::vector<LampCorrection> lamps;
-  /// Joint covariance (Adjustment::covariance) that goes with `refined`, and that which goes with
-  /// the map as it was surveyed: the same estimates, with the survey's errors in the lamps' places.
+  /// Joint covariance (Adjustment::covariance) for `refined`, and for the surveyed map. The latter
+  /// has the same estimates with the errors of the survey in the positions of the lamps.
   Eigen::MatrixXd refined_covariance, surveyed_covariance;
 
+  /// Known position and its residual.
   struct Place {
-    /// Of a spot, or of a capture that stands for all with this place.
+    /// Name of the spot, or of the first capture with this position.
     std::string name;
     PlaceOf of;
+    /// Number of captures with this position.
     int captures;
-    /// Found less stated, x, y, and z where it is stated.
+    /// Adjusted minus measured position: x, y, and z if it was measured.
     Eigen::Vector3d misfit_m;
-    /// Contradicts the others, and is left out.
+    /// True if the position contradicts the other data and is rejected.
     bool wrong;
   };
   std::vector<Place> places;
-  /// Of the lens' correction: squared length over its covariance, and what is to be expected of it.
+  /// Squared correction of the lens, normalized by its covariance, over the directions that
+  /// captures determine.
   double lens_chi_squared = 0;
+  /// Number of these directions: the expectation of `lens_chi_squared`.
   int lens_freedom = 0;
+  /// True if `lens_chi_squared` exceeds its bound of one in ten thousand.
   bool lens_contradicted = false;
 
-  /// Captures that it rests on; those of fewer than two lamps of the map or without a fix.
+  /// Number of captures that are used, and of captures without a fix, with fewer than two lamps of
+  /// the map, or without an inlier.
   int captures = 0, captures_left_out = 0;
+  /// Number of detections that are used, and that are rejected.
   int detections = 0, detections_left_out = 0;
-  /// Of the detections that are used, per axis, the freedom of the unknowns taken off.
+  /// RMS residual of the used detections per axis, in px: sqrt(sum of squares / degrees of
+  /// freedom).
   double residual_px = 0;
-  /// By how much the stated sigma_px were taken larger, because the residuals are; 1 where they are
-  /// not. Where none is stated, sigma_px is this many pixels.
+  /// Factor by which sigma_px is multiplied because the residuals are larger; 1 if they are not. If
+  /// no sigma_px is given, the estimated noise in px.
   double noise_scale = 1;
-  /// True if residuals are larger than the stated noise by more than chance, at one in a thousand.
+  /// True if residuals exceed the given noise significantly, at a probability of one in a thousand.
   bool noise_is_contradicted = false;
-  /// What the captures leave to the survey alone, for people: the datum, lamps that nothing sees.
+  /// Human-readable notes on quantities that only the survey determines: the datum, and lamps that
+  /// no capture contains.
   std::vector<std::string> notes;
 
   bool ok() const { return undetermined.empty(); }
 };
 
-/// The covariance of a lens whose calibration states none, for AdjustmentInput: an error of any of
-/// its intrinsics, taken alone, moves the pixels of a grid over the image by `sd_px` (rms per
-/// axis); those of different intrinsics are independent. Precondition: sd_px is positive.
+/// Returns a covariance for a lens whose calibration has none, for AdjustmentInput. An error of
+/// each intrinsic, taken alone, displaces the pixels of a grid over the image by `sd_px` (RMS per
+/// axis). Errors of different intrinsics are independent.
+/// @pre sd_px is positive
 MatrixX stated_lens_covariance(const Camera& camera, double sd_px);
 
-/// Robust twice over: a loss of Cauchy on detections, lamps and places finds what is wrong, and
-/// the last solution is plain least squares without it. A lamp is said to have moved when its
-/// survey contradicts everything else (the test of Baarda, chi-squared of three at 1e-4); the worst
-/// first, and each time anew, so that it does not spread over the others. Deterministic.
-/// Preconditions: every lamp has its sd_m; the calibration has no adjustment.
+/// Estimates lens, zenith, lever arm and lamp map from all captures.
+///
+/// @pre every lamp has its sd_m; the calibration has no adjustment
+///
+/// The first solutions use a Cauchy loss on detections, lamps and positions, and identify the
+/// outliers. The final solution is plain least squares without outliers. A lamp counts as moved if
+/// its survey contradicts all other data (test of Baarda, chi-squared with 3 degrees of freedom at
+/// 1e-4). Lamps are tested one at a time, the worst first, so that the error of one lamp does not
+/// spread over other lamps. The result is deterministic.
 AdjustmentResult adjust_captures(const AdjustmentInput& input, const AdjustmentLimits& limits = {});
 
 }  // namespace vlp

@@ -19,21 +19,22 @@ using Matrix23 = Eigen::Matrix<double, 2, 3>;
 using CaptureMatrix = Eigen::Matrix<double, 7, 7>;
 using CaptureVector = Eigen::Matrix<double, 7, 1>;
 
-/// Where the camera of a capture stands, its yaw, and how it moves; from the state.
+/// Position, yaw and motion of the camera (or axis) of a capture, from the state.
 struct Placed {
   Eigen::Vector3d position_m;
   double cosine, sine;
   Eigen::Vector2d velocity_m_per_s;
   double yaw_rate_rad_per_s;
 
-  /// Rz(-g) (P - A) on a spot, Rz(-g) (P - S) elsewhere.
+  /// Returns the lamp relative to the axis (on a spot) or to the camera, in the level frame: Rz(-g)
+  /// (P - A) or Rz(-g) (P - S).
   Eigen::Vector3d still_of(const Eigen::Vector3d& lamp_m) const {
     const Eigen::Vector3d w = lamp_m - position_m;
     return {cosine * w.x() + sine * w.y(), cosine * w.y() - sine * w.x(), w.z()};
   }
 };
 
-/// Rz(-angle).
+/// Returns the rotation Rz(-angle).
 Eigen::Matrix3d turned_back(double angle_rad) {
   const double c = std::cos(angle_rad), s = std::sin(angle_rad);
   Eigen::Matrix3d turn;
@@ -44,7 +45,7 @@ Eigen::Matrix3d turned_back(double angle_rad) {
 }  // namespace
 
 ZenithTurn turn_by_zenith(const Eigen::Vector2d& zenith, const Eigen::Vector3d& x) {
-  // level_from_zenith(), the smallest turn of n to +Z, transposed.
+  // Transpose of level_from_zenith(), the smallest rotation of n to +Z.
   const double nz = 1 / std::sqrt(1 + zenith.squaredNorm());
   const Eigen::Vector2d n = zenith * nz;
   const double a = n.dot(x.head<2>()), across = a / (1 + nz), lift = x.z() - across;
@@ -67,7 +68,7 @@ LensFreedom::LensFreedom(const Camera& camera, const std::optional<MatrixX>& cov
                                               std::ssize(camera.intrinsics))),
       directions(stated_intrinsics(camera), 0) {
   if (!covariance) return;
-  // Pixels and coefficients are made comparable by their standard deviations.
+  // Scales pixels and coefficients by their standard deviations to make them comparable.
   const Eigen::VectorXd sd = covariance->diagonal().cwiseSqrt();
   const Eigen::VectorXd inverse_sd =
       (sd.array() > 0).select(sd.cwiseInverse(), Eigen::VectorXd::Zero(sd.size()));
@@ -137,7 +138,7 @@ Placed placed(const Eigen::VectorXd& state, const AdjustmentLayout& layout,
   const Eigen::Index position = capture.spot ? layout.spot(*capture.spot) : capture.own;
   Placed camera{state.segment<3>(position), std::cos(yaw_rad), std::sin(yaw_rad),
                 capture.motion.velocity_m_per_s, capture.motion.yaw_rate_rad_per_s};
-  // An axis stands.
+  // The axis is stationary.
   if (capture.spot) camera.velocity_m_per_s.setZero();
   if (capture.velocity_is_free()) camera.velocity_m_per_s = state.segment<2>(motion);
   if (capture.yaw_rate_is_free()) {
@@ -241,7 +242,7 @@ Eigen::Vector3d AdjustmentProblem::place_of(const PlaceSighting& place) const {
 
 namespace {
 
-/// How place_of() depends on the arm and on the yaw.
+/// Derivatives of place_of() with respect to the lever arm and to the yaw.
 struct PlaceDerivatives {
   Eigen::Matrix<double, 3, 2> by_arm;
   Eigen::Vector3d by_yaw;
@@ -252,6 +253,7 @@ PlaceDerivatives derivatives_of(const AdjustmentProblem& problem,
   const auto& capture = problem.captures[place.capture];
   const Placed camera = placed(problem.state(), problem.layout(), capture);
   const Eigen::Vector2d arm_m = problem.state().segment<2>(problem.layout().lever_arm);
+  // On a spot the position is that of the axis, elsewhere that of the camera.
   const double share = (place.of_axis ? 0 : 1) - (capture.spot ? 0 : 1);
   PlaceDerivatives at;
   at.by_arm << camera.cosine, -camera.sine, camera.sine, camera.cosine, 0, 0;
@@ -268,8 +270,8 @@ bool turns_the_arm(const AdjustmentProblem& problem,
 
 }  // namespace
 
-/// What Ceres minimizes. The unknowns stay in the problem's state, one vector, so that the order of
-/// their addresses, and with it Ceres' rounding, is always the same.
+/// Cost functions and solver. The unknowns stay in the state vector of the problem. The order of
+/// their addresses, and with it the rounding in Ceres, is therefore always the same.
 struct AdjustmentCosts {
   struct Lenses : ceres::EvaluationCallback {
     explicit Lenses(const AdjustmentProblem& of) : problem(of) {}
@@ -288,7 +290,8 @@ struct AdjustmentCosts {
     ++block;
   }
 
-  /// Blocks: the capture's own, [spot, lever arm], zenith, lamp, [lens].
+  /// Residual of an observation. Blocks: local unknowns of the capture, [spot, lever arm], zenith,
+  /// lamp, [lens].
   class Seen : public ceres::CostFunction {
    public:
     Seen(const AdjustmentProblem& problem, const Lenses& lenses,
@@ -327,7 +330,7 @@ struct AdjustmentCosts {
     bool on_spot_;
   };
 
-  /// Unknowns less their values before, over a standard deviation.
+  /// Residual (unknowns - prior mean) / sd.
   class Prior : public ceres::CostFunction {
    public:
     Prior(Eigen::VectorXd value, double sd) : value_(std::move(value)), weight_(1 / sd) {
@@ -351,7 +354,7 @@ struct AdjustmentCosts {
     double weight_;
   };
 
-  /// The held directions of the lamps. Blocks: all lamps.
+  /// Constraint of the fixed directions of the lamps. Blocks: all lamps.
   class Gauge : public ceres::CostFunction {
    public:
     explicit Gauge(const AdjustmentProblem& problem) : problem_(problem) {
@@ -378,7 +381,7 @@ struct AdjustmentCosts {
     const AdjustmentProblem& problem_;
   };
 
-  /// What is known of a capture's motion. Block: the capture's own.
+  /// Prior of the motion of a capture. Block: local unknowns of the capture.
   class Moved : public ceres::CostFunction {
    public:
     Moved(const AdjustmentProblem& problem, const AdjustmentProblem::Capture& capture)
@@ -402,7 +405,7 @@ struct AdjustmentCosts {
     const AdjustmentProblem::Capture& capture_;
   };
 
-  /// Blocks: the capture's own, [spot], [lever arm].
+  /// Residual of a known position. Blocks: local unknowns of the capture, [spot], [lever arm].
   class Stood : public ceres::CostFunction {
    public:
     Stood(const AdjustmentProblem& problem, const AdjustmentProblem::PlaceSighting& place)
@@ -442,7 +445,7 @@ struct AdjustmentCosts {
   };
 
   static bool solve(AdjustmentProblem& problem, bool robust) {
-    // 95 % as good as least squares on normal noise, in two and in three dimensions about.
+    // 95 % efficiency for normal noise, approximately in two and in three dimensions.
     constexpr double width = 2.385;
     const auto loss = [robust]() -> ceres::LossFunction* {
       return robust ? new ceres::CauchyLoss(width) : nullptr;
@@ -517,12 +520,12 @@ struct AdjustmentCosts {
     options.linear_solver_type = ceres::DENSE_SCHUR;
     options.linear_solver_ordering = order;
     options.max_num_iterations = 100;
-    // Plain least squares starts near its solution: Gauss-Newton steps, hardly damped.
+    // Plain least squares starts near its solution: Gauss-Newton steps with barely any damping.
     if (!robust) options.initial_trust_region_radius = 1e8;
     options.function_tolerance = robust ? 1e-5 : 1e-14;
     options.gradient_tolerance = 1e-14;
     options.parameter_tolerance = 1e-12;
-    options.num_threads = 1;  // the order of sums, and so their rounding, stays
+    options.num_threads = 1;  // keeps the order of sums and so their rounding
     options.logging_type = ceres::SILENT;
     ceres::Solver::Summary summary;
     ceres::Solve(options, &ceres, &summary);
@@ -534,7 +537,8 @@ bool AdjustmentProblem::solve(bool robust) { return AdjustmentCosts::solve(*this
 
 namespace {
 
-/// A capture's own unknowns and what they are mixed with, to be eliminated.
+/// Information of the local unknowns of a capture, and the cross block with global unknowns, for
+/// marginalization.
 struct OwnBlock {
   CaptureMatrix own = CaptureMatrix::Zero();
   std::vector<Eigen::Index> columns;
@@ -556,11 +560,11 @@ struct OwnBlock {
   }
 };
 
-/// A row block of derivatives by the shared unknowns, part by part.
+/// Derivatives of residuals with respect to global unknowns: first column and block of each part.
 using Parts = std::vector<std::pair<Eigen::Index, Eigen::MatrixXd>>;
 
-/// Returns the derivatives of the residual of a place, in standard deviations, by the capture's own
-/// unknowns, and puts those by the shared unknowns into `parts`.
+/// Returns the derivatives of the whitened residual of a known position with respect to the local
+/// unknowns of the capture. Stores those with respect to the global unknowns in `parts`.
 Eigen::MatrixXd whitened_derivatives(const AdjustmentProblem& problem,
                                      const AdjustmentProblem::PlaceSighting& place, Parts& parts) {
   const AdjustmentLayout& at = problem.layout();
@@ -583,15 +587,17 @@ Eigen::MatrixXd whitened_derivatives(const AdjustmentProblem& problem,
   return by_own;
 }
 
-/// The elimination of a capture's own unknowns: their information N, and N^-1 times the mixed
-/// block.
+/// Marginalization of the local unknowns of a capture: their information N, and N^-1 times the
+/// cross block.
 struct Elimination {
   Eigen::MatrixXd own, own_from_shared;
 };
 
-/// Returns the trace of the covariance of rows of whitened residuals, with derivatives B by the
-/// capture's own unknowns and A (`parts`) by the shared ones `columns`:
-/// tr(B N^-1 B' + (A - B N^-1 M) C (A - B N^-1 M)'), where M is the mixed block.
+/// Returns the trace of the covariance of whitened residuals,
+///   tr(B N^-1 B' + (A - B N^-1 M) C (A - B N^-1 M)')
+/// with their derivatives B (`by_own`) with respect to the local unknowns and A (`parts`) with
+/// respect to the global unknowns `columns`. M is the cross block, C the covariance of the global
+/// unknowns.
 double predicted_variance(const Eigen::MatrixXd& by_own, const Parts& parts,
                           const std::vector<Eigen::Index>& columns, const Elimination& eliminated,
                           const Eigen::MatrixXd& shared_covariance) {
@@ -616,8 +622,8 @@ void add_information(const Parts& parts, Eigen::MatrixXd& information) {
   }
 }
 
-/// Returns the information of what is known of the shared unknowns before any capture. Unknowns
-/// without a prior have that of a guess.
+/// Returns the prior information of the global unknowns. Unknowns without a prior have the
+/// information of a guess.
 Eigen::MatrixXd prior_information(const AdjustmentProblem& problem) {
   const AdjustmentLayout& at = problem.layout();
   Eigen::MatrixXd information = Eigen::MatrixXd::Zero(at.shared, at.shared);
@@ -637,7 +643,7 @@ Eigen::MatrixXd prior_information(const AdjustmentProblem& problem) {
   return information;
 }
 
-/// Puts the derivatives of a sighting by the shared unknowns into `parts`.
+/// Stores the derivatives of an observation with respect to the global unknowns in `parts`.
 void set_parts(const AdjustmentProblem& problem, const AdjustmentProblem::Sighting& sighting,
                const AdjustmentProblem::Linearized& seen, Parts& parts) {
   const AdjustmentLayout& at = problem.layout();
@@ -654,8 +660,8 @@ void set_parts(const AdjustmentProblem& problem, const AdjustmentProblem::Sighti
   }
 }
 
-/// Adds the information of residuals with these derivatives to that of the shared unknowns and to
-/// that of the capture's own.
+/// Adds the information of residuals with these derivatives to that of the global unknowns and of
+/// the local unknowns.
 void add_residuals(const Eigen::MatrixXd& by_own, const Parts& parts, Eigen::MatrixXd& information,
                    OwnBlock& block) {
   add_information(parts, information);
@@ -663,8 +669,8 @@ void add_residuals(const Eigen::MatrixXd& by_own, const Parts& parts, Eigen::Mat
   for (const auto& [first, by_shared] : parts) block.add(by_own, first, by_shared);
 }
 
-/// Eliminates a capture's own unknowns from the information of the shared ones.
-/// Precondition: the capture is used.
+/// Marginalizes the local unknowns of a capture from the information of the global ones.
+/// @pre the capture is used
 Elimination eliminate(const AdjustmentProblem& problem, const AdjustmentProblem::Capture& capture,
                       const OwnBlock& block, Eigen::MatrixXd& information) {
   const Eigen::Index size = capture.size(), n = std::ssize(block.columns);
@@ -687,7 +693,7 @@ Elimination eliminate(const AdjustmentProblem& problem, const AdjustmentProblem:
   return eliminated;
 }
 
-/// Returns the inverse of the information, zero for exact lamps.
+/// Returns the inverse of the information; zero for exact lamps.
 Eigen::MatrixXd covariance_from_information(const AdjustmentProblem& problem,
                                             const Eigen::MatrixXd& information) {
   const AdjustmentLayout& at = problem.layout();

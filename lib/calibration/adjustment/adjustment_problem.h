@@ -12,29 +12,30 @@
 #include "positioning/positioner.h"
 #include "rig/calibration.h"
 
-/// The least-squares problem behind adjust_captures(): its unknowns in one vector, its residuals
-/// with their derivatives, its solution by Ceres, its covariance.
+/// Least-squares problem of adjust_captures(): unknowns in one vector, residuals with derivatives,
+/// solution by Ceres, covariance.
 namespace vlp {
 
-/// Where the unknowns stand in the vector: first those that captures share, then those of each
-/// capture. A part that is not there has size 0.
+/// Positions of the unknowns in the vector: first the global ones, then those of each capture. An
+/// absent part has size 0.
 struct AdjustmentLayout {
-  /// Of the lens, in units of its standard deviations (LensFreedom).
+  /// Correction of the lens, in units of its standard deviations (LensFreedom).
   Eigen::Index lens = 0, lens_size = 0;
-  /// (x/z, y/z) of the zenith in the camera.
+  /// Point (x/z, y/z) of the zenith in the camera.
   Eigen::Index zenith = 0;
   Eigen::Index lever_arm = 0;
-  /// Three a lamp, three (x, y of the axis, z of the camera) a spot.
+  /// Three per lamp; three (x, y of the axis, z of the camera) per spot.
   Eigen::Index lamps = 0, spots = 0;
+  /// Number of global unknowns.
   Eigen::Index shared = 0;
 
   Eigen::Index lamp(std::size_t i) const { return lamps + 3 * static_cast<Eigen::Index>(i); }
   Eigen::Index spot(std::size_t i) const { return spots + 3 * static_cast<Eigen::Index>(i); }
 };
 
-/// The directions in which a lens may move: intrinsics = start + directions u, where u has unit
-/// covariance; those of which errors are stated (stated_intrinsics()). Directions in which the
-/// covariance is nothing but rounding are left out.
+/// Whitened parametrization of the lens: intrinsics = start + directions u, where u has unit
+/// covariance. Comprises the intrinsics that have errors (stated_intrinsics()). Omits directions in
+/// which the covariance is numeric noise.
 struct LensFreedom {
   Eigen::VectorXd start;
   Eigen::MatrixXd directions;
@@ -42,27 +43,30 @@ struct LensFreedom {
   LensFreedom(const Camera& camera, const std::optional<MatrixX>& covariance);
 };
 
+/// Unknowns, observations and priors of an adjustment.
 class AdjustmentProblem {
  public:
+  /// Observation of a lamp in a capture.
   struct Sighting {
     std::size_t capture, lamp;
     Eigen::Vector2d pixel;
     double sigma_px;
-    /// Scales residuals in pixels to standard deviations.
+    /// Maps residuals in pixels to standard deviations.
     Eigen::Matrix2d whitening;
-    /// When it is read.
+    /// Readout time relative to the middle of the image.
     double time_s;
     bool used = true;
   };
+  /// Capture with the location of its local unknowns.
   struct Capture {
-    /// Index of the spot; nothing when it stands by itself.
+    /// Index of the spot; std::nullopt if the capture has a position of its own.
     std::optional<std::size_t> spot;
-    /// From the level frame to that of the robot's inclination.
+    /// Rotation from the level frame to the frame of the base.
     Eigen::Matrix3d base_from_level;
-    /// Of the camera; on a spot the yaw rate alone.
+    /// Motion of the camera; on a spot only the yaw rate is used.
     KnownMotion motion = {};
-    /// Where its own unknowns stand: (X, Y, Z, yaw), or, on a spot, the yaw; then, as far as they
-    /// are not known, the velocity and the yaw rate.
+    /// Index of its first local unknown. The local unknowns are (X, Y, Z, yaw), or the yaw on a
+    /// spot, followed by velocity and yaw rate if these are not known exactly.
     Eigen::Index own = 0;
 
     bool velocity_is_free() const { return !spot && motion.velocity_sd_m_per_s > 0; }
@@ -73,25 +77,27 @@ class AdjustmentProblem {
     }
     Eigen::Index size() const { return pose_size() + motion_size(); }
   };
+  /// Surveyed position of a lamp.
   struct LampPrior {
     Eigen::Vector3d surveyed_m;
-    /// 0: exact. Infinite: it counts for nothing.
+    /// Standard deviation per axis. 0: the lamp is fixed; infinite: the survey is ignored.
     double sd_m;
   };
-  /// What one known place says of one capture.
+  /// Observation of a known position by one capture.
   struct PlaceSighting {
     std::size_t capture, place;
     bool of_axis;
     Eigen::Vector3d stated_m;
-    /// 2 without a height.
+    /// Number of coordinates: 3, or 2 without a height.
     Eigen::Index size;
-    /// With which it counts: that of the place, times the root of its number of captures.
+    /// Effective standard deviation: that of the known position times the square root of its number
+    /// of captures.
     double sd_m;
   };
 
   AdjustmentProblem(LensModel model, LensFreedom freedom, std::size_t lamps, std::size_t spots);
 
-  /// Adds a capture with its unknowns at this place.
+  /// Adds a capture and its local unknowns, with the initial pose `start`.
   void add_capture(const Capture& capture, const Pose& start);
 
   const AdjustmentLayout& layout() const { return layout_; }
@@ -101,22 +107,23 @@ class AdjustmentProblem {
   std::vector<Capture> captures;
   std::vector<Sighting> sightings;
   std::vector<LampPrior> lamps;
-  /// Directions of the lamps' coordinates that stay as surveyed, a column each, over the standard
-  /// deviation with which they do. Without columns, nothing is held.
+  /// Directions of the lamps' coordinates that stay as surveyed, one column each, divided by the
+  /// standard deviation of this constraint. Without columns there is no constraint.
   Eigen::MatrixXd gauge;
   std::vector<PlaceSighting> places;
   std::vector<bool> place_used;
-  /// Whether some residual depends on the lever arm.
+  /// True if some residual depends on the lever arm.
   bool has_lever_arm = false;
-  /// What sigma_px is multiplied with.
+  /// Factor of sigma_px.
   double noise_scale = 1;
 
-  /// Least squares from the state as it is, which it moves; with `robust`, Cauchy's loss on
-  /// sightings, lamps and places. False when it does not converge to something finite.
+  /// Solves by least squares from the current state and updates it. With `robust`, applies a Cauchy
+  /// loss to observations, lamps and known positions. Returns false if the solution is not usable
+  /// or not finite.
   bool solve(bool robust);
 
-  /// The whitened residual of a sighting, seen less predicted; nothing where the lens has no such
-  /// ray. Derivatives by the shared unknowns it depends on and by the capture's own.
+  /// Whitened residual of an observation, measured minus predicted, and its derivatives with
+  /// respect to the global unknowns and to the local ones of the capture.
   struct Linearized {
     Eigen::Vector2d residual;
     Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::ColMajor, 2, 16> by_lens;
@@ -124,35 +131,40 @@ class AdjustmentProblem {
     Eigen::Matrix<double, 2, 3> by_lamp, by_spot;
     Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::ColMajor, 2, 7> by_own;
   };
+  /// Linearizes an observation at the current state. Returns std::nullopt if the lens cannot
+  /// project the point.
   std::optional<Linearized> linearize(const Sighting& sighting, const Lens& lens) const;
 
-  /// Of the camera (or of the axis it turns about) in the capture.
+  /// Returns the position of the camera (or of the axis) in the capture, from the current state.
   Eigen::Vector3d place_of(const PlaceSighting& place) const;
 
-  /// What is known of a capture's motion, where it is not known exactly: the state less it, in
-  /// standard deviations, and one over these.
+  /// Prior of the motion unknowns of a capture, one entry for each that is not known exactly.
+  /// `deviations` are (state - prior mean) / sd, `weights` are 1 / sd.
   struct MotionPrior {
     Eigen::VectorXd deviations, weights;
   };
+  /// Returns the prior residuals of the motion of a capture.
   MotionPrior motion_prior(const Capture& capture) const;
 
-  /// How many unknowns of a capture's motion its sightings determine, where what is known does not:
-  /// of each one less its variance over that which was known before.
+  /// Returns the number of motion unknowns of a capture that its observations determine: the sum of
+  /// 1 - (posterior variance / prior variance).
   double told_of_motion(std::size_t capture) const;
 
-  /// The lens that the state stands for; nothing where that is none.
+  /// Returns the lens of the current state; std::nullopt if its intrinsics are invalid.
   std::optional<Lens> lens() const;
   std::vector<double> intrinsics() const;
 
+  /// Result of shared_covariance().
   struct SharedCovariance {
-    /// Covariance of the shared unknowns, zero for exact ones. Unknowns that no residual depends on
-    /// have the standard deviation of a guess: 1 rad, 10 m.
+    /// Covariance of the global unknowns, zero for exact ones. Unknowns without any residual have
+    /// the standard deviation of a guess: 1 rad, 10 m.
     Eigen::MatrixXd matrix;
-    /// Number of unknowns that known places determine: the sum of tr(C_place) / sd^2 over the
-    /// places that are used, C_place being the covariance of the adjusted place.
+    /// Number of unknowns that known positions determine: the sum of tr(C) / sd^2 over the
+    /// positions that are used. C is the covariance of the adjusted position.
     double determined_by_places;
   };
-  /// Computes the covariance of the shared unknowns at the state.
+  /// Computes the covariance of the global unknowns at the current state, after marginalization of
+  /// the local ones.
   SharedCovariance shared_covariance() const;
 
   const LensFreedom& freedom() const { return freedom_; }
@@ -166,12 +178,15 @@ class AdjustmentProblem {
   Eigen::VectorXd state_;
 };
 
-/// camera_from_level of a zenith's normalized point, times x, and its derivative by the point.
+/// Point in the camera, its derivative with respect to the zenith's normalized point, and the
+/// rotation.
 struct ZenithTurn {
   Eigen::Vector3d x_in_camera;
   Eigen::Matrix<double, 3, 2> by_zenith;
   Eigen::Matrix3d camera_from_level;
 };
+/// Rotates a point of the level frame into the camera by camera_from_level of a zenith, given as a
+/// normalized point.
 ZenithTurn turn_by_zenith(const Eigen::Vector2d& zenith, const Eigen::Vector3d& x_in_level);
 
 }  // namespace vlp

@@ -13,7 +13,7 @@ namespace vlp {
 
 namespace {
 
-/// Fills in what the offset makes of the fixes.
+/// Sets the fixes and circles before and after the correction.
 void apply(DispersionFit& fit, const StationFixes& station, const std::vector<bool>& used,
            DispersionCircle kind) {
   const OptionalFixes before = station.at({0, 0}), after = station.at(fit.dispersion.offset_px);

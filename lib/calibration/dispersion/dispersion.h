@@ -17,62 +17,71 @@
 
 namespace vlp {
 
-/// A capture at a known place.
+/// Capture at a reference point, that is, at a known position of the camera.
 struct StationCapture {
   std::vector<Detection> detections;
-  /// Where the camera is, in the world.
+  /// Position of the camera in the world: the reference point.
   Eigen::Vector2d station_m;
   std::optional<Inclination> inclination = {};
 };
 
+/// Method of fit_dispersion().
 enum class DispersionMethod {
-  /// What is fixed in the camera apart from what is fixed in the world; captures at various yaws.
+  /// Separates errors that rotate with the camera from errors that are fixed in the world. Requires
+  /// captures at various yaws.
   camera,
-  /// The paper's: the centre of the dispersion circle is taken back; captures at one yaw.
+  /// Method of Chen and Guan: moves the center of the dispersion circle to the reference point.
+  /// Requires captures at one yaw.
   paper
 };
 
-/// What the paper's circle is: the mean fix and the farthest from it, or the smallest enclosing
-/// one.
+/// Definition of the dispersion circle: `mean` is centered at the mean fix and contains the
+/// farthest one; `enclosing` is the smallest enclosing circle.
 enum class DispersionCircle { mean, enclosing };
 
+/// Result of a dispersion calibration.
 enum class DispersionStatus {
   ok,
-  no_fix,            // no capture has one
+  no_fix,            // no capture has a position fix
   too_few_captures,  // fewer than three with a fix (`paper`: two)
-  station_far,       // every fix is far from it
-  one_yaw,           // `camera`: camera and world cannot be told apart
-  many_yaws,         // `paper`
+  station_far,       // every fix is far from the reference point
+  one_yaw,           // `camera`: one yaw cannot separate errors of camera and world
+  many_yaws,         // `paper`: the captures are at several yaws
   diverged           // no offset explains the fixes
 };
 
-/// What it means and what to add, for people.
+/// Describes the status and the remedy, human-readable.
 std::string_view explanation_of(DispersionStatus status);
 
 /// Result of fit_dispersion(). Members after `noise_is_stated` are valid only if the status is
 /// `ok`.
 struct DispersionFit {
   DispersionStatus status = DispersionStatus::no_fix;
-  /// Captures without a fix, and why the first has none.
+  /// Number of captures without a fix.
   int captures_without_fix = 0;
+  /// Reason why the first of them has none.
   FixStatus no_fix_status = FixStatus::ok;
   /// True if all detections state their sigma_px.
   bool noise_is_stated = false;
 
-  /// Its circle is that of `before`. The covariance is from the scatter of the fixes and their
-  /// noise (compute_variance_factor()), `by_lamps` from the map's sd_m. There is neither for the
-  /// enclosing circle.
+  /// Offset with its uncertainty; the circle is that of `before`. The covariance follows from the
+  /// scatter of the fixes and their noise (compute_variance_factor()), `by_lamps` from the map's
+  /// sd_m. Both are absent for the enclosing circle.
   Dispersion dispersion = {{0, 0}, 0, {0, 0}, 0, {}};
-  /// Fixed in the world, an error of the station or of the lamp map: mean fix minus station that
-  /// stays, and its covariance from noise and map. Method `paper` takes it for zero.
+  /// Mean error of the corrected fixes, fixed in the world: fix minus reference point. Caused by
+  /// errors of the reference point or the lamp map. Absent for method `paper`, which assumes that
+  /// it is zero.
   std::optional<Eigen::Vector2d> world_offset_m = {};
+  /// Covariance of `world_offset_m` from noise and map.
   Matrix2 world_covariance = Matrix2::Zero();
 
+  /// Position fix of one capture.
   struct StationFix {
+    /// Index of the capture.
     std::size_t capture;
-    /// Fix minus station without any dispersion correction, and with that found.
+    /// Fix minus reference point, without any dispersion correction and with the estimated one.
     Eigen::Vector2d before_m, after_m;
-    /// Otherwise it contradicts the others and is left out.
+    /// False if the fix contradicts the other fixes and is rejected.
     bool used;
   };
   std::vector<StationFix> fixes = {};
@@ -80,17 +89,25 @@ struct DispersionFit {
   Circle before = {{0, 0}, 0}, after = {{0, 0}, 0};
 };
 
-/// The dispersion calibration (Chen and Guan, section 3.2; lib/THEORY.md, "Dispersion circle"). A
-/// level camera of yaw g_k, H_k below the lamps, whose normalized points z are too large by delta,
-/// and a station or map that is wrong by m, put
-///   fix_k - station = -H_k e^{j g_k} delta + m.
-/// Method `paper` (eq. 10 to 13 with the scale f / H and the turn by the yaw that they lack) takes
-/// the circle's centre D for the whole of it: offset_px = -f e^{-jg} D / H, corrected until the
-/// circle of the fixes made anew has its centre at the station (find_paper_offset). Method `camera`
-/// estimates offset_px = f delta and m so that the fixes, made anew with the offset as
-/// level_from_camera() applies it, agree with -H e^{jg} delta and m exactly; each weighs by its
-/// covariance. Fixes farther off than five standard deviations, of the residuals' median, are left
-/// out. A dispersion that `calibration` has already is not used.
+/// Estimates the dispersion: an offset in the undistorted image that makes fixes err with the yaw
+/// of the camera (lib/THEORY.md, "Dispersion circle").
+///
+/// A level camera with yaw g_k has its lamps at height H_k above it. If its normalized points are
+/// too large by delta, and reference point or map have an error m, then
+///   fix_k - station = -H_k e^{j g_k} delta + m
+///
+/// Method `paper` assumes m = 0. The center D of the circle gives offset_px = -f e^{-jg} D / H. The
+/// offset is corrected until the circle of the recomputed fixes is centered at the reference point
+/// (find_paper_offset()). These are eq. 10 to 13, with the scale f / H and the rotation by the yaw,
+/// which the paper omits.
+///
+/// Method `camera` estimates offset_px = f delta and m. The fixes are recomputed with the offset as
+/// in level_from_camera(), so that the model is exact. Each fix is weighted by its covariance.
+///
+/// Fixes beyond five standard deviations, from the median of the residuals, are rejected. An
+/// existing dispersion of `calibration` is ignored.
+///
+/// Source: Chen and Guan, section 3.2.
 DispersionFit fit_dispersion(std::span<const StationCapture> captures, const LampMap& map,
                              const Calibration& calibration, DispersionMethod method,
                              DispersionCircle circle = DispersionCircle::mean);

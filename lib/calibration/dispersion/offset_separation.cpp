@@ -15,7 +15,7 @@ namespace {
 
 using Fixes = std::vector<std::optional<StationFixes::At>>;
 
-/// A fix's residual and its derivative by (offset_px, world_m), whitened.
+/// Whitened residual of a fix and its derivative with respect to (offset_px, world_m).
 struct Equation {
   std::size_t capture;
   Eigen::Vector2d residual;
@@ -25,7 +25,8 @@ struct Equation {
 };
 
 std::vector<Equation> linearize(const StationFixes& fixes, const OffsetSeparation& at) {
-  constexpr double step_px = 0.25;  // fixes are smooth over it, and far above their rounding
+  constexpr double step_px =
+      0.25;  // fixes are smooth over this step, which is far above their rounding
   const Eigen::Vector2d along_u(step_px, 0), along_v(0, step_px);
   const Fixes here = fixes.at(at.offset_px);
   const Fixes right = fixes.at(at.offset_px + along_u), left = fixes.at(at.offset_px - along_u);
@@ -52,7 +53,8 @@ std::vector<double> squares_of(const std::vector<Equation>& equations) {
   return squares;
 }
 
-/// One step of weighted least squares; nothing where that is not determined.
+/// Applies one step of weighted least squares to `at` and returns it. Returns std::nullopt if the
+/// equations do not determine it.
 std::optional<Eigen::Vector4d> step_of(const std::vector<Equation>& equations,
                                        const std::vector<double>& weights, OffsetSeparation& at) {
   Eigen::Matrix4d information = Eigen::Matrix4d::Zero();
@@ -77,20 +79,21 @@ std::optional<Eigen::Vector4d> step_of(const std::vector<Equation>& equations,
   return step;
 }
 
-/// Returns the degrees of freedom of fixes: two rows each, minus offset and world.
+/// Returns the degrees of freedom of fixes: two rows each, minus the four unknowns.
 double freedom_of(const std::vector<double>& squares) {
   return 2 * static_cast<double>(squares.size()) - 4;
 }
 
-/// Returns the variance per axis, above zero so that it can be divided by.
+/// Estimates the variance per axis. Returns a value above zero, so that it can be a divisor.
 double variance_of(const std::vector<double>& squares) {
   return std::max(robust_planar_variance(squares, freedom_of(squares)), kFixRoundingVariance);
 }
 
-/// Approaches the solution so closely that outliers can be recognized.
+/// Approaches the solution closely enough to recognize outliers. Returns false if the fixes do not
+/// determine it.
 bool approach(const StationFixes& fixes, OffsetSeparation& at) {
   constexpr int iterations = 6;
-  constexpr double width_squared = 2.385 * 2.385;  // 95 % as good as least squares on normal noise
+  constexpr double width_squared = 2.385 * 2.385;  // 95 % efficiency for normal noise
   for (int iteration = 0; iteration < iterations; ++iteration) {
     const auto equations = linearize(fixes, at);
     if (equations.empty()) return false;
@@ -104,7 +107,8 @@ bool approach(const StationFixes& fixes, OffsetSeparation& at) {
   return true;
 }
 
-/// Least squares without what contradicts the rest; whether that is another set than `at.used`.
+/// Solves by least squares without outliers. Returns true if the set of inliers differs from
+/// `at.used`, and std::nullopt if the solution does not converge.
 std::optional<bool> settle(const StationFixes& fixes, OffsetSeparation& at) {
   constexpr int max_iterations = 30;
   constexpr double small_px = 1e-7, small_m = 1e-10;
@@ -131,7 +135,8 @@ std::optional<bool> settle(const StationFixes& fixes, OffsetSeparation& at) {
   return std::nullopt;
 }
 
-/// Propagates errors of the map: the solution moves by -(J'WJ)^-1 J'W d, d being the fixes' moves.
+/// Propagates errors of the map. The solution changes by -(J'WJ)^-1 J'W d, where d are the changes
+/// of the fixes.
 LampDerivatives propagate_map(const StationFixes& fixes, const OffsetSeparation& at) {
   LampDerivatives derivatives = fixes.compute_lamp_derivatives(at.offset_px);
   if (derivatives.lamps.empty()) return derivatives;

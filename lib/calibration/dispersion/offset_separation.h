@@ -10,32 +10,39 @@
 
 namespace vlp {
 
-/// What is wrong in the camera and what in the world, see fit_dispersion().
+/// Errors of camera and world from fit_dispersion(), method `camera`.
 struct OffsetSeparation {
+  /// Offset in the undistorted image, which rotates with the camera.
   Eigen::Vector2d offset_px = Eigen::Vector2d::Zero();
+  /// Mean error of the corrected fixes, fixed in the world.
   Eigen::Vector2d world_m = Eigen::Vector2d::Zero();
-  /// Covariance of both, offset_px first, if the fixes scatter as their covariances state and the
-  /// map is exact.
+  /// Covariance of (offset_px, world_m) for fixes that scatter according to their covariances and
+  /// an exact map.
   Eigen::Matrix4d covariance;
-  /// Derivatives of both by the places of the lamps, rows in the order of `covariance`.
+  /// Derivatives of (offset_px, world_m) with respect to the positions of the lamps, rows as in
+  /// `covariance`.
   LampDerivatives by_lamps = {};
-  /// Squared residuals over what those let expect; zero when as many fixes as unknowns are used.
+  /// Variance factor: squared residuals divided by their expectation. It is 0 without redundancy.
   double excess;
-  /// Number of rows of the fixes that are used, minus the unknowns.
+  /// Number of rows of the used fixes minus the number of unknowns.
   int freedom = 0;
-  /// Of each capture.
+  /// True for each capture whose fix is used.
   std::vector<bool> used;
 };
 
-/// Gauss-Newton on fix_k(offset) - station - world, the fixes' derivatives from differences; Cauchy
-/// weights first, then plain least squares without outliers (kFixOutlierSigmas). Returns
-/// std::nullopt if the captures do not determine it, or it does not converge.
+/// Estimates offset and world error by Gauss-Newton iterations on fix_k(offset) - station - world.
+/// Differentiates the fixes numerically. Starts with Cauchy weights, then uses plain least squares
+/// without outliers (kFixOutlierSigmas).
+///
+/// Returns std::nullopt if the captures do not determine the unknowns, or if the iterations do not
+/// converge.
 std::optional<OffsetSeparation> separate_offsets(const StationFixes& fixes);
 
-/// Standard deviations beyond which a fix is an outlier, if the variance is known
+/// Number of standard deviations beyond which a fix is an outlier, for a known variance
 /// (planar_outlier_bound()).
 inline constexpr double kFixOutlierSigmas = 5;
-/// Variance below which residuals are rounding.
+/// Smallest variance of residuals, in m^2 or relative to their covariance. Smaller ones are numeric
+/// noise.
 inline constexpr double kFixRoundingVariance = 1e-24;
 
 }  // namespace vlp

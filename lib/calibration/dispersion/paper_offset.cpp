@@ -32,10 +32,12 @@ Eigen::Vector2d mean_of(const std::vector<Eigen::Vector2d>& points) {
   return sum / static_cast<double>(points.size());
 }
 
-/// How the offset moves the mean fix, from differences; not finite where there is no fix.
+/// Differentiates the mean fix with respect to the offset, numerically. The result is not finite if
+/// there is no fix.
 Eigen::Matrix2d floor_from_image(const StationFixes& station, const Eigen::Vector2d& at_px,
                                  const std::vector<bool>& used) {
-  constexpr double step_px = 0.25;  // fixes are smooth over it, and far above their rounding
+  constexpr double step_px =
+      0.25;  // fixes are smooth over this step, which is far above their rounding
   Eigen::Matrix2d derivative;
   for (Eigen::Index axis = 0; axis < 2; ++axis) {
     const Eigen::Vector2d step = step_px * Eigen::Vector2d::Unit(axis);
@@ -46,8 +48,8 @@ Eigen::Matrix2d floor_from_image(const StationFixes& station, const Eigen::Vecto
   return derivative;
 }
 
-/// Returns the mean noise covariance of the fixes, in m^2: zero where neither sigma_px nor
-/// residuals give the noise.
+/// Returns the mean noise covariance of the fixes, in m^2. Returns zero if neither sigma_px nor
+/// residuals determine the noise.
 Eigen::Matrix2d noise_of_fixes(const OptionalFixes& fixes, const std::vector<bool>& used,
                                bool noise_is_stated) {
   Eigen::Matrix2d sum = Eigen::Matrix2d::Zero();
@@ -65,9 +67,10 @@ Eigen::Matrix2d noise_of_fixes(const OptionalFixes& fixes, const std::vector<boo
 
 /// Estimates the covariance of the mean of n errors from their scatter and their noise.
 ///
-/// Few errors do not determine a covariance: two give one of rank 1. The sample covariance counts
-/// with n - 1, its isotropic mean with isotropic_weight. In coordinates in which the noise is the
-/// unit matrix, compute_variance_factor() makes the variance along each axis of it.
+/// Few errors do not determine a covariance: two errors give one of rank 1. The sample covariance
+/// therefore has weight n - 1 and its isotropic mean has isotropic_weight.
+/// compute_variance_factor() scales the variance along each axis of the result, in coordinates in
+/// which the noise is the unit matrix.
 Eigen::Matrix2d covariance_of_mean(const std::vector<Eigen::Vector2d>& errors,
                                    const Eigen::Matrix2d& noise) {
   constexpr double isotropic_weight = 2;  // as three errors
@@ -91,8 +94,8 @@ Eigen::Matrix2d covariance_of_mean(const std::vector<Eigen::Vector2d>& errors,
   return l * axes * values.asDiagonal() * axes.transpose() * l.transpose() / n;
 }
 
-/// Computes the derivatives of the offset by the places of the lamps. The offset takes back the
-/// mean of the moves of the fixes.
+/// Computes the derivatives of the offset with respect to the positions of the lamps. The offset
+/// compensates the mean change of the fixes.
 LampDerivatives compute_offset_derivatives(const StationFixes& station, const PaperOffset& found,
                                            const Eigen::Matrix2d& image_from_floor) {
   LampDerivatives derivatives = station.compute_lamp_derivatives(found.offset_px);

@@ -11,30 +11,36 @@
 
 namespace vlp {
 
-/// The circle of some points. Precondition: there is one.
+/// Returns the dispersion circle of the points.
+/// @pre there is at least one point
 Circle circle_of(const std::vector<Eigen::Vector2d>& points, DispersionCircle kind);
 
+/// Result of find_paper_offset(). Members other than `status` are valid only if it is `ok`.
 struct PaperOffset {
-  /// `ok`, many_yaws or diverged; otherwise there is nothing below.
+  /// Status `ok`, `many_yaws` or `diverged`.
   DispersionStatus status;
   Eigen::Vector2d offset_px = Eigen::Vector2d::Zero();
-  /// Covariance from the scatter of the fixes, at least that of their noise. std::nullopt for the
+  /// Covariance from the scatter of the fixes, at least that of their noise. Absent for the
   /// enclosing circle.
   std::optional<Matrix2> covariance = {};
-  /// Derivatives of offset_px by the places of the lamps; empty without a covariance.
+  /// Derivatives of offset_px with respect to the positions of the lamps; empty without a
+  /// covariance.
   LampDerivatives by_lamps = {};
-  /// Of each capture.
+  /// True for each capture whose fix is used.
   std::vector<bool> used = {};
 };
 
-/// The offset with which the circle of the fixes has its centre at the station (eq. 10 and 11), of
-/// captures at one yaw. It starts from eq. 12 and 13 as meant, -f e^{-jg} D / H, which is the whole
-/// of it where the offset is applied as a shift under lamps of one height; after a rotation centre
-/// of model `tilt` it is applied as a turn, which moves fixes by more, and so it is corrected by
-/// what is left of D until nothing is. Precondition: there is a fix.
+/// Finds the offset with which the circle of the fixes is centered at the reference point (eq. 10
+/// and 11), for captures at one yaw.
 ///
-/// @param noise_is_stated  whether all detections state their sigma_px; otherwise it is estimated
-///                         from the residuals of the fixes
+/// @param noise_is_stated  whether all detections have a sigma_px; otherwise it is estimated from
+///     the residuals of the fixes
+/// @pre there is at least one fix
+///
+/// Starts with eq. 12 and 13 in their intended form, -f e^{-jg} D / H. This is exact if the offset
+/// is applied as a shift and all lamps have one height. After a rotation center of model `tilt` the
+/// offset is applied as a rotation, which moves fixes by more. The offset is therefore corrected by
+/// the remaining D until it vanishes.
 PaperOffset find_paper_offset(const StationFixes& station, const Eigen::Vector2d& focal_px,
                               DispersionCircle kind, bool noise_is_stated);
 

@@ -11,7 +11,7 @@
 namespace vlp {
 namespace {
 
-/// Mean height of the lamps seen.
+/// Returns the mean height of the detected lamps, in the world.
 double lamps_height(const StationCapture& capture, const LampMap& map) {
   double sum_m = 0;
   int count = 0;

@@ -11,41 +11,47 @@
 
 namespace vlp {
 
-/// Derivatives of some quantities by the places of lamps that the map states an sd_m of.
+/// Derivatives of several quantities with respect to the positions of the lamps that have an sd_m
+/// in the map.
 struct LampDerivatives {
   std::vector<Lamp> lamps;
-  /// A row for each quantity, three columns for each lamp.
+  /// One row for each quantity, three columns for each lamp.
   Eigen::MatrixXd by_positions;
 
-  /// Returns the moves of the quantities by errors of one standard deviation, a column each.
+  /// Returns the changes of the quantities for errors of one standard deviation, one column per
+  /// lamp coordinate.
   Eigen::MatrixXd compute_moves() const;
 };
 
-/// The fixes of captures at a station, as functions of the dispersion's offset.
+/// Position fixes of captures at a reference point, as functions of the dispersion's offset.
 class StationFixes {
  public:
+  /// Position fix of one capture for a given offset.
   struct At {
-    /// Fix minus station.
+    /// Fix minus reference point.
     Eigen::Vector2d error_m;
-    /// Of this capture's noise alone: what all have in common does not scatter them.
+    /// Covariance from the noise of this capture alone. Errors that all captures have in common do
+    /// not scatter the fixes.
     Eigen::Matrix2d covariance;
     double yaw_rad;
-    /// Of the lamps it rests on, above it.
+    /// Mean height above the camera of the detected lamps of the map.
     double height_m;
-    /// Sum of the squared residuals of its lamps, and its degrees of freedom.
+    /// Sum of the squared residuals of the lamps.
     double squared_residuals_px2;
+    /// Degrees of freedom of `squared_residuals_px2`.
     int degrees_of_freedom;
   };
 
   StationFixes(std::span<const StationCapture> captures, const LampMap& map,
                const Calibration& calibration);
 
-  /// Of each capture; nothing where there is no fix.
+  /// Returns the fix of each capture; std::nullopt for captures without a fix.
   std::vector<std::optional<At>> at(const Eigen::Vector2d& offset_px) const;
-  /// Computes the derivatives of the fixes, in m, by the places of the lamps that are detected and
-  /// have an sd_m above zero, by a difference each. Two rows for each capture, zero without a fix.
+  /// Computes the derivatives of the fixes, in m, with respect to the positions of the lamps that
+  /// are detected and have an sd_m above zero. Differentiates numerically, one coordinate at a
+  /// time. The result has two rows for each capture, which are zero without a fix.
   LampDerivatives compute_lamp_derivatives(const Eigen::Vector2d& offset_px) const;
-  /// Of captures without one.
+  /// Returns the status of the first capture without a fix; `ok` if there is none.
   FixStatus first_refusal() const { return first_refusal_; }
 
  private:

@@ -24,7 +24,7 @@ double compute_student_factor(double degrees_of_freedom) {
          (sigmas_of_95_percent * sigmas_of_95_percent);
 }
 
-/// Computes the weight of residuals that contradict stated noise: 0 up to the ratio that 20 % of
+/// Computes the weight of residuals that contradict given noise: 0 up to the ratio that 20 % of
 /// all residuals exceed, 1 from that of 5 %, linear in between.
 double compute_contradiction(double ratio, double degrees_of_freedom) {
   constexpr double sigmas_of_20_percent = 0.8416, sigmas_of_5_percent = 1.6449;

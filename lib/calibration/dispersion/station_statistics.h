@@ -8,34 +8,40 @@
 
 #include "calibration/dispersion/station_fixes.h"
 
-/// What the fixes at a station are like as a whole. Captures without a fix count for nothing.
+/// Statistics of all fixes at a reference point. Captures without a fix are ignored.
 namespace vlp {
 
-/// Of each capture.
+/// Fix of each capture.
 using OptionalFixes = std::vector<std::optional<StationFixes::At>>;
 
 /// Means over the fixes that are used.
 struct TypicalFix {
+  /// Mean of the unit vectors along the yaws.
   Eigen::Vector2d heading = Eigen::Vector2d::Zero();
+  /// Mean height of the lamps above the camera.
   double height_m = 0;
+  /// Number of fixes.
   int count = 0;
 
-  /// Root of the mean squared sine, about, of the yaws from their mean.
+  /// Returns the approximate RMS sine of the yaws relative to their mean.
   double yaw_variety() const;
+  /// Returns true if the yaws vary by less than about 10 degrees.
   bool at_one_yaw() const;
 };
 
+/// Computes the means over the fixes that are used.
 TypicalFix typical_of(const OptionalFixes& fixes, const std::vector<bool>& used);
 
-/// Whether one yaw is left when some single fix is left out: one alone is not to tell camera from
-/// world.
+/// Returns true if the removal of a single fix leaves one yaw. One fix alone is not sufficient to
+/// separate errors of camera and world.
 bool at_one_yaw_without_one(const OptionalFixes& fixes, std::vector<bool> used);
 
-/// Whether every fix is farther from the station than a camera that leans by 11 degrees would be.
+/// Returns true if every fix is farther from the reference point than a camera tilted by 11 degrees
+/// would be.
 bool far_from_all(const OptionalFixes& fixes);
 
-/// Degrees of freedom with which stated noise counts: its standard deviation is right to 29 %,
-/// 1 / sqrt(12).
+/// Degrees of freedom assigned to given noise: its standard deviation is accurate to 29 %, 1 /
+/// sqrt(12).
 inline constexpr double kStatedFreedom = 6;
 
 /// Computes the factor of a variance, so that 1.96 standard deviations cover about 95 % of the
@@ -43,7 +49,7 @@ inline constexpr double kStatedFreedom = 6;
 ///
 /// The residuals have the variance s^2 = `ratio` times the nominal one, with nu degrees of freedom;
 /// q(m) = (t_m / 1.96)^2 with a bound t_m of Student's t at 97.5 % (student_bound). If the noise is
-/// not stated the factor is ratio q(nu). Stated noise counts as an estimate with
+/// not stated the factor is ratio q(nu). Given noise counts as an estimate with
 /// n = kStatedFreedom:
 ///   f = max(1, (n + nu ratio) / (n + nu) q(n + nu)),
 /// and if the residuals contradict it, f (ratio q(nu) / f)^w where that is larger: w rises from 0
@@ -53,7 +59,9 @@ inline constexpr double kStatedFreedom = 6;
 double compute_variance_factor(double ratio, double degrees_of_freedom, bool noise_is_stated,
                                std::optional<double> pooled_ratio = {});
 
-/// Those within five standard deviations of the median fix, at one yaw. Precondition: there is one.
+/// Returns true for each fix within five standard deviations of the median fix, for fixes at one
+/// yaw.
+/// @pre there is at least one fix
 std::vector<bool> near_median(const OptionalFixes& fixes);
 
 }  // namespace vlp

@@ -18,10 +18,10 @@
 namespace vlp {
 namespace {
 
-/// What tone curves, overexposure and blur move an edge by, at most.
+/// Largest edge displacement by tone curves, overexposure and blur, px.
 constexpr double kMostShift_px = 1.5;
 
-/// Where tag `to` is, seen from tag `from`, whose width is 1: x right and y down on the print.
+/// Displacement from tag `from` to tag `to`, in widths of `from`: x right and y down on the board.
 struct Step {
   int from, to;
   Eigen::Vector2d way;
@@ -48,8 +48,8 @@ double width_of(const SeenTag& tag) {
   return sum_px / 4;
 }
 
-/// From every tag to its nearest neighbours, those among them that the board does not have; the
-/// tags' edges have gone inwards by shift_px.
+/// Returns the steps from every tag to its four nearest neighbors, including tags that the board
+/// does not have. `shift_px`: inward displacement of the tag edges.
 std::vector<Step> steps_in(std::span<const BoardView> views, const std::optional<Lens>& lens,
                            double shift_px) {
   constexpr std::size_t nearest = 4;
@@ -91,15 +91,16 @@ std::vector<Step> steps_in(std::span<const BoardView> views, const std::optional
   return steps;
 }
 
-/// How steps go with a layout.
+/// Agreement of steps with a layout.
 struct Fit {
-  /// Steps that go where the layout says, over all between tags that it has.
+  /// Fraction of the steps between tags of the layout that agree with the layout.
   double share = 0;
   std::size_t counted = 0;
   std::optional<double> pitch;
-  /// With edges that went inwards by shift_px on either side the ways between tags, in px, are
-  ///   pitch (width + 2 shift);
-  /// the line through all of them, where tags of different widths tell the two apart.
+  /// Line fitted to the distances between tags, px, over the widths of the tags:
+  ///   distance = pitch (width + 2 shift_px),
+  /// with edges displaced inwards by shift_px on either side. Tags of different widths separate
+  /// pitch and displacement.
   struct Line {
     double pitch, pitch_sd, shift_px;
   };
@@ -157,12 +158,12 @@ Fit fit_of(const Board& board, const std::vector<Step>& steps) {
   return fit;
 }
 
-/// What most neighbours agree on: by how much the id grows from a tag to the one right of it, or
-/// below it (axis 0 or 1); 0 when they do not agree.
+/// Returns the increment of the id from a tag to the tag right of it (axis 0) or below it (axis 1),
+/// by a majority of the neighbors; 0 without a majority.
 int growth_along(int axis, const std::vector<Step>& steps) {
   constexpr double aside = 0.35, most = 0.5;
   constexpr int least_votes = 4;
-  // The very next tags are the shortest steps along the axis, from each tag.
+  // The adjacent tags are the shortest steps along the axis, from each tag.
   std::map<int, int> votes;
   int all = 0;
   for (std::size_t i = 0; i < steps.size();) {
@@ -188,8 +189,8 @@ int growth_along(int axis, const std::vector<Step>& steps) {
   return 0;
 }
 
-/// The layout that explains the steps, if one does: ids that grow by one along rows grow by the
-/// number of columns from row to row, and so with columns.
+/// Returns the layout that explains the steps; std::nullopt if none does. Ids that increase by one
+/// along rows increase by the number of columns from row to row, and vice versa.
 std::optional<Board> layout_shown(Board board, const std::vector<Step>& steps) {
   constexpr double enough = 0.8;
   constexpr int most_tags = 1000;
@@ -200,7 +201,7 @@ std::optional<Board> layout_shown(Board board, const std::vector<Step>& steps) {
   board.id_order = {column_major,
                     right > 0 ? (down > 0 ? BoardCorner::top_left : BoardCorner::bottom_left)
                               : (down > 0 ? BoardCorner::top_right : BoardCorner::bottom_right)};
-  // Of tags that lie on a line of ids with a neighbour; others are of the surroundings.
+  // Counts tags that lie on a line of ids with a neighbor; other tags belong to the surroundings.
   std::map<int, int> votes;
   for (const Step& step : steps) {
     if (std::abs(step.to - step.from) == 1 || std::abs(step.to - step.from) == line) {
@@ -213,7 +214,7 @@ std::optional<Board> layout_shown(Board board, const std::vector<Step>& steps) {
   const int stated = column_major ? board.cols : board.rows;
   std::optional<Board> best;
   double best_share = 0;
-  // Where a line of ids begins is seen from where no step crosses.
+  // No step crosses the position at which a line of ids begins.
   const auto try_first = [&](int first) {
     if (first < 0) return;
     Board tried = board;
@@ -245,7 +246,7 @@ std::string layout_problem(const Board& board, const std::vector<Step>& steps) {
   const bool fits = known.empty() || fit_of(board, known).share >= enough;
   const auto shown = layout_shown(board, steps);
   if (fits && !known.empty()) {
-    // Tags that it does not have may be of another board beside it, unless they go on with it.
+    // Unknown tags may belong to another board next to this one, unless they continue its layout.
     std::vector<Step> across;
     std::copy_if(steps.begin(), steps.end(), std::back_inserter(across),
                  [&](const Step& step) { return has(step.from) != has(step.to); });
@@ -275,8 +276,8 @@ std::string layout_problem(const Board& board, const std::vector<Step>& steps) {
          " in any id_order; is it another board?";
 }
 
-/// Whether the gap can be what board.yaml says, the edges having gone towards the dark by what
-/// tone curves, overexposure and blur do.
+/// Returns true if the pitch agrees with `expected` from board.yaml, directly or with edges
+/// displaced by tone curves, overexposure and blur.
 bool gap_agrees(const Fit& fit, double expected, double tolerance) {
   constexpr double sigmas = 3;
   if (std::abs(*fit.pitch / expected - 1) <= tolerance) return true;
@@ -286,13 +287,13 @@ bool gap_agrees(const Fit& fit, double expected, double tolerance) {
          sigmas * fit.line->pitch_sd / expected <= tolerance;
 }
 
-/// The ChArUco board that explains the steps, if one does: of other numbers of squares, or with
-/// another colour first.
+/// Describes a ChArUco board with another number of squares, or another color of the first square,
+/// that explains the steps better than `board`; empty if `board` agrees.
 std::string charuco_problem(const Board& board, const std::vector<Step>& steps) {
   constexpr double enough = 0.8;
   constexpr int least = 4, most = 60;
   const Fit stated = fit_of(board, steps);
-  // Markers that it does not have may be of another board beside it.
+  // Unknown markers may belong to another board next to this one.
   if (stated.share >= enough && 2 * stated.counted > steps.size()) return "";
   int largest = 0;
   for (const Step& step : steps) largest = std::max({largest, step.from, step.to});
@@ -303,7 +304,7 @@ std::string charuco_problem(const Board& board, const std::vector<Step>& steps) 
       Board tried = board;
       tried.cols = cols;
       tried.top_left_white = white;
-      // As many as the markers need; more when that is stated.
+      // The number of rows that the markers need, or that of board.yaml if it is larger.
       const int markers = largest - board.first_id + 1;
       tried.rows = std::max(least, (2 * markers + cols - 1) / cols);
       if (tried.rows > most) continue;
@@ -329,7 +330,7 @@ std::string charuco_problem(const Board& board, const std::vector<Step>& steps) 
 BoardCheck check_charuco(const Board& board, const std::vector<Step>& steps) {
   BoardCheck check{charuco_problem(board, steps), fit_of(board, steps).pitch};
   if (!check.problem.empty() || !check.pitch) return check;
-  // The markers' outlines are known to a pixel or two.
+  // The outlines of markers are accurate to one or two pixels.
   constexpr double tolerance = 0.15, hundreds = 100;
   const double stated = board.square_size_m / board.tag_size_m;
   if (std::abs(*check.pitch / stated - 1) <= tolerance) return check;
@@ -343,7 +344,7 @@ BoardCheck check_charuco(const Board& board, const std::vector<Step>& steps) {
 
 BoardCheck check_board(const Board& board, std::span<const BoardView> views,
                        const std::optional<Lens>& lens, double shift_px) {
-  // More is no tone curve's, but another spacing.
+  // A larger displacement is caused by another spacing, not by a tone curve.
   const auto steps = steps_in(views, lens, std::clamp(shift_px, -kMostShift_px, kMostShift_px));
   constexpr std::size_t least_steps = 10;
   if (steps.size() < least_steps) return {};

@@ -11,20 +11,24 @@
 
 namespace vlp {
 
-/// What the images say of a board against what board.yaml says. The square of one tag gives a
-/// homography that tells where its neighbours are, in tags; so id order and spacing can be seen
-/// without knowing the lens. (The size of a tag cannot: a larger board farther away looks the
-/// same.)
+/// Comparison of the board in the images with board.yaml.
+///
+/// The homography of the square of one tag gives the positions of its neighbors in tag widths.
+/// Order of ids and spacing can therefore be checked without a lens. The size of a tag cannot: a
+/// larger board at a larger distance looks the same.
 struct BoardCheck {
-  /// What is wrong with board.yaml, and what would be right, in one line; empty when nothing is.
+  /// Difference from board.yaml with the values that the images show, in one line; empty if none.
   std::string problem;
-  /// From a tag to the next one, in tags; nothing when no two neighbours are seen.
+  /// Median distance of neighboring tags, in tag widths (ChArUco: size of a square in marker
+  /// widths). std::nullopt with fewer than ten pairs of tags, or if no pair lies as on the board.
   std::optional<double> pitch;
 };
 
-/// lens: straightens the image when it is known, for a finer check of the spacing: 1 % of the pitch
-/// instead of 5 %. shift_px: by which the edges of the tags are known to have gone inwards
-/// (edge_shift.h).
+/// Compares the layout and the spacing of a board with the tags in the images.
+///
+/// @param lens  undistorts the tags, if given; the tolerance of the pitch is then 1 % instead of 5
+///     % (ChArUco: always 15 %)
+/// @param shift_px  inward displacement of the tag edges (edge_shift.h), px, clamped to +-1.5 px
 BoardCheck check_board(const Board& board, std::span<const BoardView> views,
                        const std::optional<Lens>& lens, double shift_px = 0);
 

@@ -19,7 +19,7 @@ Eigen::Vector3d turned(const BoardPose& pose, const Eigen::Vector2d& in_board_m)
   return rotation * Eigen::Vector3d(in_board_m.x(), in_board_m.y(), 0);
 }
 
-/// Of each corner: the edges that cross there go inwards by 1 px each.
+/// Returns the displacement of corner k if the two edges that meet there move inwards by 1 px.
 Eigen::Vector2d inward_at(const SeenTag& tag, std::size_t k) {
   const auto& corners = tag.corners_px;
   const Eigen::Vector2d middle = (corners[0] + corners[1] + corners[2] + corners[3]) / 4;

@@ -12,62 +12,70 @@
 
 namespace vlp {
 
-/// A board's corners as uniform lattices, which is what mrcal solves for. Those of a board of
-/// squares are one; when the gap is as wide as a tag all corners of the tags form one, too;
-/// otherwise corner k of every tag is a lattice of its own, with a pose of its own, a part.
+/// Corners of a board as uniform lattices, the only boards that mrcal solves for.
+///
+/// A board of squares is one lattice. A board of tags is one lattice if its gaps are as wide as its
+/// tags. Otherwise corner k of all tags forms a lattice with its own pose, called a part.
 class BoardLattice {
  public:
-  /// Throws std::invalid_argument for a board whose parts would be lines: one row or column of tags
-  /// with gaps of another width.
+  /// @throws std::invalid_argument if the parts would be lines: one row or column of tags whose
+  ///     gaps are not as wide as the tags
   explicit BoardLattice(const Board& board);
 
-  /// Parts of a board: 1 or 4. Points along its width and height, and their distance.
+  /// Number of parts of the board: 1 or 4.
   std::size_t parts() const { return parts_; }
+  /// Number of points along the width and the height of a part.
   int cols() const { return cols_; }
   int rows() const { return rows_; }
+  /// Distance between adjacent points of a part, m.
   double spacing_m() const { return spacing_m_; }
   std::size_t points() const {
     return static_cast<std::size_t>(cols_) * static_cast<std::size_t>(rows_);
   }
-  /// Deflection of a whole board over that of a part, along x and y: a part is smaller.
+  /// Ratio of the warp of the whole board to that of a part, along x and y; a part is smaller.
   const Eigen::Vector2d& warp_of_board() const { return warp_of_board_; }
 
+  /// Corner of the board and its measurement in a view.
   struct Corner {
-    /// z = 0 for a flat board.
+    /// Position in the board frame, m; z = 0 for a flat board.
     Eigen::Vector3d in_board_m;
     Eigen::Vector2d pixel;
     std::size_t part, point;
-    /// Where the corner goes, per px, when the edges of its tag go inwards; 0 where squares that
-    /// touch make the corner, which stays.
+    /// Displacement of the corner, px, per px by which the edges of its tag move inwards. 0 for
+    /// corners between touching squares, which do not move.
     Eigen::Vector2d inward{0, 0};
-    /// What its residual is multiplied by.
+    /// Factor by which the residual is multiplied.
     double weight = 1;
-    /// Of its tag's edge to the tag's next corner.
+    /// Curvature of the tag's edge from this corner to the tag's next corner.
     EdgeBow bow = {};
-    /// SeenTag::Deviations; 0 where nobody knows.
+    /// Standard deviation from pixel noise (SeenTag::Deviations), px; 0 if unknown.
     double sd_px = 0;
   };
-  /// Every corner of what was seen, of a flat board: its points, or four of each tag, in its order.
+  /// Returns all corners of a detection on a flat board, in the order of `seen`: its points, or
+  /// four corners of each tag.
   std::vector<Corner> corners(const SeenBoard& seen) const;
-  /// SeenPoint::index of a point: part by part, row by row.
+  /// Returns the SeenPoint::index of a point: part by part, row by row.
   std::size_t index_of(std::size_t part, std::size_t point) const {
     return part * points() + point;
   }
-  /// Of which tag a point is, whose corners share its edges and so their errors; of a board of
-  /// squares each by itself.
+  /// Returns the index of the tag of a point. The corners of a tag share its edges and therefore
+  /// have correlated errors. On a board of squares each point is a group of its own.
   std::size_t tag_of(std::size_t point) const {
     if (squares_ || parts_ > 1) return point;
     const auto cols = static_cast<std::size_t>(cols_);
     return point / cols / 2 * (cols / 2) + point % cols / 2;
   }
-  /// The corners of a board of which a part is bent by so much.
+  /// Returns the corners of a board whose parts have the warp `warp_of_part_m`, along x and y.
   std::vector<Corner> bent(std::vector<Corner> corners,
                            const Eigen::Vector2d& warp_of_part_m) const;
 
   /// Computes the pose of a part from that of the board.
   BoardPose pose_of_part(const BoardPose& camera_from_board, std::size_t part) const;
-  /// Corners that fix every part's pose: twelve of a board in one part (all, when it has no more),
-  /// six of each of four parts; two or more in each of two rows.
+  /// Returns true if the corners determine the pose of every part:
+  /// - points: at least 12 of a board in one part, 6 in each of four parts, or all points of a
+  ///   smaller board; at least two points in each of two rows
+  /// - tags: at least 3 of a board in one part; at least 6 of a board in four parts, in at least
+  ///   two columns and two rows
   bool enough(const SeenBoard& seen) const;
 
  private:
@@ -81,7 +89,7 @@ class BoardLattice {
   std::size_t parts_;
   int cols_, rows_;
   double spacing_m_;
-  /// Where the parts begin in the board.
+  /// Origin of each part in the board frame, m.
   std::array<Eigen::Vector2d, 4> origins_m_;
   Eigen::Vector2d warp_of_board_, field_m_;
 };

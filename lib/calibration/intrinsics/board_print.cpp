@@ -15,7 +15,7 @@
 namespace vlp {
 namespace {
 
-/// Returns the points of a board as BoardProblem has them, row by row.
+/// Returns the points of a board in the order of BoardProblem, row by row.
 std::vector<Eigen::Vector3d> points_of_board(const BoardProblem& problem) {
   std::vector<Eigen::Vector3d> points;
   points.reserve(problem.points_of_a_board());

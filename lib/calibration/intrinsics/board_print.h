@@ -10,8 +10,8 @@
 
 namespace vlp {
 
-/// Effect of an error of the board's print on a lens: the change if the board is wider than stated,
-/// and as high.
+/// Effect of an aspect error of the printed board on a lens: the change if the board is wider than
+/// stated, at the stated height.
 struct PrintEffect {
   /// Change of the intrinsics.
   Eigen::VectorXd intrinsics;
@@ -22,13 +22,12 @@ struct PrintEffect {
 };
 
 /// Computes the effect of one standard deviation of the ratio of the board's width to its height,
-/// sqrt(2) print_sd. A common scale of the board changes its distances alone, and not the lens.
+/// sqrt(2) print_sd. A common scale error of the board changes distances only, not the lens.
 ///
-/// With the points x of the boards at the solution, D = diag(1 + sqrt(2) print_sd, 1, 1) and the
-/// projection p, the problem is solved again from the solution with each corner seen moved by
-///   p(x) - p(D x),
-/// which is the same to first order as a solve with the points D x. Shifts of edges, weights and
-/// outliers stay as they are.
+/// The problem is solved again from the solution, with each measured corner moved by
+///   p(x) - p(D x),  D = diag(1 + sqrt(2) print_sd, 1, 1),
+/// where x are the points of the boards at the solution and p is the projection. To first order
+/// this equals a solve with the points D x. Edge shifts, weights and outliers are kept.
 ///
 /// @param print_sd  Board::print_sd, > 0
 /// @param region    region where the lens is known (CalibrationReport::region)

@@ -18,7 +18,7 @@
 namespace vlp {
 namespace {
 
-/// Of a lattice point, by all that moves it.
+/// Projection of a lattice point and its derivatives with respect to lens, pose and warp.
 struct PointProjection {
   Eigen::Vector2d pixel;
   Lens::Projection by_lens;
@@ -26,7 +26,7 @@ struct PointProjection {
   Eigen::Matrix2d by_warp;
 };
 
-/// A point of the lattice and how the warp lifts it.
+/// Point of the lattice, m, and the derivative of its z coordinate with respect to the warp.
 struct LatticePoint {
   Eigen::Vector2d in_board_m, lift;
 };
@@ -55,8 +55,8 @@ std::optional<PointProjection> projected(const Lens& lens, const LatticePoint& p
   return result;
 }
 
-/// The residuals, projected minus seen, of one board's points that are no outliers. Parameters:
-/// intrinsics, pose, warp.
+/// Residuals, projected minus measured, of the points of one board that are not outliers.
+/// Parameters: intrinsics, pose, warp.
 class BoardCost : public ceres::CostFunction {
  public:
   BoardCost(const BoardProblem& problem, std::size_t pose) : problem_(problem) {
@@ -166,7 +166,7 @@ bool solve_once(BoardProblem& problem, const SolveFor& what) {
   return true;
 }
 
-/// Marks corners beyond 5 sigmas on either axis; true when there are any.
+/// Marks corners with a residual beyond 5 sigma on either axis. Returns true if there are any.
 bool mark_outliers(BoardProblem& problem) {
   constexpr double sigmas = 5;
   auto residuals = residuals_of(problem);
@@ -194,7 +194,7 @@ bool has_lens(const BoardProblem& problem) {
          std::ranges::all_of(intrinsics, [](double value) { return std::isfinite(value); });
 }
 
-/// What a lens leaves of the points that are no outliers.
+/// Fit of a lens to the points that are not outliers.
 struct Left {
   explicit Left(const BoardProblem& problem) {
     const auto residuals = residuals_of(problem);
@@ -213,7 +213,7 @@ struct Left {
   }
 
   bool sees_all = true;
-  double rms_px;  // of those that it sees
+  double rms_px;  // of the points that it projects
 };
 
 }  // namespace

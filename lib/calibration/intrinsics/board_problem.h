@@ -11,15 +11,15 @@
 
 namespace vlp {
 
-/// Where a board is: x_in_camera = R(rotation) x_in_board + translation_m, with the rotation's axis
-/// times its angle.
+/// Pose of a board: x_in_camera = R(rotation) x_in_board + translation_m. `rotation` is a rotation
+/// vector: axis times angle, rad.
 struct BoardPose {
   Eigen::Vector3d rotation;
   Eigen::Vector3d translation_m;
 };
 
-/// A camera and the boards that it saw, as mrcal solves for them (mrcal documentation,
-/// "Formulation"): boards are uniform lattices of cols x rows points, spacing_m apart, bent by
+/// Camera and board views in the formulation of mrcal (mrcal documentation, "Formulation"). Boards
+/// are uniform lattices of cols x rows points, spacing_m apart, with the warp
 ///   z = warp_m.x (1 - (2 i / (cols - 1) - 1)^2) + warp_m.y (1 - (2 j / (rows - 1) - 1)^2).
 struct BoardProblem {
   LensModel lens_model;
@@ -29,17 +29,18 @@ struct BoardProblem {
   double spacing_m;
   Eigen::Vector2d warp_m = Eigen::Vector2d::Zero();
   std::vector<BoardPose> poses;
-  /// u_px, v_px, weight; row by row, pose by pose. The weight is what the residual is multiplied
-  /// by; kUnseen, or another below 0 for an outlier. Every pose needs four points or more, not on a
-  /// line.
+  /// Measured points (u_px, v_px, weight), row by row, pose by pose. The residual is multiplied by
+  /// the weight. A point that was not seen has the weight kUnseen, an outlier another negative
+  /// weight. Every pose needs at least four points that are not on a line.
   std::vector<Eigen::Vector3d> points;
   static constexpr double kUnseen = -1e9;  // weights are 1000 at most
-  /// Of the corners, for which the regularization is made: of a pixel, as mrcal makes it. Of
-  /// corners that are better known its share of all squares would be the larger, and draw the lens
-  /// off.
+  /// Corner noise for which the regularization is scaled, px; the default is that of mrcal. With
+  /// more accurate corners the regularization would be a larger fraction of the sum of squares and
+  /// bias the lens.
   double noise_px = 1;
-  /// Rays in the camera and where the lens has to see them, each as good as a corner: they hold the
-  /// frame of a splined lens, whose control points make up for any turn of it.
+  /// Ray in the camera frame and the pixel to which the lens has to project it, weighted like a
+  /// corner. Such rays fix the frame of a splined lens, whose control points can compensate any
+  /// rotation.
   struct Held {
     Eigen::Vector2d pixel;
     Eigen::Vector3d ray;
@@ -51,49 +52,58 @@ struct BoardProblem {
   }
 };
 
-/// Of the points that are no outliers.
+/// Returns the measured pixels of the points that are not outliers.
 std::vector<Eigen::Vector2d> seen_px(const BoardProblem& problem);
 
-/// What a solve may change besides the poses.
+/// Parameters that a solve may change in addition to the poses.
 struct SolveFor {
   bool core = false;         // fx fy cx cy
-  bool distortions = false;  // regularized, as mrcal does it
+  bool distortions = false;  // regularized as in mrcal
   bool warp = false;
   bool without_outliers = false;  // gives outliers a negative weight
 };
 
-/// Minimizes the residuals in place, by mrcal_optimize, or by Ceres for the models that mrcal does
-/// not have: without regularization, outliers beyond 5 sigmas. By Ceres, too, where mrcal goes from
-/// a lens that sees all points to one that does not, unless that fits worse: the quotient of
-/// OPENCV8 and OPENCV12 can have poles between the points and fit them all the same, which mrcal's
-/// steps go over; Ceres takes no step to a lens that does not see a point. False when it fails:
-/// points that no lens of the model can see there, too few for the unknowns, or a focal length that
-/// is not above 0.
+/// Minimizes the residuals in place: by mrcal_optimize, or by Ceres for models that mrcal lacks.
+/// Ceres solves without regularization and rejects outliers beyond 5 sigma.
+///
+/// Ceres also replaces mrcal if mrcal goes from a lens that projects all points to one that does
+/// not. The result of mrcal is kept if the RMS residual of Ceres is more than 5 % larger. Reason:
+/// the rational functions of OPENCV8 and OPENCV12 can have poles between the points and still fit.
+/// The steps of mrcal cross such poles. Ceres rejects steps to a lens that does not project a
+/// point.
+///
+/// @return false if the solve fails: no lens of the model can project the points, too few points
+///     for the unknowns, or a focal length that is not positive
 bool solve(BoardProblem& problem, const SolveFor& what);
 
-/// The problem at its solution. State and Jacobian are packed: the state is divided by `scale`, so
-/// that its entries are of like size.
+/// Residuals and Jacobian of a problem. State and Jacobian are packed: the state is divided by
+/// `scale`, so that its entries have similar magnitudes.
 struct Linearization {
-  /// Of the points, u and v in turn, in their order, weighted; 0 for those with a negative weight.
+  /// Weighted residuals of the points in their order, u and v alternating, px; 0 for points with a
+  /// negative weight.
   Eigen::VectorXd residuals_px;
-  /// Of the regularization; none of the models that mrcal does not have.
+  /// Residuals of the regularization; empty for models that mrcal lacks.
   Eigen::VectorXd regularization;
-  /// A column for each row of the Jacobian: of the points first, then of the regularization.
+  /// Transposed Jacobian with a column per residual: those of the points first, then the
+  /// regularization.
   Eigen::SparseMatrix<double> jacobian_transposed;
-  /// State / packed state.
+  /// State divided by packed state.
   Eigen::VectorXd scale;
-  /// The intrinsics come first in the state, those from `first_intrinsic` on; where the poses (6
-  /// each) begin, and the warp after them.
+  /// First intrinsic parameter in the state, which begins with the intrinsics; index of the poses
+  /// in the state (6 entries each). The warp follows the poses.
   Eigen::Index first_intrinsic, poses;
 };
+/// Linearizes a problem at its current parameters.
 Linearization linearized(const BoardProblem& problem, const SolveFor& what);
 
-/// Both, by either.
+/// Returns true if mrcal has the lens model.
 bool has_mrcal(LensModel model);
+/// Implementations of solve() and linearize().
 bool solve_by_mrcal(BoardProblem& problem, const SolveFor& what);
 bool solve_by_ceres(BoardProblem& problem, const SolveFor& what);
 Linearization linearized_by_mrcal(const BoardProblem& problem, const SolveFor& what);
-/// The intrinsics are solved for, the warp where `what` says so.
+/// Linearizes with analytic Jacobians, with respect to all intrinsics and poses, and to the warp if
+/// what.warp.
 Linearization linearized_by_us(const BoardProblem& problem, const SolveFor& what);
 
 }  // namespace vlp

@@ -23,12 +23,12 @@ namespace vlp {
 
 namespace {
 
-/// Fills in the uncertainty over the image: the mean and the worst in the region, the worst beyond.
+/// Computes the uncertainty over the image: mean and maximum in the region, maximum outside.
 void add_uncertainty_over_image(const ProjectionUncertainty& uncertainty, const Lens& lens,
                                 const std::array<int, 2>& imager_px, CalibrationReport& report) {
   double inside = 0;
   for (const Eigen::Vector2d& pixel : pixel_grid(imager_px)) {
-    // Beyond the farthest corner a fisheye may end, as splines do; there they refuse pixels.
+    // A fisheye or a spline may end beyond the farthest corner and has no rays there.
     const bool can_end = lens.model() == LensModel::fisheye || is_splined(lens.model());
     if (can_end && !lens.unproject(pixel)) continue;
     const double sigma_px = uncertainty.worst_px(pixel);
@@ -52,10 +52,10 @@ std::optional<ProjectionDifference> compare_halves(const IntrinsicsSolution& sol
   const IntrinsicsSolution even = solve_every_other(solution, 0);
   const IntrinsicsSolution odd = solve_every_other(solution, 1);
   if (!even.ok() || !odd.ok()) return std::nullopt;
-  // Half of the views leave parts of a splined lens undetermined.
+  // Half of the views may not determine all parts of a splined lens.
   std::vector<ProjectionUncertainty> halves;
   if (is_splined(solution.lens().model())) halves = {{even, input.lattice}, {odd, input.lattice}};
-  constexpr double max_ratio = 3;  // sqrt(2) is usual
+  constexpr double max_ratio = 3;  // typically sqrt(2)
   return projection_difference(
       even.lens(), odd.lens(), input.imager_px, [&](const Eigen::Vector2d& pixel) {
         const double sigma_px = uncertainty.worst_px(pixel);
@@ -76,7 +76,7 @@ CalibrationReport report_on(const IntrinsicsSolution& solution, const Intrinsics
   const Eigen::MatrixXd by_views = covariance_by_views(solution);
   ImageRegion region =
       known_region(seen_px(solution.problem), input.imager_px, lens.model(), solution.another_fits);
-  // Beyond it splines are anything.
+  // Splines are undetermined outside the region.
   const ImageRegion compared = is_splined(lens.model()) ? region : ImageRegion();
   const auto expected =
       expected_difference(lens, input.imager_px, uncertainty.intrinsics_covariance(), compared);
@@ -93,7 +93,7 @@ CalibrationReport report_on(const IntrinsicsSolution& solution, const Intrinsics
                            {}};
   add_uncertainty_over_image(uncertainty, lens, input.imager_px, report);
   if (!is_splined(lens.model())) {
-    // Of few views each of them may chance to be small.
+    // With few views each of these covariances may be too small by chance.
     const ProjectionUncertainty independent(solution);
     for (const Eigen::MatrixXd& covariance :
          {uncertainty.intrinsics_covariance(), independent.intrinsics_covariance(), by_views}) {
@@ -155,7 +155,7 @@ ViewCoverage coverage_of(const IntrinsicsSolution& solution, const IntrinsicsInp
   coverage.share = parts.fraction();
   std::vector<Eigen::Vector3d> normals;
   for (const BoardPose& pose : solution.problem.poses) {
-    // Away from the camera; where it leans to, the board is nearer.
+    // Points away from the camera; the board is nearer on the side to which it is tilted.
     const Eigen::Vector3d normal =
         Eigen::AngleAxisd(pose.rotation.norm(), pose.rotation.normalized()) *
         Eigen::Vector3d::UnitZ();

@@ -14,63 +14,71 @@
 
 namespace vlp {
 
-/// How far a solution can be trusted.
+/// Uncertainty of a solution.
 struct CalibrationReport {
-  /// Where the lens is known, and its share of the image.
+  /// Region of the image where the lens is calibrated (known_region()), and its fraction of the
+  /// image.
   ImageRegion region;
   double region_share;
-  /// ProjectionUncertainty::worst_px(), by tags, over the pixel_grid() of the region: the mean and
-  /// the worst; and the worst beyond. The worst is no less than what the largest error
-  /// over the region is expected to be, expected_worst_px(), by tags, by independent corners and by
-  /// views; but of a splined lens. Where another model fits as well, solve_lens() makes it what
-  /// lies between the two.
+  /// Mean and maximum of ProjectionUncertainty::worst_px() by tags, px, over the pixel_grid() of
+  /// the region.
+  ///
+  /// The maximum is at least expected_worst_px() over the region for each of three covariances: by
+  /// tags, by independent corners and by views. Splined lenses are excluded from this rule. If
+  /// another lens model fits equally well, estimate_lens() raises the maximum to the largest
+  /// difference between the two lenses.
   double uncertainty_mean_px, uncertainty_worst_px;
+  /// Maximum of ProjectionUncertainty::worst_px() outside the region, px.
   double uncertainty_beyond_px;
-  /// Standard deviation of fx: by the noise of the tags, and by covariance_by_views().
+  /// Standard deviation of fx, px: from the noise of the tags, and from covariance_by_views().
   double focal_sd_px, focal_sd_by_views_px;
-  /// What the lens should be apart from the true one, as projection_difference() says it, rms per
-  /// axis: by the noise, and by covariance_by_views(). Of a splined lens over the region.
+  /// Expected projection_difference() from the true lens, RMS per axis, px: from the noise of the
+  /// tags, and from covariance_by_views(). For splined lenses over the region only.
   double expected_rms_px, expected_by_views_rms_px;
-  /// Between the lens of every other view and that of the rest (solve_every_other()): twice
-  /// expected_rms_px when the lens model fits and the tags' errors are independent; more when
-  /// they are not. Of a splined lens where both halves have corners. Nothing when a half does not
-  /// determine a lens.
+  /// Difference over the region between the lens of every second view and that of the other views
+  /// (solve_every_other()). It is about twice expected_rms_px if the lens model fits and the errors
+  /// of tags are independent, and larger otherwise. For splined lenses only pixels that both halves
+  /// determine are compared. std::nullopt if a half does not determine a lens.
   std::optional<ProjectionDifference> halves;
 };
-/// Precondition: solution.ok(). Two more solves.
+/// Computes the report of a solution; solves twice for `halves`. `input`: input of its solve.
+/// @pre solution.ok()
 CalibrationReport report_on(const IntrinsicsSolution& solution, const IntrinsicsInput& input);
 
-/// What a solution leaves of each of some views that took no part in it, rms per axis: their poses
-/// and the shifts of their edges are fitted, nothing else. All corners count as they are given, so
-/// that lens models can be compared by it. Infinite of a view without a pose.
+/// Returns the RMS residual of each held-out view, per axis, px; infinity for a view without a
+/// pose.
+///
+/// Fits only the poses of the views and the shifts of their edges. All corners keep their given
+/// weights, so that lens models can be compared.
 std::vector<double> held_out_rms_px(const IntrinsicsSolution& solution,
                                     const IntrinsicsInput& held_out);
 
-/// The same of all of them together.
+/// Fit of all held-out views together.
 struct HeldOut {
   int views = 0, corners = 0;
-  /// Per axis.
+  /// RMS residual per axis, px.
   double rms_px = 0;
 };
-/// Views without a pose are left out.
+/// Computes the fit of the held-out views as held_out_rms_px(), without views that have no pose.
 HeldOut held_out_fit(const IntrinsicsSolution& solution, const IntrinsicsInput& held_out);
 
-/// Where the views have corners, and how they tilt.
+/// Distribution of the corners over the image, and tilts of the boards.
 struct ViewCoverage {
-  /// Corners in each of 3 x 3 parts of the image, row by row from the top left.
+  /// Number of corners in each of 3 x 3 parts of the image, row by row from the top left.
   std::array<int, 9> corners{};
-  /// Share of 8 x 6 parts of the image that have corners.
+  /// Fraction of 8 x 6 parts of the image that contain corners.
   double share = 0;
-  /// The largest angle, over the views, by which the board's left, right, upper and lower side (as
-  /// the image shows it) is nearer to the camera.
+  /// Largest angle over the views by which the left, right, upper and lower side of the board, as
+  /// in the image, is nearer to the camera; rad.
   std::array<double, 4> tilts_rad{};
-  /// The largest angle between two of the boards.
+  /// Largest angle between two of the boards, rad.
   double tilt_rad = 0;
 };
+/// Computes the coverage of the views in a solution. `input`: input of its solve.
 ViewCoverage coverage_of(const IntrinsicsSolution& solution, const IntrinsicsInput& input);
 
-/// One line: where in the image to show the board, and how to tilt it, next; the place with the
-/// fewest corners and the side that was tilted least.
+/// Recommends the next view in one line: the board in the part of the image with the fewest
+/// corners, tilted towards the side that was tilted least.
 std::string next_view(const ViewCoverage& coverage);
 
 }  // namespace vlp

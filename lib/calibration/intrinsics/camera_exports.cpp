@@ -24,7 +24,8 @@ std::vector<double> matrix_of(const Camera& camera) {
   return {p[0], 0, p[2], 0, p[1], p[3], 0, 0, 1};
 }
 
-/// mrcal's order is OpenCV's; filled up with zeros.
+/// Returns the distortion coefficients in the order of OpenCV, which mrcal shares, padded with
+/// zeros to at least `least`.
 std::vector<double> distortions_of(const Camera& camera, std::size_t least) {
   std::vector<double> values(camera.intrinsics.begin() + 4, camera.intrinsics.end());
   if (values.size() < least) values.resize(least, 0);
@@ -36,7 +37,7 @@ std::vector<double> distortions_of(const Camera& camera, std::size_t least) {
                               std::string(name_of(camera.lens_model)) + "; take --lens " + known);
 }
 
-/// ROS's name of the distortion; nullptr where it has none.
+/// Returns ROS's name of the distortion model; nullptr if it has none.
 const char* ros_distortion(LensModel model) {
   switch (model) {
     case LensModel::pinhole:
@@ -52,8 +53,8 @@ const char* ros_distortion(LensModel model) {
   }
 }
 
-/// Returns a camera's name as YAML. Throws std::invalid_argument if it holds control characters or
-/// is not UTF-8, which not every reader takes.
+/// Returns a camera's name as YAML. Throws std::invalid_argument if the name has control characters
+/// or is not UTF-8, which not every reader accepts.
 std::string quoted_name(const std::string& name) {
   constexpr unsigned char first_printable = 0x20, del = 0x7f;
   std::string quoted = "'";

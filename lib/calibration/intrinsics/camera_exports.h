@@ -9,23 +9,25 @@
 
 namespace vlp {
 
-/// A camera as others write it, in YAML. All of them have pixel centres at whole numbers, as here.
-/// Each throws std::invalid_argument for a lens model that the format does not have.
+// Cameras in the formats of other programs. As in this toolbox, the centers of pixels have integer
+// coordinates in all of them. Each function throws std::invalid_argument if the format has no such
+// lens model.
 
-/// ROS camera_info: plumb_bob for PINHOLE, OPENCV4 and OPENCV5, rational_polynomial for OPENCV8,
-/// equidistant for OPENCV_FISHEYE.
+/// Formats ROS camera_info: plumb_bob for PINHOLE, OPENCV4 and OPENCV5, rational_polynomial for
+/// OPENCV8, equidistant for OPENCV_FISHEYE. Throws std::invalid_argument also if the name of the
+/// camera has control characters or is not UTF-8.
 std::string ros_camera_info(const Camera& camera);
-/// Kalibr's camchain: pinhole with radtan, for PINHOLE and OPENCV4, or with equidistant, for
+/// Formats Kalibr's camchain: pinhole with radtan for PINHOLE and OPENCV4, or with equidistant for
 /// OPENCV_FISHEYE.
 std::string kalibr_camchain(const Camera& camera);
-/// OpenCV's FileStorage: camera_matrix and distortion_coefficients, for all but STEREOGRAPHIC and
-/// splined lenses.
-/// Those of OPENCV_FISHEYE are for cv::fisheye; distortion_model says so.
+/// Formats OpenCV's FileStorage with camera_matrix and distortion_coefficients, for all models but
+/// STEREOGRAPHIC and splined lenses. The coefficients of OPENCV_FISHEYE are those of cv::fisheye,
+/// with "distortion_model: fisheye".
 std::string opencv_camera(const Camera& camera);
-/// mrcal's .cameramodel, the camera and, unless it is empty, where its lens is known; for all but
-/// OPENCV_FISHEYE.
+/// Formats mrcal's .cameramodel, a Python literal, for all models but OPENCV_FISHEYE. `region`:
+/// valid_intrinsics_region, left out if empty.
 std::string mrcal_cameramodel(const Camera& camera, const ImageRegion& region = {});
-/// That region's key and value in a .cameramodel, a line; "" when it is empty.
+/// Formats the line valid_intrinsics_region of a .cameramodel; "" if the region is empty.
 std::string mrcal_region(const ImageRegion& region);
 
 }  // namespace vlp

@@ -29,12 +29,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Longest file of a camera: mrcal's holds the corners that went into its solve.
+/// Maximum size of a camera file; that of mrcal contains the corners of its solve.
 constexpr std::size_t kMaxCameraBytes = std::size_t{64} << 20;
 /// Largest width and height of an image, as in a calibration.
 constexpr int kMaxImager_px = 1 << 20;
 
-/// A Python literal without its comments, from a # that is in no string to the end of the line.
+/// Returns a Python literal without comments, which begin with a # outside strings.
 std::string without_comments(const std::string& text) {
   std::string rest;
   char quote = 0;  // that ends the string; 0 outside
@@ -56,8 +56,8 @@ std::string without_comments(const std::string& text) {
   return rest;
 }
 
-/// What follows 'key': in a Python literal, a list, tuple or text, without what encloses it;
-/// nothing where there is no such key.
+/// Returns the value of `key` in a Python literal, a list, tuple or string, without its delimiters;
+/// std::nullopt if the key is missing.
 std::optional<std::string> python_value(const std::string& text, const std::string& key) {
   constexpr const char* blanks = " \t\r\n";
   for (const char quote : {'\'', '"'}) {
@@ -90,7 +90,7 @@ std::string required_value(const fs::path& file, const std::string& text, const 
   return *value;
 }
 
-/// The numbers of a list, or of lists in one.
+/// Parses the numbers of a list, or of a list of lists.
 std::vector<double> numbers_in(const fs::path& file, std::string list, const std::string& key) {
   std::vector<double> numbers;
   constexpr std::string_view between = ",[]()";
@@ -108,7 +108,8 @@ std::vector<double> python_numbers(const fs::path& file, const std::string& text
   return numbers_in(file, required_value(file, text, key), key);
 }
 
-/// mrcal closes the contour, and means by an empty one that the lens is known nowhere.
+/// Reads the valid region. mrcal closes the contour; an empty contour means that the lens is
+/// calibrated nowhere.
 ImageRegion region_from_mrcal(const fs::path& file, const std::string& text) {
   const std::string key = "valid_intrinsics_region";
   const auto value = python_value(text, key);
@@ -131,7 +132,7 @@ ImageRegion region_from_mrcal(const fs::path& file, const std::string& text) {
 }
 
 AnyCamera camera_from_mrcal(const fs::path& file, const std::string& text) {
-  // What the solve went in is long, and not looked at.
+  // The inputs of the optimization are long and not needed.
   const std::string literal = without_comments(text);
   const std::string head = literal.substr(0, literal.find("'optimization_inputs'"));
   const std::string name = required_value(file, head, "lensmodel");
@@ -157,7 +158,8 @@ std::vector<double> yaml_numbers(const YAML::Node& node) {
   return list.as<std::vector<double>>();
 }
 
-/// The last two of OpenCV's 14 tilt the sensor. All zero: a pinhole.
+/// Returns the lens model and removes trailing coefficients of zero. The last two of OpenCV's 14
+/// coefficients tilt the sensor and must be 0. If all are zero, the model is a pinhole.
 LensModel model_of(const std::string& name, std::vector<double>& distortions) {
   constexpr std::size_t with_tilt = 14, without = 12;
   if (name == "fisheye" || name == "equidistant") {
@@ -220,8 +222,8 @@ Camera camera_from_yaml(const YAML::Node& document) {
   return camera;
 }
 
-/// Pixels of the new lens against those of rays, and the normal equations of its parameters (of a
-/// splined lens of its core).
+/// Residuals of a lens fit to rays, and the normal equations of the parameters (splined: of the
+/// core).
 struct LensFit {
   double squares = 0;
   int count = 0;
@@ -249,9 +251,9 @@ LensFit lens_fit_at(const std::vector<double>& parameters, LensModel model,
   return step;
 }
 
-/// Fits the parameters of a lens model to the rays of another lens, by Levenberg and Marquardt's
-/// method; those of a splined lens are left as they are. Throws std::invalid_argument if the model
-/// has no lens near the other one.
+/// Fits the parameters of a lens model to the rays of another lens by the method of Levenberg and
+/// Marquardt. Parameters of a splined lens are kept. Throws std::invalid_argument if the model has
+/// no lens close to the other one.
 void fit_parameters(const Camera& camera, const Lens& from, LensModel model,
                     std::vector<double>& parameters) {
   constexpr int max_iterations = 200;

@@ -9,32 +9,35 @@
 
 namespace vlp {
 
+/// Camera from a file of any supported format.
 struct AnyCamera {
   Camera camera;
-  /// Where its lens is known, which calibrations (region_px) and mrcal (valid_intrinsics_region)
-  /// tell; empty where nothing is said.
+  /// Region where the lens is calibrated, from region_px of a calibration or
+  /// valid_intrinsics_region of mrcal; empty if the file has none.
   ImageRegion region;
 };
-/// The camera in a file, whose content tells what it is:
-///   a calibration of this toolbox
-///   mrcal's .cameramodel, of the models that the toolbox has
+/// Reads a camera. The format is detected from the content:
+///   calibration of this toolbox
+///   mrcal's .cameramodel, with a lens model of the toolbox
 ///   OpenCV's FileStorage (YAML): image_width, image_height, camera_matrix,
 ///     distortion_coefficients; distortion_model: fisheye for cv::fisheye
 ///   ROS camera_info: plumb_bob, rational_polynomial, equidistant
 ///   Kalibr's camchain, its cam0: pinhole with radtan, equidistant or none
-/// Skewed camera matrices are refused, and lenses that are known nowhere. Throws InputError.
+/// @throws InputError, also for skewed camera matrices and for an empty valid_intrinsics_region
 AnyCamera read_any_camera(const std::filesystem::path& file);
 
-/// A camera with a lens of another model, fitted to the pixels of the camera's rays all over the
-/// image (pixel_grid(); of a splined lens splined_like()), by least squares.
+/// Camera whose lens was replaced by one of another model.
 struct FittedCamera {
   Camera camera;
-  /// The largest distance between the two pixels of a ray, and the share of the image whose rays
-  /// both have.
+  /// Largest distance between the pixels to which the two lenses project a ray, px; fraction of the
+  /// image whose rays both lenses project.
   double worst_px, share;
 };
-/// A camera that has the model already is given back as it is. Throws std::invalid_argument when
-/// the model has no lens near the camera's, or a splined one too few control points where it sees.
+/// Fits a lens of another model to the rays of a camera over the image, by least squares in pixels
+/// (pixel_grid(); splined lenses: splined_like()). Returns a camera that already has the model
+/// unchanged.
+/// @throws std::invalid_argument if the model has no lens close to the camera's, or if a splined
+///     model has too few control points in the field of view
 FittedCamera with_lens_model(const Camera& camera, LensModel model);
 
 }  // namespace vlp

@@ -18,7 +18,7 @@
 namespace vlp {
 namespace {
 
-/// With the corners behind one of kGammas.
+/// Returns the detection with corners corrected for one of kGammas.
 SeenBoard behind(const SeenBoard& seen, std::size_t curve) {
   SeenBoard coded;
   for (const SeenTag& tag : seen.tags) {
@@ -32,7 +32,7 @@ SeenBoard behind(const SeenBoard& seen, std::size_t curve) {
   return coded;
 }
 
-/// Views that tell enough, evenly among all of them.
+/// Returns at most 24 views with enough corners, evenly spaced among all of them.
 std::vector<const SeenBoard*> some_of(const std::vector<BoardView>& views,
                                       const BoardLattice& lattice) {
   constexpr std::size_t most = 24;
@@ -46,7 +46,7 @@ std::vector<const SeenBoard*> some_of(const std::vector<BoardView>& views,
   return some;
 }
 
-/// Of OPENCV8 or OPENCV_FISHEYE that which leaves less.
+/// Solves OPENCV8 and OPENCV_FISHEYE and returns the solution with the smaller residuals.
 IntrinsicsSolution lens_of_either(IntrinsicsInput input) {
   auto fisheye = may_be_wide(input) ? fit_fisheye(input) : std::nullopt;
   if (fisheye && fisheye->farthest_rad >= kRightAngle_rad) return std::move(fisheye->solution);
@@ -56,7 +56,7 @@ IntrinsicsSolution lens_of_either(IntrinsicsInput input) {
   return other ? std::move(fisheye->solution) : solution;
 }
 
-/// The median of what the pixels' noise makes of the corners; nothing when nobody knows it.
+/// Returns the median standard deviation of the corners from pixel noise; std::nullopt if unknown.
 std::optional<double> told_sd_px(const IntrinsicsInput& input) {
   std::vector<double> told;
   for (const auto& view : input.views) {
@@ -68,8 +68,8 @@ std::optional<double> told_sd_px(const IntrinsicsInput& input) {
   return upper_median(std::move(told));
 }
 
-/// What a lens leaves with the corners behind each curve, over what noise makes of them; nothing
-/// where no lens is found.
+/// Returns the RMS residual of the lens for each curve, divided by the noise of the corners;
+/// std::nullopt if no lens is found.
 std::optional<PerCurve> left_over_noise(const std::vector<BoardView>& views, const Board& board) {
   constexpr double exact_px = 1e-6;
   IntrinsicsInput input{BoardLattice(board), {}, views.front().imager_px, LensModel::opencv8};
@@ -86,7 +86,8 @@ std::optional<PerCurve> left_over_noise(const std::vector<BoardView>& views, con
     if (!solution.ok() || !noise_px) return {};
     ratios[curve] = std::max(solution.rms_px, exact_px) / *noise_px;
     if (curve > 0) continue;
-    // The others are to leave the same for the same reasons.
+    // The other curves are solved with the same model, warp and views, so that ratios are
+    // comparable.
     input.lens_model = solution.problem.lens_model;
     input.warp = solution.solved_for.warp ? WarpChoice::on : WarpChoice::off;
     std::vector<const SeenBoard*> kept;

@@ -9,21 +9,31 @@
 
 namespace vlp {
 
-/// Puts corners where they are behind the tone curve that all images of a camera call for together,
-/// by what the board's geometry and the levels beside the edges say of its gamma:
-///   n log ratio(gamma) + (log gamma - log levels_gamma)^2 / (2 x 0.2^2),     n = 50 / least ratio,
-/// is least, with ratio what a lens leaves of the corners behind that gamma (solve_intrinsics(), of
-/// OPENCV8 or OPENCV_FISHEYE, whichever leaves less) over what the pixels' noise makes of them
-/// (SeenTag::sds_px, in the median). Edges behind a wrong curve are off by shares of their blur
-/// that differ from tag to tag with its width, so that no lens and no shift that changes evenly
-/// over a view (edge_shifts()) make them fit. The levels (costs_of_levels()) tell gamma more
-/// sharply, but falsely, as JPEG and sharpening leave beside an edge what looks like more of a
-/// curve, or less: by 20 % rms. Nor do thousands of residuals tell it as sharply as they would if
-/// the ratio were exact: n, instead of their number, lets 2 % of it weigh as much as the levels do,
-/// and less where noise explains little of what is left. Of 24 views at most, evenly among those
-/// that tell enough. By the levels alone where no lens is found, the board is not that of the
-/// images, or half of those whose levels tell have no curve for sure. Returns gamma, 1 of none
-/// (take_curve()). Throws as BoardLattice does.
+/// Estimates one gamma of the tone curve for all images of a camera and corrects the corners in
+/// `views` for it. Returns gamma; 1 if there is no tone curve.
+///
+/// Minimizes over kGammas
+///   cost(gamma) = n log ratio(gamma) + (log(gamma / gamma_levels) / 0.2)^2 / 2
+/// with
+///   ratio         RMS residual of the lens fit for corners corrected with gamma, divided by the
+///                 median standard deviation of the corners from pixel noise; OPENCV8 or
+///                 OPENCV_FISHEYE, whichever fits better without a curve
+///   n             50 / min(ratio), an effective number of residuals
+///   gamma_levels  estimate from the grey values next to the edges (costs_of_levels())
+///
+/// Uses gamma_levels alone if no lens is found, if check_board() reports another board, or if at
+/// least half of the views with usable grey values show no curve. Uses at most 24 views.
+///
+/// Reason for both terms: grey values are precise but biased by JPEG and sharpening (20 % RMS of
+/// gamma). A wrong curve displaces edges by fractions of their blur, which differ from tag to tag
+/// with its width. No lens and no smooth edge shift of a view (edge_shifts()) absorbs such
+/// displacements.
+///
+/// Reason for n: thousands of residuals do not determine gamma as precisely as exact ratios would.
+/// With n, a ratio of 2 % weighs as much as the grey values, and less if the noise explains few of
+/// the residuals.
+///
+/// @throws std::invalid_argument as BoardLattice
 double take_common_curve(std::vector<BoardView>& views, const Board& board);
 
 }  // namespace vlp

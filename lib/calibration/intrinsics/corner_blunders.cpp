@@ -16,7 +16,7 @@ constexpr std::size_t kNeighbours = 8;
 
 using Corners = std::vector<BoardLattice::Corner>;
 
-/// The nearest corners on the board, those taken out left aside.
+/// Returns the nearest corners on the board, without those in `out`.
 std::vector<std::size_t> around(const Corners& corners, const std::vector<bool>& out,
                                 std::size_t middle) {
   std::vector<std::pair<double, std::size_t>> away;
@@ -31,7 +31,8 @@ std::vector<std::size_t> around(const Corners& corners, const std::vector<bool>&
   return nearest;
 }
 
-/// How far a corner is from where its neighbours put it, over what it may be; 0 with too few.
+/// Returns the distance of a corner from its predicted position, relative to the limit; 0 with too
+/// few neighbors.
 double misplaced(const Corners& corners, const std::vector<std::size_t>& nearest,
                  std::size_t middle) {
   constexpr double share = 0.25, least_px = 3;
@@ -57,7 +58,7 @@ double misplaced(const Corners& corners, const std::vector<std::size_t>& nearest
 }  // namespace
 
 std::vector<std::size_t> corner_blunders(const Corners& corners) {
-  constexpr std::size_t most = 10;  // one of so many
+  constexpr std::size_t most = 10;  // at most one in ten
   std::vector<bool> out(corners.size(), false);
   std::vector<std::vector<std::size_t>> nearest(corners.size());
   std::vector<double> off(corners.size());
@@ -80,7 +81,7 @@ std::vector<std::size_t> corner_blunders(const Corners& corners) {
       if (!out[i] && std::find(others.begin(), others.end(), worst) != others.end()) look(i);
     }
   }
-  // A blunder may have put its neighbours to the wrong place before it was found itself.
+  // An outlier may have biased the predictions of its neighbors before it was found itself.
   std::erase_if(found, [&](std::size_t i) {
     look(i);
     out[i] = off[i] > 1;

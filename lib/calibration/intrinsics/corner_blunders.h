@@ -9,13 +9,15 @@
 
 namespace vlp {
 
-/// Corners of a view that lie where their neighbours do not put them: by a quarter of the way to
-/// the nearest of them, and by 3 px, or more. That is no noise, but a corner of something else, or
-/// a slip in a file; least squares would bend the view, or the lens, to it. By index, rising.
+/// Returns the indices, ascending, of outliers among the corners of a view: corners more than max(3
+/// px, a quarter of the distance to the nearest neighbor) from their predicted position.
 ///
-/// Each corner is compared with where the homography of its nearest eight puts it, which holds for
-/// any lens; the worst is taken out and the others are looked at again, at most so often that a
-/// tenth of the corners is gone.
+/// Noise is smaller: such a corner belongs to something else or is a mistake in a file. Least
+/// squares would distort the view or the lens to fit it.
+///
+/// Each corner is predicted by the homography of its nearest eight corners on the board, which
+/// holds for any lens. The worst corner is removed and its neighbors are tested again. Returns no
+/// corner if more than a tenth would be outliers: then the board or the order is another one.
 std::vector<std::size_t> corner_blunders(const std::vector<BoardLattice::Corner>& corners);
 
 }  // namespace vlp

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kMostSigmas = 3;
 
-/// The median of a figure of corners that is not 0, the mean when that is.
+/// Returns the median of a property of the corners, or its mean if the median is 0.
 template <typename Figure>
 double usual(std::span<const CornerError> errors, const Figure& figure) {
   std::vector<double> values;
@@ -32,9 +32,9 @@ double usual(std::span<const CornerError> errors, const Figure& figure) {
 
 CornerVariance corner_variance(std::span<const CornerError> errors) {
   constexpr int rounds = 10;
-  constexpr double least_share = 0.002;  // of the mean square: no corner weighs all
-  // Half by the noise of pixels: from the rest alone, one corner with a large deviation by chance
-  // would tell that deviations mean nothing.
+  constexpr double least_share = 0.002;  // of the mean square: no corner dominates
+  // Starts with half of the variance from pixel noise. Started with the floor alone, one corner
+  // with a large deviation by chance would reduce the scale to 0.
   const double usual_px2 = usual(errors, [](const auto& error) { return error.square_px2; });
   const double usual_sd_px = usual(errors, [](const auto& error) { return error.sd_px; });
   CornerVariance variance{usual_px2 / 2, 0};
@@ -52,7 +52,7 @@ CornerVariance corner_variance(std::span<const CornerError> errors) {
       told_px2 += square * expected / static_cast<double>(errors.size());
     }
     Eigen::Vector2d both = normal.inverse() * right;
-    // Of corners that are all as good only the sum is known.
+    // With equal deviations only the sum of the components is determined.
     if (!both.allFinite() || both[1] < 0) both = {right[0] / normal(0, 0), 0};
     if (both[0] < 0) both = {0, right[1] / normal(1, 1)};
     variance = {std::max(both[0], least_share * told_px2), both[1]};

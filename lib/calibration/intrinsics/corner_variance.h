@@ -6,42 +6,51 @@
 
 namespace vlp {
 
-/// A corner's error: the mean of the squares of its residual's axes, and its standard deviation by
-/// the noise of its pixels.
+/// Error of a corner: mean of the squared residuals of both axes, px^2, and standard deviation from
+/// pixel noise, px.
 struct CornerError {
   double square_px2, sd_px;
 };
 
-/// What corners are good for, since by that a solve has to weigh them (least squares, Gauss and
-/// Markov): behind JPEG those in the dark corners of an image are five times as uncertain as those
-/// in its middle. Of the noise of their pixels, which need not be independent, and of all else that
-/// no pixel tells, such as how the board is printed:
-///   variance = rest^2 + scale^2 sd^2.
+/// Variance model of a corner position, per axis:
+///   variance = rest_px2 + scale2 sd_px^2.
+/// `sd_px` is the standard deviation predicted from pixel noise. `scale2` allows for correlated
+/// noise. `rest_px2` covers errors that the pixels do not show, such as printing errors of the
+/// board.
+///
+/// A least-squares solve has to weight residuals by their variances (Gauss and Markov). Behind
+/// JPEG, corners in the dark corners of an image are five times as uncertain as those in the
+/// middle.
 struct CornerVariance {
   double rest_px2 = 0, scale2 = 0;
 
+  /// Returns the variance of a corner, px^2.
   double of(double sd_px) const { return rest_px2 + scale2 * sd_px * sd_px; }
 };
 
-/// The variance components by least squares of the squares that are left, each over its variance,
-/// neither below 0; beyond three standard deviations a residual counts as that. No corner is taken
-/// for better than 4 % of what all are off in the mean, lest it weighs all. Precondition: there are
-/// errors, not all of them 0; deviations are finite.
+/// Estimates the variance components by least squares of the squared residuals, each divided by its
+/// variance. Neither component is negative.
+///
+/// A residual beyond three standard deviations counts as three. The standard deviation of a corner
+/// is at least 4 % of the RMS residual of all, so that no corner dominates.
+/// @pre at least one error, not all of them 0; standard deviations are finite
 CornerVariance corner_variance(std::span<const CornerError> errors);
 
-/// What a solve multiplies residuals by:
-///   weight^2 = mean of the squares of the residuals / variance,
-/// the mean of corners of which a deviation is known, so that the rms of weighted residuals is what
-/// those are off. Corners of which nobody knows a deviation, whose edges were not found, have a
-/// variance of their own, by what is left of them, no less than that mean. Beyond three standard
-/// deviations a residual counts as that.
+/// Factors by which a solve multiplies residuals:
+///   weight^2 = mean of the squared residuals / variance.
+/// The mean is over corners with a predicted standard deviation, so that the RMS of weighted
+/// residuals equals the RMS residual of those corners.
+///
+/// Corners without a predicted standard deviation, whose edges were not found, have a common
+/// variance. It is estimated from their residuals and at least that mean. A residual beyond three
+/// standard deviations counts as three.
 class CornerWeights {
  public:
-  /// Of corners of which the deviation is known, and of those of which it is not. Precondition:
-  /// there are some of the first, not all of them 0.
+  /// @param known    corners with a predicted standard deviation; at least one, not all residuals 0
+  /// @param unknown  corners without one
   CornerWeights(std::span<const CornerError> told, std::span<const CornerError> untold);
 
-  /// By a corner's deviation, 0 where nobody knows it.
+  /// Returns the weight of a corner. `sd_px`: its predicted standard deviation, px; 0 if unknown.
   double of(double sd_px) const;
 
  private:

@@ -11,7 +11,7 @@
 namespace vlp {
 namespace {
 
-/// An edge of a tag, between two pixels.
+/// Edge of a tag as a straight line between two pixels.
 struct Chord {
   Eigen::Vector2d from, to, outwards;
 
@@ -22,7 +22,8 @@ struct Chord {
   }
 };
 
-/// How far outside of a chord the lens has the straight line between its ends, at w.
+/// Returns the distance, px, outside of a chord at which the lens projects the straight line
+/// between its ends, at w.
 std::optional<double> bow_of_lens(const Chord& chord, const Eigen::Vector3d& from_ray,
                                   const Eigen::Vector3d& to_ray, const Lens& lens, double w) {
   constexpr int rounds = 3;
@@ -37,7 +38,7 @@ std::optional<double> bow_of_lens(const Chord& chord, const Eigen::Vector3d& fro
   }
 }
 
-/// What an edge's ends move outwards by, with the bow that the lens makes.
+/// Outward displacements of the ends of an edge, and the curvature by the lens.
 struct MovedEdge {
   std::array<double, 2> outwards_px;
   EdgeBow bow;
@@ -49,7 +50,7 @@ std::optional<MovedEdge> moved(const Chord& chord, const EdgeBow& seen, const Le
   const auto lens_at = [&](double w) {
     return bow_of_lens(chord, from_ray->direction, to_ray->direction, lens, w);
   };
-  // Gauss and Legendre's places and weights.
+  // Nodes and weights of Gauss-Legendre quadrature.
   constexpr std::array<std::array<double, 2>, 4> rule{{{-0.8611363115940526, 0.3478548451374538},
                                                        {-0.3399810435848563, 0.6521451548625461},
                                                        {0.3399810435848563, 0.6521451548625461},
@@ -71,7 +72,7 @@ std::optional<MovedEdge> moved(const Chord& chord, const EdgeBow& seen, const Le
 }  // namespace
 
 double take_bows_of_lens(std::vector<BoardLattice::Corner>& corners, const Lens& lens) {
-  constexpr double much = 0.25;  // of an edge: no corner, or none of these edges
+  constexpr double much = 0.25;  // of an edge; beyond it the corner or the edges are wrong
   double most_px = 0;
   for (std::size_t first = 0; first + 4 <= corners.size(); first += 4) {
     const auto tag = corners.begin() + static_cast<std::ptrdiff_t>(first);

@@ -9,16 +9,21 @@
 
 namespace vlp {
 
-/// Moves the corners of a view's tags, each where its edges cross, to where they cross when the
-/// edges bow as the lens bows straight lines between these corners, and not as their pixels alone
-/// show it. An edge's bow is known from the lens a hundred times better than from the edge, and
-/// fitted together with its ends it leaves these uncertain: of pixels all along an edge a
-/// parabola's middle has nine quarters of a straight line's variance, and errors of its ends go
-/// together, so that a tag as a whole is known half as well. By the linear regression of one on the
-/// other: with the bow seen, b(w), and the lens' one, l(w),
+/// Moves the corners of a view's tags to the intersections of edges with the curvature of the lens,
+/// instead of the measured curvature. The curvature of the lens is that of straight lines between
+/// the corners. Afterwards the corners have this curvature.
+///
+/// The lens determines the curvature of an edge a hundred times more accurately than the edge
+/// itself. A curvature fitted together with the ends makes the ends uncertain. With pixels all
+/// along an edge the middle of a parabola has 9/4 of the variance of a straight line, and the
+/// errors of both ends are correlated. A whole tag is then half as accurate.
+///
+/// The correction is a linear regression, with the measured curve b(w) and that of the lens l(w):
 ///   end += (straight line fitted to b - l over the pixels) at the end, outwards.
-/// Corners have the lens' bows then. Corners without bows stay: of touching squares, and from
-/// files that do not tell them. Returns by how much one moved at most, in px.
+///
+/// Corners without a measured curvature are kept: those of touching squares, and of files without
+/// it. Tags are also kept if a corner would move by a quarter of an edge or more.
+/// @return largest displacement of a corner, px
 double take_bows_of_lens(std::vector<BoardLattice::Corner>& corners, const Lens& lens);
 
 }  // namespace vlp

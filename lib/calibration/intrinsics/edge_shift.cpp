@@ -18,14 +18,14 @@ constexpr int kPose = 6, kUnknowns = kPose + 4;
 using Square = Eigen::Matrix<double, kUnknowns, kUnknowns>;
 using Column = Eigen::Matrix<double, kUnknowns, 1>;
 
-/// The normal equations of a view's pose and shift, for corners of variance 1 / weight^2.
+/// Normal equations of the pose and the shift of a view, for corners of variance 1 / weight^2.
 struct ShiftEquations {
   Square normal = Square::Zero();
   Column right = Column::Zero();
   EdgeShift shift;
   bool any = false;
 
-  /// With the shift's terms expected to be `usual`, with so much weight each.
+  /// Solves with priors: the terms of the shift are `usual`, with the given weights.
   EdgeShift solved(const Eigen::Vector4d& usual, const Eigen::Vector4d& weights) const {
     Square all = normal;
     Column sum = right;
@@ -73,7 +73,7 @@ ShiftEquations equations_of(const std::vector<BoardLattice::Corner>& corners, co
 
 std::vector<EdgeShift> edge_shifts(std::span<const std::vector<BoardLattice::Corner>> views,
                                    const Lens& lens, ShiftForm form) {
-  // Corners of 0.05 px, shifts that differ by 0.1 px from view to view and within a view.
+  // Corner noise of 0.05 px; shifts differ by 0.1 px from view to view and within a view.
   constexpr double weight = 0.25, none = 1e-6, all = 1e9;
   const double uneven = form == ShiftForm::even ? all : weight;
   const Eigen::Vector4d alone(none, uneven, uneven, uneven), beside(weight, uneven, uneven, uneven);

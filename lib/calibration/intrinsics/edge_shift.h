@@ -11,35 +11,42 @@
 
 namespace vlp {
 
-/// How far the edges of the tags in a view went inwards, towards the dark, at a pixel:
-///   shift = by . (1, x, y, x^2 + y^2),  (x, y) = (pixel - middle) / reach.
-/// It changes over the view as the light does, where white is overexposed.
+/// Displacement of the tag edges in a view inwards, towards the dark, as a function of the pixel:
+///   shift = coefficients . (1, x, y, x^2 + y^2),  (x, y) = (pixel - middle) / reach_px,  px.
+/// It varies over the view like the illumination if white is overexposed.
 struct EdgeShift {
   Eigen::Vector4d by = Eigen::Vector4d::Zero();
   Eigen::Vector2d middle{0, 0};
   double reach_px = 1;
 
+  /// Returns the displacement at a pixel, px.
   double at(const Eigen::Vector2d& pixel) const {
     const Eigen::Vector2d x = (pixel - middle) / reach_px;
     return by.dot(Eigen::Vector4d(1, x.x(), x.y(), x.squaredNorm()));
   }
 };
 
-/// Whether the shift of a view changes over it.
+/// Variation of the shift within a view: constant, or as in EdgeShift.
 enum class ShiftForm { even, changing };
 
-/// The shift in each view. A tone curve, sharpening or overexposure moves an edge by a share of its
-/// blur, because half of the coded level is not half of the light; so isolated tags shrink by that
-/// on all sides. Solved for with the pose of the board, by least squares of
-///   seen - projected - shift inward
-/// (BoardLattice::Corner), which the gaps between the tags determine. A view of few corners goes
-/// with the median of the others, and its shift changes little. One that changes over a view
-/// would take for itself what a board that is bent shows, as long as that is not known. 0 where the
-/// edges cannot move: where touching squares make the corners.
+/// Estimates the edge shift in each view.
+///
+/// A tone curve, sharpening or overexposure moves an edge by a fraction of its blur, because half
+/// of the coded level is not half of the light. Isolated tags therefore shrink on all sides. The
+/// shift is solved together with the pose of the board, by least squares of
+///   measured - projected - shift inward
+/// (BoardLattice::Corner). The gaps between the tags determine it.
+///
+/// Priors of 0.1 px, for corners of 0.05 px, keep the constant term near the median of all views
+/// and the other terms near 0. Views with fewer than 12 corners get the median. The shift is 0 if
+/// touching squares make the corners, which cannot move.
+///
+/// Use ShiftForm::constant as long as the warp of the board is unknown: a varying shift would
+/// absorb it.
 std::vector<EdgeShift> edge_shifts(std::span<const std::vector<BoardLattice::Corner>> views,
                                    const Lens& lens, ShiftForm form = ShiftForm::changing);
 
-/// Moves the edges back; the mean of what they were moved by, in px.
+/// Moves the edges back by a shift. Returns the mean displacement, px.
 double take_out_shift(std::vector<BoardLattice::Corner>& corners, const EdgeShift& shift);
 
 }  // namespace vlp

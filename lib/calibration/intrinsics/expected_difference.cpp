@@ -19,7 +19,7 @@
 namespace vlp {
 namespace {
 
-/// How the pixel that shows a ray changes.
+/// Derivatives of the pixel of a ray.
 struct Place {
   Eigen::Matrix<double, 2, 3> by_turn;
   Lens::ByParameters by_intrinsics;
@@ -40,8 +40,8 @@ std::vector<Place> places_of(const Lens& lens, const std::array<int, 2>& imager_
   return places;
 }
 
-/// How the pixels of the places change with the intrinsics, when every change of those goes with
-/// the turn that takes most of it away.
+/// Returns the derivatives of the pixels with respect to the intrinsics. Each change of the
+/// intrinsics is combined with the rotation that removes most of it.
 std::vector<Eigen::MatrixXd> by_intrinsics_turned(const std::vector<Place>& places,
                                                   Eigen::Index intrinsics) {
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
@@ -69,7 +69,7 @@ Eigen::MatrixXd draws_of(const Eigen::MatrixXd& covariance) {
     const double radius = std::sqrt(-2 * std::log(1 - share()));
     value = radius * std::cos(2 * std::numbers::pi * share());
   }
-  // Parameters are of sizes far apart.
+  // The magnitudes of the parameters differ widely.
   const Eigen::VectorXd scale = covariance.diagonal().cwiseMax(0).cwiseSqrt();
   const Eigen::VectorXd inverse = (scale.array() > 0).select(scale.cwiseInverse(), 0);
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> of_unit_size(

@@ -10,25 +10,30 @@
 
 namespace vlp {
 
-/// What projection_difference() between a lens and the true one should be.
+/// Expected projection_difference() between a lens and the true one.
 struct ExpectedDifference {
-  /// Root of the expected mean square over the image, per axis.
+  /// Root of the expected mean square over the image, per axis, px.
   double rms_px;
-  /// How many independent terms of like size the mean square has: it scatters by sqrt(2 / freedoms)
-  /// of itself.
+  /// Effective number of independent terms of similar size in the mean square, whose relative
+  /// standard deviation is sqrt(2 / freedoms).
   double freedoms;
 };
 
-/// From the covariance of the intrinsics, to first order, for even weights over the image, or over
-/// a part of it where there is one. It is less than the projection uncertainty: that counts, too,
-/// how far the camera as a whole turns against the boards, which lining two lenses up takes away.
+/// Computes the expected difference from the covariance of the intrinsics, to first order, with
+/// uniform weights over the image, or over `region` if it is not empty.
+///
+/// The difference is smaller than the projection uncertainty, which includes rotations of the
+/// camera relative to the boards. Aligning two lenses removes such rotations. Infinite if the
+/// covariance is not finite.
 ExpectedDifference expected_difference(const Lens& lens, const std::array<int, 2>& imager_px,
                                        const Eigen::MatrixXd& covariance,
                                        const ImageRegion& region = {});
 
-/// Root of the expected square of the largest difference over the same, which is more than the
-/// largest standard deviation of a place, as chance has many places to choose from. By 200 draws,
-/// the same ones every time.
+/// Estimates the root of the expected square of the largest difference over the same pixels, px,
+/// from 200 random draws with a fixed seed.
+///
+/// It exceeds the largest standard deviation of a single pixel, because the maximum is over many
+/// pixels. Infinite if the covariance is not finite.
 double expected_worst_px(const Lens& lens, const std::array<int, 2>& imager_px,
                          const Eigen::MatrixXd& covariance, const ImageRegion& region = {});
 

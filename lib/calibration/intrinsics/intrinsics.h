@@ -12,11 +12,12 @@
 
 namespace vlp {
 
-/// Whether the board's warp is solved for. `automatic`: when it takes away more of the squared
-/// residuals than 20 times their mean, which chance does once in 20,000.
+/// Selects whether the warp of the board is estimated. `automatic`: keeps the warp if it reduces
+/// the sum of squared residuals by more than 20 times their mean, which happens by chance once in
+/// 20,000.
 enum class WarpChoice { automatic, on, off };
 
-/// What is solved: the corners of each view, of one camera.
+/// Input of a solve: the corners of each view, from one camera.
 struct IntrinsicsInput {
   BoardLattice lattice;
   std::vector<std::vector<BoardLattice::Corner>> views;
@@ -25,81 +26,95 @@ struct IntrinsicsInput {
   WarpChoice warp = WarpChoice::automatic;
 };
 
+/// Result of a solve.
 enum class IntrinsicsStatus {
   ok,
   too_few_views,  // fewer than three that can be used
   all_alike,      // every view shows the board at the same angle: any focal length fits
   no_solution,    // no lens of the model fits
 };
-/// One line, with what to add.
+/// Describes a status in one line, with the remedy.
 std::string_view explanation_of(IntrinsicsStatus status);
 
-/// A solution and how it fits.
+/// Solution and its fit.
 struct IntrinsicsSolution {
   IntrinsicsStatus status;
-  /// At the solution; with status ok only, as is all below. Its poses are those of the parts of
-  /// views[0], views[1], ... in turn, and have points for each.
+  /// Problem at the solution; like all members below, valid with status ok only. The poses are
+  /// those of the parts of views[0], then of views[1] and so on; each has its points.
   BoardProblem problem;
-  /// The views that it rests on, by their index in the input.
+  /// Views in the solution, as indices of the input.
   std::vector<std::size_t> views;
-  /// Views that fit no pose while the others do, and what is left over there.
+  /// View that fits no pose, although the other views do, and its RMS residual.
   struct Dropped {
     std::size_t view;
     double rms_px;
   };
   std::vector<Dropped> dropped;
-  /// How far the edges of the tags had gone towards the dark in each of `views`, in the mean; it is
-  /// taken out of the corners (edge_shifts()).
+  /// Mean shift of the tag edges towards the dark in each of `views`, px. The corners are corrected
+  /// for it (edge_shifts()).
   std::vector<double> edge_shifts_px;
-  /// Root of the sum of the squared, weighted residuals over 2 x corners, those that are no
-  /// outliers: per axis.
+  /// RMS of the weighted residuals per axis, without outliers: sqrt(sum of squares / (2 corners)),
+  /// px.
   double rms_px;
+  /// Number of corners without outliers, and number of outliers.
   int corners, outliers;
 
   bool ok() const { return status == IntrinsicsStatus::ok; }
-  /// What `problem` leaves: rms_px, corners, outliers.
+  /// Computes rms_px, corners and outliers from `problem`.
   void set_fit();
   Lens lens() const { return Lens(problem.lens_model, problem.intrinsics); }
-  /// Intrinsics (of a splined lens but for the core), and the warp or not.
+  /// Estimated parameters: the intrinsics (splined lenses: without the core), and the warp if
+  /// selected.
   SolveFor solved_for{true, true, true, false};
-  /// Another lens model fits the corners as well, so that they do not tell what is beyond them.
+  /// True if another lens model fits the corners equally well. The lens is then undetermined
+  /// outside the region of the corners.
   bool another_fits = false;
 };
 
-/// Solves for lens, poses and the board's warp, with no guess of the focal length:
-///  1. a focal length of a geometric series, STEREOGRAPHIC, that fits the views' poses best;
-///  2. STEREOGRAPHIC with every pose, and the poses again with that lens, until they stay;
-///  3. the model wanted, regularized as mrcal does it, and the poses again (of a splined lens from
-///     OPENCV_FISHEYE, whose centre is its centre, and then regularized for the noise that is left,
-///     instead of a pixel, which would draw it off by more than the noise does; without the tags of
-///     which OPENCV_FISHEYE leaves a corner elsewhere than its neighbours, to which it would bend
-///     near the rim); views that fit no pose are dropped;
-///  4. the corners of the tags with edges that bow as this lens bows them (take_bows_of_lens());
-///  5. the shift of the tags' edges, even over a view, taken out (edge_shifts()), and the model
-///     again, at most twice;
-///  6. the board's warp (WarpChoice);
-///  7. corners weighted by what they are good for, where their images tell it (CornerWeights);
-///     the bows again, as 4., what the shifts change over a view, as 5., and the weights again;
-///  8. all of it without outliers;
-///  9. a splined lens turned to its axis.
-/// The control points of a splined lens make up for any turn of the camera, so that its frame is a
-/// convention: that of the OPENCV_FISHEYE which fits the same corners best, so that +Z is the axis
-/// of the lens, seen near (cx, cy), and +X the image's. Rays of that frame hold it in the solve
-/// (BoardProblem::held). It is turned there until less than 0.006 degrees are left, four times at
-/// most: after those, or when OPENCV_FISHEYE cannot be fitted again, it stays as it is, and nothing
-/// tells so. Where OPENCV_FISHEYE was not solved for at all, it is the frame in which the control
-/// points have least to do.
-/// Planar flips cannot live: both poses of every view are tried with each lens (view_pose()).
-/// Depends on the input only, not on threads.
+/// Estimates lens, poses and warp of the board. Needs no initial focal length. Stages:
+/// 1. Selects up to four focal lengths of a geometric series: those of STEREOGRAPHIC that fit the
+///   poses of the views best. The following stages start from one after another until one succeeds
+///   with more than half of the views.
+/// 2. Solves STEREOGRAPHIC with all poses and re-estimates the poses with that lens, until
+///   convergence.
+/// 3. Solves the requested model, regularized as in mrcal, and re-estimates the poses. Drops views
+///   that fit no pose. Splined lenses: see below.
+/// 4. Corrects the corners of the tags for the edge curvature of this lens (take_bows_of_lens()).
+/// 5. Corrects the shift of the tag edges, constant over a view (edge_shifts()), and solves again,
+///   at most twice.
+/// 6. Estimates the warp of the board (WarpChoice).
+/// 7. Weights the corners by their variances if the images provide them (CornerWeights). Repeats
+///   stage 4, then stage 5 with shifts that vary over a view, then the weights.
+/// 8. Solves again without outliers.
+/// 9. Splined lenses: aligns the frame to the axis of the lens.
+///
+/// Splined lenses start stage 3 from OPENCV_FISHEYE, whose center becomes their center. Their
+/// regularization is scaled to the residual noise instead of 1 px, which would bias the lens by
+/// more than the noise does. Tags with a corner whose residual of OPENCV_FISHEYE differs from those
+/// of its neighbors are outliers: near the rim a splined lens would overfit them.
+///
+/// The control points of a splined lens can compensate any rotation of the camera, so that its
+/// frame is a convention. It is the frame of the OPENCV_FISHEYE that fits the same corners best: +Z
+/// is the axis of the lens, imaged near (cx, cy), and +X is that of the image. Rays of that frame
+/// fix it in the solve (BoardProblem::fixed_rays).
+///
+/// The alignment ends when the remaining rotation is below 0.006 degrees. It also ends after four
+/// iterations, or if OPENCV_FISHEYE cannot be fitted again; the solution does not report these
+/// cases. If OPENCV_FISHEYE was never fitted, the frame is the one with the smallest control
+/// points.
+///
+/// Both poses of each view are tried with each lens, to resolve the planar pose ambiguity
+/// (view_pose()). The result depends on the input only, not on threads.
 IntrinsicsSolution solve_intrinsics(const IntrinsicsInput& input);
 
-/// Of every other view of a solution, from that solution on: their lens, poses and warp are solved
-/// for again, with the shifts of edges, the weights, the outliers and a warp or none as all views
-/// told them.
-/// Precondition: whole.ok().
+/// Solves for every second view of a solution, beginning with view `first`, starting from that
+/// solution. Estimates lens, poses and warp. Keeps from `whole` the edge shifts, the weights, the
+/// outliers, and whether the warp is estimated.
+/// @pre whole.ok()
 IntrinsicsSolution solve_every_other(const IntrinsicsSolution& whole, std::size_t first);
 
-/// Residuals of a problem's points, seen minus projected, outliers too; NaN where nothing was seen.
+/// Returns the residuals of the points of a problem, measured minus projected, px, including
+/// outliers. NaN for points that were not seen or cannot be projected.
 std::vector<Eigen::Vector2d> residuals_of(const BoardProblem& problem);
 
 }  // namespace vlp

@@ -65,7 +65,7 @@ void IntrinsicsSolver::start_symmetric() {
   if (!is_splined(input_.lens_model)) return;
   IntrinsicsSolver symmetric = *this;
   symmetric.input_.lens_model = LensModel::fisheye;
-  if (!symmetric.refine()) return;  // STEREOGRAPHIC has to do
+  if (!symmetric.refine()) return;  // keeps STEREOGRAPHIC
   symmetric_ = symmetric.problem_.intrinsics;
   slips_ = symmetric.slips();
   const Lens fisheye = symmetric.lens();
@@ -75,12 +75,12 @@ void IntrinsicsSolver::start_symmetric() {
     }
   }
   const std::vector<double> core = core_like(fisheye, seen_px(symmetric.problem_));
-  // Of too few control points STEREOGRAPHIC of that core has to do.
+  // With too few control points, STEREOGRAPHIC with that core is used.
   problem_.intrinsics =
       splined_like(fisheye, input_.imager_px, input_.lens_model, core).value_or(core);
   problem_.lens_model = input_.lens_model;
   problem_.intrinsics.resize(parameter_count(input_.lens_model), 0);
-  // The axis, and two rays beside it against a turn about it.
+  // The axis, and two rays next to it that prevent a rotation about it.
   for (const double beside : {0.0, -0.25, 0.25}) {
     const Eigen::Vector2d pixel =
         fisheye.center_px() + Eigen::Vector2d(beside * input_.imager_px[0], 0);
@@ -121,7 +121,7 @@ bool IntrinsicsSolver::refine() {
   constexpr int rounds = 6;
   constexpr std::size_t core = 4;
   problem_.lens_model = input_.lens_model;
-  // Of a splined lens the core would move against all control points at once; mrcal keeps it, too.
+  // The core of a splined lens would only compensate the control points; mrcal fixes it, too.
   if (is_splined(input_.lens_model)) solved_for_.core = false;
   const std::size_t given = problem_.intrinsics.size();
   problem_.intrinsics.resize(parameter_count(input_.lens_model), 0);
@@ -242,7 +242,7 @@ bool IntrinsicsSolver::weigh_corners() {
 }
 
 bool IntrinsicsSolver::leave_out_outliers() {
-  // Without noise what is left is the regularization's, and would be taken for outliers.
+  // Without noise, residuals are caused by the regularization and are not outliers.
   constexpr double exact_px = 0.005;
   if (solution().rms_px < exact_px) return true;
   SolveFor without_outliers = solved_for_;
@@ -262,7 +262,7 @@ bool IntrinsicsSolver::solve(SolveFor what) { return solve_for_lens(problem_, wh
 
 namespace {
 
-/// What a view's corners may be off, given what those of the others are.
+/// Returns the limit of the RMS residual of a view, px, given those of all views.
 double limit_for(const std::vector<double>& rms) {
   constexpr double fair_px = 1, fair = 4;
   return std::max(fair_px, fair * upper_median(rms));
@@ -326,7 +326,8 @@ std::vector<double> IntrinsicsSolver::rms_of_views() const {
 std::set<IntrinsicsSolver::CornerOfView> IntrinsicsSolver::slips() const {
   constexpr std::size_t neighbours = 8;
   constexpr double sigmas = 8, least_px = 0.1, median_of_normal = 0.6745;
-  // Where OPENCV_FISHEYE is not the lens, neighbours differ among themselves, too.
+  // If OPENCV_FISHEYE does not fit the lens, the residuals of neighbors also differ from each
+  // other.
   constexpr double beside_sigmas = 5;
   const auto residuals = residuals_of(problem_);
   std::map<CornerOfView, double> apart_px;
@@ -372,7 +373,7 @@ std::set<IntrinsicsSolver::CornerOfView> IntrinsicsSolver::slips() const {
       if (input_.lattice.tag_of(corners[k].point) == tag) found.insert({slip.first, k});
     }
   }
-  // A view of which much has slipped is not made good by what is left of it.
+  // A view with many such corners is not improved by its other corners.
   std::map<std::size_t, std::size_t> of_view;
   for (const auto& [view, corner] : found) ++of_view[view];
   std::erase_if(found, [&](const CornerOfView& slip) {

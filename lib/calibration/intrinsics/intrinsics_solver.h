@@ -12,36 +12,39 @@
 
 namespace vlp {
 
-/// The stages of solve_intrinsics(), in turn; each is false when it fails.
+/// Stages of solve_intrinsics(), in their order. Each returns false if it fails.
 class IntrinsicsSolver {
  public:
   static constexpr std::size_t kLeastViews = 3;
 
   explicit IntrinsicsSolver(const IntrinsicsInput& input);
 
-  /// Stage 2, from a focal length.
+  /// Stage 2, from an initial focal length.
   bool start(double focal_px);
-  /// Of a splined lens the start of stage 3, the symmetric one; no stage of others.
+  /// Splined lenses only: initializes stage 3 with the rotationally symmetric lens OPENCV_FISHEYE.
+  /// Keeps the initial lens STEREOGRAPHIC if that fails.
   void start_symmetric();
   /// Stage 3.
   bool refine();
-  /// Of a splined lens, the regularization made for the noise of the corners; no stage of others.
+  /// Splined lenses only: scales the regularization to the noise of the corners.
   bool weigh_regularization();
-  /// Stages 4 and 7: take_bows_of_lens().
+  /// Stages 4 and 7: applies take_bows_of_lens() to all views and solves again.
   bool take_bows();
-  /// Stages 5, even ones, and 7: what edge_shifts() finds, twice at most, until it is below 0.002
+  /// Stages 5 (ShiftForm::constant) and 7 (ShiftForm::varying): corrects the corners for
+  /// edge_shifts() and solves again, at most twice, until the terms of the shifts are below 0.002
   /// px.
   bool take_out_shifts(ShiftForm form);
-  /// Stage 6: the warp of the board, if it is to be.
+  /// Stage 6: estimates the warp of the board if WarpChoice permits it.
   bool bend();
-  /// Stage 7: corners weighted by what they are good for (CornerWeights), when images tell it of
-  /// some.
+  /// Stage 7: weights the corners by their variances (CornerWeights) if standard deviations of some
+  /// corners are known.
   bool weigh_corners();
   /// Stage 8.
   bool leave_out_outliers();
-  /// Stage 9, of a splined lens: true also when the turn has not settled.
+  /// Stage 9, splined lenses only. Returns true also if the rotation has not converged.
   bool turn_to_axis();
 
+  /// Returns the current solution.
   IntrinsicsSolution solution() const;
 
  private:
@@ -50,47 +53,52 @@ class IntrinsicsSolver {
 
   Lens lens() const { return Lens(problem_.lens_model, problem_.intrinsics); }
   bool solve(SolveFor what);
-  /// Poses of every view through this lens; views without one wait for another lens.
+  /// Estimates the pose of every view with a lens. Views without a pose are unused until the next
+  /// call.
   void seed(const Lens& lens);
-  /// The problem of the views used, at their seeds.
+  /// Sets up the problem of the views used, at their initial poses.
   void assemble(const Lens& lens);
-  /// Of the problem, by a view's place in used_.
+  /// Returns the index of a corner in the points of the problem; `used` is the index of its view in
+  /// used_.
   std::size_t point_of(std::size_t used, const BoardLattice::Corner& corner) const;
-  /// Where the corners of the input are now, and what they weigh.
+  /// Copies pixels and weights of the corners from the input to the problem; outliers are kept.
   void move_points();
-  /// Of the views used, in their order.
+  /// Returns the RMS residual of each view used, px, in the order of used_; infinity if not finite.
   std::vector<double> rms_of_views() const;
-  /// Whether the lens can see all corners of most views. mrcal solves for points behind the camera,
-  /// too, and goes on for long.
+  /// Returns true if the lens projects all corners of most views. mrcal also solves for points
+  /// behind the camera, and takes long.
   bool sees_most() const;
-  /// Of the views used, the corners that lie elsewhere than their neighbours in their residuals.
+  /// Returns the corners of tags with a corner whose residual differs from those of its neighbors.
+  /// Skips views in which these would be more than a quarter of the corners.
   std::set<CornerOfView> slips() const;
-  /// Tries both poses of each view that fits badly, and drops the worst of those that stay bad.
-  /// True when there is something to solve again.
+  /// If a view fits badly, re-estimates the poses of all views used and drops the worst of the
+  /// views that still fit badly. Returns true if the problem has to be solved again.
   bool change_poses();
-  /// Views that were dropped because a worse one had spoilt the lens, and that fit it now.
+  /// Reinstates dropped views that fit the current lens: a worse view had distorted the earlier
+  /// lens. Returns true if there are any.
   bool take_back();
 
   IntrinsicsInput input_;
-  /// What was taken out of the views of the input.
+  /// Mean shift by which the corners of each view of the input were corrected, px.
   std::vector<double> edge_shifts_px_;
-  /// The warp only after bend().
+  /// Parameters to estimate; the warp only after solve_board_warp().
   SolveFor solved_for_{true, true, false, false};
   PoseSeeds seeds_;
   std::vector<std::size_t> used_;
   std::vector<IntrinsicsSolution::Dropped> dropped_;
   BoardProblem problem_{};
-  /// Of a splined lens, the parameters of OPENCV_FISHEYE for the same corners, however well it fits
-  /// them; empty when it was not solved for.
+  /// Splined lenses only: parameters of OPENCV_FISHEYE fitted to the same corners, regardless of
+  /// the quality of its fit; empty if it was not fitted.
   std::vector<double> symmetric_;
-  /// Of a splined lens, corners that it would bend to where they are few: outliers from the start.
+  /// Splined lenses only: corners that the lens would overfit where corners are sparse. Outliers
+  /// from the start.
   std::set<CornerOfView> slips_;
 };
 
-/// No two boards are tilted differently, by five degrees or more.
+/// Returns true if all board normals lie within five degrees of each other.
 bool all_alike(const BoardProblem& problem);
 
-/// solve(), without the distortions of a model that has none.
+/// Calls solve(), without the distortions if the model has none.
 bool solve_for_lens(BoardProblem& problem, SolveFor what);
 
 }  // namespace vlp

@@ -10,13 +10,13 @@
 namespace vlp {
 namespace {
 
-/// Positive where c lies clockwise of a to b, as the image shows it (y down).
+/// Returns a positive value if c lies clockwise of the line from a to b in the image (y down).
 double side(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c) {
   const Eigen::Vector2d u = b - a, v = c - a;
   return u.x() * v.y() - u.y() * v.x();
 }
 
-/// Andrew's monotone chain (1979).
+/// Computes the convex hull by Andrew's monotone chain (1979); empty if all points are on a line.
 ImageRegion hull_of(std::vector<Eigen::Vector2d> points) {
   std::sort(points.begin(), points.end(), [](const auto& a, const auto& b) {
     return a.x() < b.x() || (a.x() == b.x() && a.y() < b.y());
@@ -39,7 +39,7 @@ ImageRegion hull_of(std::vector<Eigen::Vector2d> points) {
   return hull.size() < 3 ? ImageRegion() : hull;
 }
 
-/// What of a polygon lies where sign * (x[axis] - limit) <= 0 (Sutherland and Hodgman, 1974).
+/// Returns the part of a polygon with sign * (x[axis] - limit) <= 0 (Sutherland and Hodgman, 1974).
 ImageRegion cut(const ImageRegion& region, int axis, double limit, double sign) {
   ImageRegion rest;
   for (std::size_t i = 0; i < region.size(); ++i) {
@@ -62,7 +62,7 @@ ImageRegion known_region(const std::vector<Eigen::Vector2d>& corners_px,
   const double margin = is_splined(model) || another_fits ? 0 : 0.04;
   const Eigen::Vector2d last(imager_px[0] - 1, imager_px[1] - 1);
   const double margin_px = margin * last.norm();
-  // The hull grown by a square, whose corners reach an image's corner as its edges are reached.
+  // Extends the hull by a square: near a corner of the image it reaches both edges.
   std::vector<Eigen::Vector2d> grown;
   for (const Eigen::Vector2d& corner : hull_of(corners_px)) {
     for (const double x : {-margin_px, margin_px}) {

@@ -10,20 +10,23 @@
 
 namespace vlp {
 
-/// A part of an image, a polygon, by its corners in turn.
+/// Polygon in an image: its vertices in order, px.
 using ImageRegion = std::vector<Eigen::Vector2d>;
 
-/// Where a lens is known: the convex hull of the corners that it rests on, and around it a margin
-/// of 4 % of the image's diagonal, the image's edges permitting; the whole image when that leaves
-/// less than 1.5 % of it. Convex, clockwise as the image shows it. Beyond it no corner contradicts
-/// a lens model that is wrong. A splined lens, which corners tell nothing of where they are not,
-/// has no margin, nor has a lens whose model the corners do not tell from another (another_fits).
-/// Empty without three corners that are not on a line.
+/// Returns the region of the image where a lens is calibrated: the convex hull of the corners used,
+/// extended by 4 % of the image diagonal and clipped to the image.
+///
+/// Returns the whole image if the region covers at least 98.5 % of it, and an empty region without
+/// three corners that are not on a line. The polygon is convex and clockwise in the image. Outside
+/// it no corner contradicts a wrong lens model.
+///
+/// There is no margin for splined lenses, which are undetermined outside the corners, and if the
+/// corners do not distinguish the model from another one (another_fits).
 ImageRegion known_region(const std::vector<Eigen::Vector2d>& corners_px,
                          const std::array<int, 2>& imager_px, LensModel model,
                          bool another_fits = false);
 
-/// Computes the area of a region as a share of the image's, which reaches from the centre of its
+/// Computes the area of a region as a fraction of the image, which extends from the center of its
 /// first pixel to that of its last.
 double share_of_image(const ImageRegion& region, const std::array<int, 2>& imager_px);
 

@@ -21,12 +21,12 @@ namespace {
 
 using Squares = std::vector<double>;
 
-/// By their number of parameters.
+/// Candidates in the order of their number of parameters.
 constexpr std::array kModels{LensModel::opencv4, LensModel::fisheye, LensModel::opencv5,
                              LensModel::opencv8, LensModel::opencv12};
 
-/// The mean squared residual per axis of each view, from solves without it, infinite where it has
-/// no pose; nothing when a solve fails.
+/// Returns the mean squared residual per axis of each view, px^2, from solves without it; infinity
+/// if it has no pose. Returns std::nullopt if a solve fails.
 std::optional<Squares> judged(const IntrinsicsInput& input) {
   constexpr std::size_t parts = 3;
   Squares squares;
@@ -50,7 +50,7 @@ double mean_of(const Squares& squares) {
   return std::accumulate(squares.begin(), squares.end(), 0.0) / static_cast<double>(squares.size());
 }
 
-/// The mean over the views of log(a / b), and its standard error.
+/// Mean over the views of log(a / b), and its standard error.
 struct Excess {
   double mean, error;
 };
@@ -65,8 +65,8 @@ Excess excess(const Squares& a, const Squares& b) {
   return {sum / n, std::sqrt(spread / (n - 1) / n)};
 }
 
-/// Takes the views from all models that none of them fits: what is wrong with those is not the
-/// lens.
+/// Removes the views that no model fits from all models: the lens is not the cause of their
+/// residuals.
 void leave_out_bad_views(std::vector<std::optional<Squares>>& of_models) {
   constexpr double much = 9;
   constexpr double inf = std::numeric_limits<double>::infinity();

@@ -13,58 +13,65 @@
 
 namespace vlp {
 
-/// What one lens model leaves of views that took no part in its solves.
+/// Residuals of one lens model in views that took no part in its solves.
 struct TriedLens {
   LensModel model;
-  /// Per axis, over the views that count; infinite when no lens of the model fits all of those.
+  /// RMS per axis, px, over the views that count; infinity if no lens of the model fits all of
+  /// them.
   double rms_px = std::numeric_limits<double>::infinity();
 };
 
+/// Minimum number of views for choose_lens().
 constexpr std::size_t kLeastViewsToChoose = 6;
 
-/// A lens of OPENCV_FISHEYE, and how far off its axis there are corners.
+/// Fit of OPENCV_FISHEYE, and the largest angle of a corner off its axis.
 struct FisheyeFit {
   IntrinsicsSolution solution;
   double farthest_rad;
 };
 
-/// A lens model for a camera, and what it was chosen by.
+/// Selected lens model and the results of its selection.
 struct LensChoice {
   LensModel model;
-  /// The models tried, those with fewer parameters first, OPENCV4 before the fisheye.
+  /// Candidates in the order of their number of parameters; OPENCV4 before OPENCV_FISHEYE.
   std::vector<TriedLens> tried;
-  /// How far off the axis the board is seen, by OPENCV_FISHEYE, when that is where no OPENCVn has
-  /// rays, at a right angle or beyond; else 0.
+  /// Largest angle of a corner off the axis of OPENCV_FISHEYE if it is at least a right angle,
+  /// where no OPENCVn has rays; 0 otherwise.
   double beyond_rad = 0;
-  /// When one fits.
+  /// Fit of OPENCV_FISHEYE; std::nullopt if it does not fit.
   std::optional<FisheyeFit> fisheye = {};
 };
 
-/// From here on no OPENCVn has rays.
+/// Angle off the axis from which on no OPENCVn has rays.
 inline constexpr double kRightAngle_rad = std::numbers::pi / 2;
 
-/// OPENCV_FISHEYE; nothing when none fits the views to 2 px. input.lens_model is not looked at.
+/// Fits OPENCV_FISHEYE. Returns std::nullopt if no lens fits the views with an RMS residual of at
+/// most 2 px. Ignores input.lens_model.
 std::optional<FisheyeFit> fit_fisheye(IntrinsicsInput input);
 
-/// Whether there may be corners far off the axis, 40 degrees or more by the focal length with which
-/// the views' poses fit best. Takes a small part of the time of a solve.
+/// Returns true if corners may be more than 40 degrees off the axis, given the focal length with
+/// which the poses of the views fit best. Takes a small fraction of the time of a solve.
 bool may_be_wide(const IntrinsicsInput& input);
 
-/// The lens model that the views call for, by cross-validation: the views go into three parts in
-/// turn, every model with distortion is solved for with two of them (solve_intrinsics()) and judged
-/// by the third, where only poses are fitted (held_out_rms_px()), until each view has been judged
-/// once. A model is worse than another by the mean over the views of the logarithm of the ratio of
-/// their squared residuals, in which the views of a few places do not outweigh the rest. Taken is
-/// the model with the fewest parameters that is worse than the best by no more than two standard
-/// errors of that: the one-standard-error rule of Breiman, Friedman, Olshen and Stone,
-/// Classification and Regression Trees, 1984, 3.4.3, which with one error would take a model larger
-/// than the lens in one of six cases. Views that every model leaves three times the usual residual
-/// of do not count. No OPENCVn is solved for when OPENCV_FISHEYE fits and sees corners at 90
-/// degrees off the axis or beyond. input.lens_model is not looked at. Nothing when no model fits
-/// the views, or there are fewer than kLeastViewsToChoose.
+/// Selects a lens model by three-fold cross-validation. Every third view is in the same part.
+///
+/// Each model with distortion is solved with two parts (solve_intrinsics()) and evaluated with the
+/// third, so that each view is evaluated once. The evaluation fits only poses and edge shifts
+/// (held_out_rms_px()). Two models are compared by the mean, over the views, of the logarithm of
+/// the ratio of their squared residuals. The views of a few positions do not dominate this mean.
+///
+/// Selects the model with the fewest parameters whose mean exceeds that of the best by at most two
+/// standard errors: the one-standard-error rule of Breiman, Friedman, Olshen and Stone,
+/// Classification and Regression Trees, 1984, 3.4.3. With one standard error, the rule would select
+/// a model larger than the lens in one of six cases.
+///
+/// Views in which the residuals of every model exceed three times the typical residual do not
+/// count. OPENCVn models are skipped if OPENCV_FISHEYE fits and has corners at 90 degrees off the
+/// axis or more. Ignores input.lens_model.
+/// @return std::nullopt if no model fits the views, or with fewer than kLeastViewsToChoose views
 std::optional<LensChoice> choose_lens(const IntrinsicsInput& input);
 
-/// In words: the models with what they left, the one taken first.
+/// Describes the candidates with their residuals, the selected one first.
 std::string words_of(const LensChoice& choice);
 
 }  // namespace vlp

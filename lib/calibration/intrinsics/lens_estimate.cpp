@@ -28,7 +28,7 @@ namespace {
 /// Residual above which a lens does not fit, per axis.
 constexpr double kMaxFit_px = 2;
 
-/// The views in the solve, and those that are held out.
+/// Views in the solve, and views that are held out.
 struct SplitViews {
   IntrinsicsInput solved, held_out;
 };
@@ -93,9 +93,10 @@ BoardReach measure_reach(const IntrinsicsSolution& fisheye, const Eigen::Vector2
   return reach;
 }
 
-/// Returns why the grid of a splined lens does not suit the views, by OPENCV_FISHEYE: more than a
-/// tenth of the boards (a board of four parts counts four times) reach beyond it, where solves
-/// fail, some after a minute; or it has too few control points where the lens sees. Else empty.
+/// Returns the reason why the grid of a splined lens does not suit the views, judged by
+/// OPENCV_FISHEYE; empty if it does. Either more than a tenth of the boards extend beyond the grid,
+/// where solves fail, some after a minute (a board of four parts counts four times). Or the grid
+/// has too few control points in the field of view.
 std::string explain_unsuitable_grid(IntrinsicsInput input) {
   constexpr double margin = 1.05;
   const LensModel splined = input.lens_model;
@@ -128,7 +129,7 @@ std::string recommend_model(LensModel requested, const IntrinsicsSolution& other
                      name_of(requested), name, other.rms_px, name);
 }
 
-/// Returns why no lens of the model fits: the model, if another one fits; else empty.
+/// Recommends another model that fits if the requested one does not; empty if there is none.
 std::string explain_no_fit(IntrinsicsInput input, const std::optional<FisheyeFit>& fisheye) {
   const LensModel requested = input.lens_model;
   std::string problem = fisheye ? recommend_model(requested, fisheye->solution) : "";
@@ -243,7 +244,7 @@ bool choose_model(SplitViews& views, LensEstimate& result) {
   return true;
 }
 
-/// Returns why the solver found no lens.
+/// Returns the reason why the solver found no lens.
 std::string explain_no_lens(const SplitViews& views, const std::optional<FisheyeFit>& fisheye,
                             IntrinsicsStatus status) {
   std::string problem;

@@ -21,7 +21,7 @@ struct LensViews {
   std::vector<BoardView> views;
   Board board;
   LensModel lens_model = LensModel::opencv8;
-  /// Every n-th view is kept out of the solve for validation; 0: none.
+  /// Every n-th view is held out of the solve for validation; 0: none.
   int held_out = 0;
   WarpChoice warp = WarpChoice::automatic;
   /// Selects the lens model by cross-validation (choose_lens()) instead of `lens_model`.
@@ -50,18 +50,18 @@ struct LensEstimate {
   std::optional<LensSharpness> sharpness = {};
   /// Result of the selection of the lens model, if it was requested.
   std::optional<LensChoice> choice = {};
-  /// A model that fits clearly better than the stated one, or equally well where the board is seen
+  /// Model that fits clearly better than the requested one, or equally well if the board is seen
   /// near a right angle off the axis.
   std::optional<LensModel> better_model = {};
   /// Change of projections by one standard deviation of the board's print (compute_print_effect()),
-  /// rms over the image, in px; std::nullopt if the board does not state it or the solve fails.
+  /// RMS over the image, px; std::nullopt if Board::print_sd is 0 or the solve fails.
   std::optional<double> print_px = {};
-  /// Lattice of the corners in `solution`. Covariance of the intrinsics, with the pull of the
-  /// regularization and the board's print; std::nullopt for a splined lens or if it is not finite.
+  /// Lattice of the corners in `solution`. Covariance of the intrinsics including the bias of the
+  /// regularization and the print of the board; std::nullopt for splined lenses and if not finite.
   std::optional<BoardLattice> lattice = {};
   std::optional<MatrixX> intrinsics_covariance = {};
 
-  /// Gamma of the camera's tone curve, 1 for none; the views with their corners behind it.
+  /// Gamma of the camera's tone curve, 1 for none; the views with corners corrected for it.
   double gamma = 1;
   std::vector<BoardView> views = {};
   /// Images of the views in the solve, in the order of IntrinsicsSolution.
@@ -74,15 +74,15 @@ struct LensEstimate {
   bool ok() const { return status == LensStatus::ok; }
 };
 
-/// Returns `warp`, or WarpChoice::off for a square chessboard: it looks the same after a quarter
-/// turn, so that the direction of its bend cannot be determined. Throws std::invalid_argument if
-/// the bend of such a board is requested.
+/// Returns `warp`, or WarpChoice::off for a square chessboard. Such a board looks the same after a
+/// quarter turn, so that the direction of its warp cannot be determined.
+/// @throws std::invalid_argument if the warp of such a board is requested
 WarpChoice possible_warp(const Board& board, WarpChoice warp);
 
-/// Estimates a lens from views of a board, in these stages: the tone curve of the camera
-/// (take_common_curve()), the layout of the board (check_board()), the lens model, the solve
-/// (solve_intrinsics()), the board again by the lens, the uncertainty (report_on()).
-/// Throws std::invalid_argument as BoardLattice does.
+/// Estimates a lens from views of a board in these stages: tone curve of the camera
+/// (take_common_curve()), layout of the board (check_board()), lens model, solve
+/// (solve_intrinsics()), board again with the lens, uncertainty (report_on()).
+/// @throws std::invalid_argument as BoardLattice
 LensEstimate estimate_lens(LensViews input);
 
 }  // namespace vlp

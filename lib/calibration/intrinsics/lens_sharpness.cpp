@@ -21,7 +21,8 @@ using Map = LensSharpness::Map;
 
 /// Minimum number of views of a part of the image, for a median and for a quartile between two.
 constexpr std::size_t kMinViews = 3, kMinViewsOfQuartile = 5;
-/// Fewest edges of a view from which the field of its light is fitted; of fewer, EdgeField is even.
+/// Minimum number of edges of a view for a fit of the field of its light; EdgeField is constant
+/// with fewer.
 constexpr std::size_t kMinEdgesOfField = 32;
 
 /// A value for each view in each part of the image.
@@ -151,8 +152,8 @@ double compute_asymmetry(const Map& mtf50, double mean, const std::array<int, 2>
   return 2 * (std::hypot(c[1], c[2]) + std::hypot(c[3], c[4]));
 }
 
-/// Returns the median over pairs of opposite parts of the mean of both, which a linear change over
-/// the image leaves equal to the value between them. NaN without a pair, as in a corner.
+/// Returns the median over pairs of opposite parts of the mean of the pair. A linear change over
+/// the image does not affect it. NaN without a pair, as in a corner.
 double expect_from_neighbours(const Map& map, int col, int row) {
   const int reach = map.cols / 6;  // a sixth of the image is larger than a speck
   const auto value = [&](int c, int r) {
@@ -170,7 +171,8 @@ double expect_from_neighbours(const Map& map, int col, int row) {
   return means.empty() ? LensSharpness::kUnknown : upper_median(std::move(means));
 }
 
-/// Largest loss of a part of a map against the parts around it; NaN if no part can be compared.
+/// Largest loss of a part of a map relative to the surrounding parts; NaN if no part can be
+/// compared.
 struct LocalLoss {
   double fraction = LensSharpness::kUnknown;
   Eigen::Vector2d at_px = Eigen::Vector2d::Zero();
@@ -188,7 +190,7 @@ LocalLoss find_local_loss(const Map& map, const std::array<int, 2>& imager_px) {
   return largest;
 }
 
-/// Michelson contrast (white - black) / (white + black).
+/// Computes the Michelson contrast (white - black) / (white + black).
 Map compute_contrasts(Map black_to_white) {
   for (double& ratio : black_to_white.values) ratio = (1 - ratio) / (1 + ratio);
   return black_to_white;

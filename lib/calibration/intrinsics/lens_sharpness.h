@@ -23,16 +23,16 @@ double mtf50_from_blur(double sigma_px);
 /// Returns the median MTF50 of the edges of a view; std::nullopt if no edge has a known blur.
 std::optional<double> mtf50_of_view(const SeenBoard& seen);
 
-/// Sharpness and contrast of lens and pixel together over the image, from the steps of the light
-/// across the edges of tags (slanted edges as in ISO 12233). The line spread is that of a Gaussian
-/// with an excess kurtosis.
+/// Sharpness and contrast of lens and pixel together over the image, from the light profiles across
+/// tag edges (slanted edges as in ISO 12233). The line spread is a Gaussian with an excess
+/// kurtosis.
 ///
-/// Each part of the image has the lower quartile of the blurs of the views there, so that a shaken
-/// image or one out of focus does not count as a bad lens.
+/// Each part of the image has the lower quartile of the blurs of the views there. A shaken or
+/// defocused image does therefore not count as a bad lens.
 struct LensSharpness {
   static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
-  /// Figures of equal parts of the image, row by row from the top left; NaN where unknown.
+  /// Values of equal parts of the image, row by row from the top left; NaN if unknown.
   struct Map {
     int cols, rows;
     std::vector<double> values =
@@ -42,34 +42,35 @@ struct LensSharpness {
       return values[std::size_t(row) * std::size_t(cols) + std::size_t(col)];
     }
   };
-  /// MTF50 in cycles per pixel; light of black over light of white.
+  /// MTF50, cycles per pixel; light of black divided by light of white.
   Map mtf50{12, 9}, black_to_white{12, 9};
-  /// Light of white relative to a smooth field over each view, in smaller parts: specks of dust are
-  /// small.
+  /// Light of white relative to a smooth field over each view, in smaller parts, because specks of
+  /// dust are small.
   Map light{24, 18};
 
   double mean_mtf50 = kUnknown;
-  /// Least MTF50 of a part over the mean.
+  /// Smallest MTF50 of a part divided by the mean.
   double worst_ratio = kUnknown;
-  /// Upper bound of the difference of the MTF50 between directions from the image's middle, over
-  /// the mean: 2 (|c1| + |c2|) of the terms c1 cos(t - t1) + c2 cos(2 (t - t2)) around the middle.
-  /// A lens in place is as sharp in all directions. A tilted or decentred one is sharper on one
-  /// side, or along one axis.
+  /// Upper bound of the difference of the MTF50 between directions from the middle of the image,
+  /// divided by the mean: 2 (|c1| + |c2|) of the terms c1 cos(t - t1) + c2 cos(2 (t - t2)) around
+  /// the middle. A centered lens is equally sharp in all directions. A tilted or decentered one is
+  /// sharper on one side, or along one axis.
   double asymmetry = kUnknown;
-  /// Median of black_to_white. A veil raises it.
+  /// Median of black_to_white. Veiling glare raises it.
   double black_level = kUnknown;
-  /// Largest fraction by which MTF50 or contrast of a part is below that of the parts around it.
+  /// Largest fraction by which MTF50 or contrast of a part is below that of the surrounding parts.
   /// A smear raises it.
   double local_loss = kUnknown;
-  /// Largest fraction by which the light of a part is below that of the parts around it, and the
-  /// middle of this part. Dust raises it. Unknown if no parts of `light` can be compared.
+  /// Largest fraction by which the light of a part is below that of the surrounding parts, and the
+  /// middle of this part. Dust raises it. NaN if no parts of `light` can be compared.
   double local_shadow = kUnknown;
   Eigen::Vector2d local_shadow_px = Eigen::Vector2d::Zero();
 };
 
-/// Measures sharpness and contrast from views of a board of AprilTags, with corners behind the
-/// tone curve (take_common_curve()). Returns std::nullopt if fewer than half of the parts of the
-/// image are known, each from five views, as for boards with corner squares and of squares only.
+/// Measures sharpness and contrast from views of a board of AprilTags, with corners corrected for
+/// the tone curve (take_common_curve()). Returns std::nullopt if fewer than half of the parts of
+/// the image are known, from at least five views each. This is always so for boards with corner
+/// squares and for boards of squares.
 std::optional<LensSharpness> measure_sharpness(std::span<const BoardView> views,
                                                const std::array<int, 2>& imager_px);
 

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-// The only file that knows mrcal. Its headers lack extern "C" before version 2.4; what they include
-// in turn must come before it.
+// The only file that includes headers of mrcal. They lack extern "C" before version 2.4, so that
+// the headers that they include must come first.
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -31,9 +31,9 @@ static_assert(sizeof(BoardPose) == sizeof(mrcal_pose_t));
 static_assert(sizeof(Eigen::Vector3d) == sizeof(mrcal_point3_t));
 static_assert(sizeof(Eigen::Vector2d) == sizeof(mrcal_calobject_warp_t));
 
-/// mrcal's arguments for a problem.
+/// Arguments of mrcal for a problem.
 struct Arguments {
-  /// held: the rays that are, as points that do not move.
+  /// `fixed_rays`: rays of the problem, as points that do not move.
   Arguments(const BoardProblem& problem, const SolveFor& what,
             std::span<const BoardProblem::Held> held = {})
       : frames(static_cast<int>(problem.poses.size())), fixed(static_cast<int>(held.size())) {
@@ -75,7 +75,7 @@ struct Arguments {
 
 int bytes(Eigen::Index doubles) { return static_cast<int>(doubles) * int(sizeof(double)); }
 
-/// With weights for which the corners' noise is a pixel.
+/// Returns the points with weights for which the noise of the corners is one pixel.
 std::vector<Eigen::Vector3d> weighted_points(const BoardProblem& problem) {
   auto points = problem.points;
   for (Eigen::Vector3d& point : points) {
@@ -84,7 +84,7 @@ std::vector<Eigen::Vector3d> weighted_points(const BoardProblem& problem) {
   return points;
 }
 
-/// mrcal 2.4 has one argument more.
+/// Calls an unpack function of mrcal, which has one more argument since version 2.4.
 template <typename Unpack>
 void unpack(Unpack* function, double* state, const Arguments& the) {
   if constexpr (std::is_invocable_v<Unpack*, double*, int, int, int, int, int, int,
@@ -95,16 +95,18 @@ void unpack(Unpack* function, double* state, const Arguments& the) {
   }
 }
 
-/// mrcal reports outliers on stderr, asked or not; a library should not. It works in a thread that
-/// has open files of its own, among them nothing for stderr: without the process's, what other
-/// threads say meanwhile would be lost. Where the system does not grant that, or no thread, mrcal
-/// is heard. One at a time: mrcal does not say that more may be.
+/// Runs `work` without the messages of mrcal on stderr, where it always reports outliers.
+///
+/// The work runs in a thread with its own table of open files, in which stderr is /dev/null.
+/// Redirecting stderr of the process would discard messages of other threads. If the system does
+/// not grant that, or no thread, the messages of mrcal appear. Calls are sequential, because mrcal
+/// does not document concurrent use.
 template <typename Work>
 void in_silence(const Work& work) {
   static std::mutex only_one;
   const std::lock_guard alone(only_one);
   const auto silent_work = [&] {
-    // Those that are not for mrcal are closed, lest what others close stays open here.
+    // Closes the other files, so that files which other threads close do not stay open here.
     constexpr unsigned first = STDERR_FILENO + 1, last = std::numeric_limits<unsigned>::max();
     if (::close_range(first, last, CLOSE_RANGE_UNSHARE) == 0) {
       const int nowhere = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
@@ -178,7 +180,7 @@ Linearization linearized_by_mrcal(const BoardProblem& problem, const SolveFor& w
         the.selections, &the.constants, problem.spacing_m, problem.cols, problem.rows, false);
   });
   if (!done) throw std::runtime_error("mrcal_optimizer_callback failed");
-  // In pixels again, all of it.
+  // Scales everything back to pixels.
   residuals *= problem.noise_px;
   for (double& value : values) value *= problem.noise_px;
   const int of_boards = mrcal_num_measurements_boards(the.frames, problem.cols, problem.rows);

@@ -23,7 +23,7 @@ namespace {
 
 constexpr std::size_t kMostBytes = std::size_t{1} << 30;
 
-/// A row of the file; nothing was seen where there is no pixel.
+/// Row of the file; without a pixel, the corner was not seen.
 struct CornerRow {
   std::size_t line;
   std::string_view image;
@@ -42,7 +42,7 @@ std::vector<std::string_view> words_in(std::string_view line) {
   return words;
 }
 
-/// Reads the rows of the one file.
+/// Reads the rows of a file.
 class CornerRows {
  public:
   CornerRows(const std::filesystem::path& file, const std::array<int, 2>& imager_px)
@@ -90,7 +90,7 @@ class CornerRows {
     rows.push_back(row);
   }
 
-  /// Nothing for "-".
+  /// Parses a number; std::nullopt for "-".
   std::optional<double> number(std::size_t line, std::string_view word) const {
     if (word == "-") return {};
     double value = 0;
@@ -101,7 +101,7 @@ class CornerRows {
     return value;
   }
 
-  /// 0 where nothing was seen.
+  /// Returns the weight of a corner; 0 if it was not seen.
   double weight_of(std::size_t line, std::optional<double> fourth) const {
     constexpr double most_level = 30, most_weight = 1000;
     if (!fourth || *fourth < 0) return 0;
@@ -122,7 +122,7 @@ class CornerRows {
   std::optional<InputError> first_outside_;
 };
 
-/// How a board's lattice is counted, for messages.
+/// Describes the numbers of corners of a board, for messages.
 std::string counted(const Board& board, const BoardLattice& lattice) {
   return fmt::format("a board of {} x {} {} has {} x {} corners", board.cols, board.rows,
                      board.has_squares() ? "squares" : "tags", lattice.cols(), lattice.rows());
@@ -142,8 +142,9 @@ std::string wrong_count(const Board& board, const BoardLattice& lattice, std::si
   return words;
 }
 
-/// Part of a board that an image of mrcal's table stands for, and the name of the image itself. An
-/// image of a board of four parts stands four times, with -corner0 to -corner3 added to its name.
+/// Part of a board that an image of the table stands for, and the name of the image itself. An
+/// image of a board of four parts occurs four times, with -corner0 to -corner3 appended to its
+/// name.
 struct PartOfImage {
   std::string image;
   std::size_t part;
@@ -165,7 +166,7 @@ PartOfImage parse_part(const BoardLattice& lattice, const CornerRows& table, std
   return found;
 }
 
-/// Throws InputError if the corners lie in rows of another length than the board's.
+/// Throws InputError if the corners lie in rows of another length than that of the board.
 void check_row_length(const Board& board, const BoardLattice& lattice, const CornerRows& table,
                       const std::vector<LatticePixels>& images, std::size_t first_line) {
   const auto stated = static_cast<std::size_t>(lattice.cols());

@@ -20,7 +20,7 @@ namespace {
 
 constexpr int kDigits = 17;
 
-/// All that mrcal.optimize() takes, at the solution.
+/// Formats all arguments of mrcal.optimize(), at the solution.
 std::string optimization_inputs(const IntrinsicsSolution& solution) {
   const BoardProblem& problem = solution.problem;
   const std::size_t boards = problem.poses.size();
@@ -87,7 +87,7 @@ void write_cameramodel(const std::filesystem::path& file, const IntrinsicsSoluti
 
 namespace {
 
-/// Words of the table, a view each.
+/// Returns unique names of the views in the table.
 std::vector<std::string> names_in_table(const IntrinsicsSolution& solution,
                                         std::span<const std::string> images) {
   std::vector<std::string> names;
@@ -109,7 +109,7 @@ void write_corners(const std::filesystem::path& file, const IntrinsicsSolution& 
   const BoardProblem& problem = solution.problem;
   const std::size_t parts = problem.poses.size() / solution.views.size();
   const std::size_t count = problem.points_of_a_board();
-  // mrcal cuts levels off to whole ones from 0 on; it takes weights as well, when it is told to.
+  // mrcal truncates levels to integers from 0 on; an option makes it read weights instead.
   const bool weights = std::ranges::any_of(problem.points, [](const Eigen::Vector3d& point) {
     const double level = -std::log2(point.z());
     return point.z() > 0 && (level < 0 || level != std::floor(level));

@@ -14,35 +14,43 @@
 
 namespace vlp {
 
-/// Writes mrcal's .cameramodel: the lens with 17 digits, where it is known
-/// (valid_intrinsics_region, known_region()), and all of the solved problem
-/// (optimization_inputs), on which mrcal's own tools work, such as
-/// mrcal-show-projection-uncertainty and mrcal-show-residuals. The former is of corners that err by
-/// themselves, and of a board of tags shows less than IntrinsicsReport::uncertainty_px, which is by
-/// tags (ProjectionUncertainty). Throws InputError. Precondition, here and below: mrcal has the
-/// lens model, has_mrcal().
+/// Writes mrcal's .cameramodel: the lens with 17 digits, its calibrated region
+/// (valid_intrinsics_region, known_region()), and the solved problem (optimization_inputs).
+///
+/// mrcal's tools use the problem, such as mrcal-show-projection-uncertainty and
+/// mrcal-show-residuals. The former assumes independent errors of the corners. For a board of tags
+/// it shows less than IntrinsicsReport::uncertainty_px, which is by tags (ProjectionUncertainty).
+/// @throws InputError
+/// @pre has_mrcal() of the lens model, also for write_corners()
 void write_cameramodel(const std::filesystem::path& file, const IntrinsicsSolution& solution);
 
-/// Writes the corners that were solved for as mrcal-calibrate-cameras reads them (--corners-cache):
-/// filename x y level, with level -log2(weight), or, of weights that no whole levels have, filename
-/// x y weight (--corners-cache-has-weights), row by row of the lattice, "-" for a corner not seen
-/// or left out. Of a board in four parts each image stands four times, as NAME-corner0 to
-/// NAME-corner3. images: the names of the input's views; where folders have images of one name, the
-/// second is NAME-2, because the table knows views by their names. Throws InputError.
+/// Writes the corners of a solution in the format of mrcal-calibrate-cameras (--corners-cache), row
+/// by row of the lattice. A corner that was not seen, or is an outlier, has the level "-".
+///
+/// The columns are `filename x y level` with level = -log2(weight). If weights do not correspond to
+/// whole levels from 0 on, they are `filename x y weight` (--corners-cache-has-weights). An image
+/// of a board in four parts occurs four times, as NAME-corner0 to NAME-corner3.
+///
+/// @param images  names of the views of the input. The table identifies views by name: a second
+///     image of the same name becomes NAME-2.
+/// @throws InputError
 void write_corners(const std::filesystem::path& file, const IntrinsicsSolution& solution,
                    std::span<const std::string> images);
 
-/// Corners of a board as mrcal's tools keep them (--corners-cache; of mrgingham, or what
-/// write_corners() wrote): `filename x y level`, every point of the board's lattice, row by row,
-/// image after image. The residual of a point is weighted by 2^-level, the level rounded down and
-/// 30 at most, or by a fourth column named `weight`, 1000 at most; without a fourth column by 1. A
-/// point with "-" or a negative x, y, level or weight was not seen; a single row with "-" is an
-/// image without the board. Throws InputError, with file and line.
+/// Reads the corners of a board in the format of mrcal's tools (--corners-cache), from mrgingham or
+/// write_corners(): `filename x y level`, every point of the lattice of the board, row by row,
+/// image after image.
+///
+/// The residual of a point is weighted by 2^-level, with the level rounded down and at most 30. A
+/// fourth column named `weight` gives the weight itself, at most 1000. Without a fourth column the
+/// weight is 1. A point with "-" or a negative x, y, level or weight was not seen. A single row
+/// with "-" is an image without the board.
+/// @throws InputError with file and line
 std::vector<BoardView> read_corners(const std::filesystem::path& file, const Board& board,
                                     const std::array<int, 2>& imager_px);
 
-/// The version of mrcal that the toolbox was built with, as Debian's package tells it; "unknown"
-/// where there is no package.
+/// Returns the version of mrcal that the toolbox was built with, from Debian's package; "unknown"
+/// without a package.
 std::string mrcal_version();
 
 }  // namespace vlp

@@ -11,22 +11,23 @@
 
 namespace vlp {
 
-/// A .npz file in the making: NumPy's arrays in a ZIP archive, not compressed (NumPy documentation,
-/// "numpy.lib.format", version 1.0; PKWARE's APPNOTE, 4.3). For little-endian machines. The same
-/// arrays give the same bytes.
+/// Writer of an .npz file: NumPy arrays in an uncompressed ZIP archive (NumPy documentation,
+/// "numpy.lib.format", version 1.0; PKWARE's APPNOTE, 4.3). Requires a little-endian machine. The
+/// same arrays give the same bytes.
 class NumpyArchive {
  public:
   using Shape = std::vector<std::size_t>;
 
-  /// Values in C order; their number is the product of `shape`, which is {} for one value.
+  /// Adds an array. Values are in C order; their number is the product of `shape`, which is {} for
+  /// a scalar.
   void add(std::string_view name, const Shape& shape, std::span<const double> values);
   void add(std::string_view name, const Shape& shape, std::span<const std::int32_t> values);
   void add(std::string_view name, double value) { add(name, {}, std::span(&value, 1)); }
   void add(std::string_view name, bool value);
-  /// ASCII.
+  /// Adds an ASCII string.
   void add(std::string_view name, std::string_view text);
 
-  /// The whole archive.
+  /// Returns the complete archive.
   std::string bytes() const;
 
  private:
@@ -38,7 +39,7 @@ class NumpyArchive {
   std::uint16_t count_ = 0;
 };
 
-/// As Python's base64.b85encode() has it.
+/// Encodes bytes as Python's base64.b85encode() does.
 std::string base85(std::string_view bytes);
 
 }  // namespace vlp

@@ -14,7 +14,7 @@
 namespace vlp {
 namespace {
 
-/// A few of the views, evenly chosen, tell how good a focal length is.
+/// Returns at most 12 evenly spaced views, which suffice to rank focal lengths.
 IntrinsicsInput some_of(const IntrinsicsInput& input) {
   constexpr std::size_t enough = 12;
   IntrinsicsInput some = input;
@@ -46,7 +46,7 @@ Lens stereographic(const IntrinsicsInput& input, double focal_px) {
 std::vector<double> focal_lengths(const IntrinsicsInput& input) {
   const IntrinsicsInput some = some_of(input);
   std::vector<std::pair<double, double>> tried;
-  constexpr int least = -5, most = 6;  // of the image's width: 0.18 to 8
+  constexpr int least = -5, most = 6;  // relative to the width of the image: 0.18 to 8
   for (int half_octaves = least; half_octaves <= most; ++half_octaves) {
     const double focal_px = input.imager_px[0] * std::exp2(half_octaves / 2.0);
     tried.emplace_back(upper_median(poses_through(some, stereographic(input, focal_px)).rms_px),

@@ -8,18 +8,20 @@
 
 namespace vlp {
 
-/// The poses of every view through one lens.
+/// Initial poses of all views, estimated with one lens.
 struct PoseSeeds {
   std::vector<BoardPose> poses;
-  /// Infinite where there is no pose.
+  /// RMS residual of each view, px; infinity if it has no pose.
   std::vector<double> rms_px;
 };
+/// Estimates the poses of all views with a lens.
 PoseSeeds poses_through(const IntrinsicsInput& input, const Lens& lens);
 
-/// LENSMODEL_STEREOGRAPHIC with its centre in the middle of the image.
+/// Returns LENSMODEL_STEREOGRAPHIC with its principal point in the middle of the image.
 Lens stereographic(const IntrinsicsInput& input, double focal_px);
 
-/// Focal lengths from a geometric series, best first: by the median of what their poses leave over.
+/// Returns focal lengths of a geometric series, px, in ascending order of the median RMS residual
+/// of the poses with them.
 std::vector<double> focal_lengths(const IntrinsicsInput& input);
 
 }  // namespace vlp

@@ -16,7 +16,7 @@ struct Pair {
   double weight;
 };
 
-/// The rotation that takes a to b with the least weighted squares (Kabsch, 1976).
+/// Fits the rotation of a to b by weighted least squares (Kabsch, 1976).
 Eigen::Matrix3d b_from_a(const std::vector<Pair>& pairs) {
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
   for (const Pair& pair : pairs) sum += pair.weight * pair.b * pair.a.transpose();

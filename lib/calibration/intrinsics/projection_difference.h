@@ -13,25 +13,31 @@
 
 namespace vlp {
 
-/// Pixels all over an image, its edges among them, so many from left to right and about as far
-/// apart from top to bottom.
+/// Returns a grid of pixels over the image including its edges: `cols` columns, and rows about
+/// equally far apart.
 std::vector<Eigen::Vector2d> pixel_grid(const std::array<int, 2>& imager_px, int cols = 41);
 
-/// The rotation that takes the rays of `a` at the pixels to those of `b` with the least squares,
-/// where both have one; nothing for fewer than three.
+/// Fits the rotation of the rays of `a` at the pixels to those of `b`, by least squares over the
+/// pixels at which both have a ray; std::nullopt for fewer than three.
 std::optional<Eigen::Matrix3d> b_from_a(const Lens& a, const Lens& b,
                                         std::span<const Eigen::Vector2d> pixels);
 
+/// Difference of two lenses over the image.
 struct ProjectionDifference {
+  /// Mean and maximum distance between the projections, px.
   double mean_px, worst_px;
-  /// Standard deviation about 0, per axis and place: the root of the mean square over sqrt(2).
+  /// RMS per axis, px: root of the mean squared distance divided by sqrt(2).
   double rms_px;
 };
 
-/// How far two lenses put a direction apart, over the image: every pixel of the grid is unprojected
-/// by `a` and projected by `b`, turned by the rotation that fits the rays best, because what a lens
-/// calls straight ahead is its own affair (mrcal, "Projection differences"). sigma_px: how well the
-/// place is known, for the weights of that fit. Nothing when the lenses share no place.
+/// Compares the projections of two lenses over the image. Every pixel of pixel_grid() is
+/// unprojected by `a`, rotated by the best-fitting rotation of the rays and projected by `b`. The
+/// rotation is removed because the frame of a lens is a convention (mrcal, "Projection
+/// differences").
+///
+/// @param sigma_px  standard deviation at a pixel, for the weights of the rotation; pixels with an
+///     infinite one are skipped
+/// @return std::nullopt if the lenses have fewer than three such pixels in common
 std::optional<ProjectionDifference> projection_difference(
     const Lens& a, const Lens& b, const std::array<int, 2>& imager_px,
     const std::function<double(const Eigen::Vector2d&)>& sigma_px);

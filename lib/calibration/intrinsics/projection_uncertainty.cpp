@@ -26,8 +26,8 @@ double standard_deviation(const BoardProblem& problem, const Eigen::VectorXd& re
   return std::sqrt(squares / count - (sum / count) * (sum / count));
 }
 
-/// What the residuals of each tag do together: a row for each tag of each view, from a row for each
-/// residual.
+/// Sums the rows over the residuals of each tag, weighted by the residuals: a row for each tag of
+/// each view, from a row for each residual.
 Eigen::MatrixXd by_tags(const Eigen::MatrixXd& by_residual, const Eigen::VectorXd& residuals_px,
                         const BoardLattice& lattice) {
   const std::size_t points = lattice.points(), of_view = lattice.parts() * points;
@@ -44,15 +44,15 @@ Eigen::MatrixXd by_tags(const Eigen::MatrixXd& by_residual, const Eigen::VectorX
   return sums;
 }
 
-/// n / (n - k) of ProjectionUncertainty.
+/// Returns the factor n / (n - k) of ProjectionUncertainty.
 double for_what_was_fitted(const BoardProblem& problem, Eigen::Index states) {
   const double count = 2 * static_cast<double>(seen_px(problem).size());
   return count / std::max(count - static_cast<double>(states), 1.0);
 }
 
-/// Of the whole state, packed.
+/// Computes the regularization bias of the whole packed state.
 Eigen::VectorXd pull_of(const Linearization& at, double sigma_px, double regularized_for_px) {
-  constexpr double least_px = 0.01;  // coefficients that the corners leave open have no end
+  constexpr double least_px = 0.01;  // bounds coefficients that the corners do not determine
   const Eigen::Index corners = at.residuals_px.size(), pulls = at.regularization.size();
   if (pulls == 0) return Eigen::VectorXd::Zero(at.jacobian_transposed.rows());
   const Eigen::SparseMatrix<double> by_corners = at.jacobian_transposed.leftCols(corners);

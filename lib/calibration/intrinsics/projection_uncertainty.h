@@ -8,52 +8,63 @@
 
 namespace vlp {
 
-/// How far the noise of the corners moves the projection of a point at infinity, as mrcal reports
-/// it ("Projection uncertainty" in its documentation): the state's covariance is
+/// Uncertainty of the projection of a point at infinity from the noise of the corners, as mrcal
+/// reports it ("Projection uncertainty" in its documentation). The covariance of the state is
 ///   s^2 N^-1 (Jo' Jo) N^-1,  N = J' J,
-/// with J the Jacobian at the solution, Jo its rows of the corners (without those of the
-/// regularization, Jr) and s the standard deviation of the residuals. A pixel depends on the
-/// intrinsics and, because the camera's own orientation is what the boards make it, on the mean
-/// over all boards of the changes of their rotations.
+/// with
+///   J   Jacobian at the solution
+///   Jo  its rows of the corners, without those of the regularization, Jr
+///   s   standard deviation of the residuals
+/// A pixel depends on the intrinsics and on the mean, over all boards, of the changes of their
+/// rotations: the boards define the orientation of the camera.
 ///
-/// That takes the errors of all corners for independent. The corners of a tag share its edges, and
-/// so their errors: each edge's fit moves both of its ends. With the lattice of the board it is,
-/// instead,
+/// This assumes independent errors of all corners. The corners of a tag share its edges and
+/// therefore have correlated errors: the fit of an edge moves both of its ends. With the lattice of
+/// the board, the covariance is instead
 ///   c N^-1 (sum over tags (Jt' rt) (Jt' rt)') N^-1,  c = n / (n - k),
-/// with Jt and rt the rows and residuals of a tag in a view, n their number and k that of the
-/// states (Liang and Zeger, "Longitudinal data analysis using generalized linear models", 1986:
-/// errors may be anything within a tag, and of any size). Of a board of squares each corner is by
-/// itself.
+/// with
+///   Jt, rt  rows and residuals of a tag in a view
+///   n, k    number of residuals, number of states
+/// (Liang and Zeger, "Longitudinal data analysis using generalized linear models", 1986). Errors
+/// within a tag may then have any correlation and size. On a board of squares each corner is its
+/// own group.
 class ProjectionUncertainty {
  public:
-  /// As mrcal. Precondition: solution.ok().
+  /// Assumes independent corners, as mrcal.
+  /// @pre solution.ok()
   explicit ProjectionUncertainty(const IntrinsicsSolution& solution);
-  /// By the board's tags. Preconditions: solution.ok(), and it is of boards of that lattice.
+  /// Allows for correlated errors within tags.
+  /// @pre solution.ok(), with boards of that lattice
   ProjectionUncertainty(const IntrinsicsSolution& solution, const BoardLattice& lattice);
 
-  /// False when the views leave something open.
+  /// Returns false if the views do not determine all parameters.
   bool determined() const { return determined_; }
 
-  /// Of the projection of the ray seen at `pixel`, in px^2. Infinite where the lens sees no ray, or
-  /// when nothing is determined.
+  /// Returns the covariance of the projection of the ray at `pixel`, px^2. Infinite if the lens has
+  /// no ray there, or if the views do not determine all parameters.
   Eigen::Matrix2d covariance(const Eigen::Vector2d& pixel) const;
 
-  /// Standard deviation in the direction in which it is largest.
+  /// Returns the standard deviation in the direction in which it is largest, px.
   double worst_px(const Eigen::Vector2d& pixel) const;
 
-  /// Of the intrinsics alone; of a splined lens with zeros for its core, which no solve moves.
+  /// Returns the covariance of the intrinsics; 0 for the core of splined lenses, which is not
+  /// estimated.
   Eigen::MatrixXd intrinsics_covariance() const;
 
-  /// How much further the intrinsics would be, to first order, from where mrcal's regularization
-  /// draws them (coefficients to zero, the principal point to the imager's middle), were it made
-  /// for the noise s of these corners instead of BoardProblem::noise_px, a pixel here. With its
-  /// residuals r
+  /// Returns the bias of the intrinsics by mrcal's regularization, to first order.
+  ///
+  /// The regularization pulls coefficients to zero and the principal point to the middle of the
+  /// imager. The bias is the change of the intrinsics if the regularization were scaled to the
+  /// noise s of these corners instead of BoardProblem::noise_px, here 1 px. With the residuals r of
+  /// the regularization it is
   ///   (Jo' Jo + s^2 Jr' Jr)^-1 (1 - s^2) Jr' r,  s at least 0.01 and at most 1.
-  /// Zero where there is none. A standard deviation of the intrinsics that no noise explains.
+  /// 0 without regularization. Use it as a standard deviation of the intrinsics in addition to that
+  /// from noise.
   const Eigen::VectorXd& intrinsics_pull() const { return intrinsics_pull_; }
 
-  /// Of the focal length along x. Infinite when nothing is determined, and of a splined lens, whose
-  /// control points make up for it.
+  /// Returns the standard deviation of the focal length along x, px. Infinite if the views do not
+  /// determine all parameters, and for splined lenses, whose control points compensate the focal
+  /// length.
   double focal_sd_px() const;
 
  private:
@@ -61,7 +72,7 @@ class ProjectionUncertainty {
 
   Lens lens_;
   bool determined_;
-  /// Of the intrinsics and of the mean rotation, in rad, in the camera.
+  /// Covariance of the intrinsics and of the mean rotation, rad, in the camera frame.
   Eigen::MatrixXd covariance_;
   Eigen::VectorXd intrinsics_pull_;
 };

@@ -8,21 +8,22 @@
 
 namespace vlp {
 
-/// v x w = cross_matrix(v) w.
+/// Returns the cross-product matrix: v x w = cross_matrix(v) w.
 inline Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v) {
   Eigen::Matrix3d matrix;
   matrix << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
   return matrix;
 }
 
-/// The rotation about r by its length, exp(r).
+/// Returns exp(r), the rotation about r by the angle |r|, rad.
 inline Eigen::Matrix3d rotation_by(const Eigen::Vector3d& r) {
   const double angle = r.norm();
   if (!(angle > 0)) return Eigen::Matrix3d::Identity();
   return Eigen::AngleAxisd(angle, r / angle).toRotationMatrix();
 }
 
-/// exp(r + dr) = exp(J dr) exp(r), to first order in dr: the left Jacobian of the rotations.
+/// Returns the left Jacobian J of the rotations: exp(r + dr) = exp(J dr) exp(r), to first order in
+/// dr.
 inline Eigen::Matrix3d left_jacobian(const Eigen::Vector3d& r) {
   const double angle = r.norm();
   constexpr double tiny = 1e-6;

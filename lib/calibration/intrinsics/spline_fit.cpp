@@ -18,7 +18,7 @@ namespace {
 
 using Entries = std::vector<Eigen::Triplet<double>>;
 
-/// Two directions of the plane have the same equations.
+/// Equations of the control points, the same for both directions of the plane.
 struct Equations {
   Entries entries;
   std::vector<Eigen::RowVector2d> right;
@@ -26,9 +26,9 @@ struct Equations {
   int next() const { return static_cast<int>(right.size()); }
 };
 
-/// Second differences of the control points, along columns and rows: small.
+/// Adds equations for small second differences of the control points, along columns and rows.
 void keep_straight(Equations& equations, const SplineGrid& grid) {
-  constexpr double weight = 3e-4;  // which leaves 1e-5 px
+  constexpr double weight = 3e-4;  // small: changes the fit by 1e-5 px
   const auto add = [&](int first, int apart) {
     const int row = equations.next();
     equations.entries.emplace_back(row, first, weight);
@@ -45,7 +45,8 @@ void keep_straight(Equations& equations, const SplineGrid& grid) {
   }
 }
 
-/// Whether a surface without second differences is determined by its values at these places.
+/// Returns true if a surface without second differences is determined by its values at these
+/// points.
 bool determine_what_is_straight(const std::vector<Eigen::Vector2d>& places) {
   constexpr Eigen::Index unknowns = 4;
   if (std::ssize(places) < unknowns) return false;
@@ -150,7 +151,7 @@ std::string why_too_coarse(const Lens& lens, const std::array<int, 2>& imager_px
 }
 
 SplineGrid reaching(const SplineGrid& grid, const Eigen::Vector2d& u) {
-  constexpr double rounding = 1e-9;  // what is wide enough stays as it is
+  constexpr double rounding = 1e-9;  // keeps a grid that is wide enough
   const auto whole_between = [](double least, double value, double most) {
     return static_cast<int>(std::clamp(std::ceil(value - rounding), least, most));
   };

@@ -13,29 +13,34 @@
 
 namespace vlp {
 
-/// The parameters of a splined lens that puts rays where `lens` puts them turned into its frame, by
-/// least squares over the rays of all the grid's pieces that `lens` has in the image or near it.
-/// The core is given, which control points make up for; those that no ray tells of go on straight.
-/// Nothing when the rays are too few for that (a, b, c, d of a + b ux + c uy + d ux uy): the pieces
-/// are about as large as the image, or beside it. Preconditions: is_splined(model), and the core is
-/// fx, fy, cx, cy.
+/// Fits the parameters of a splined lens to another lens, rotated into its frame. Least squares
+/// over rays of all pieces of the grid that `lens` projects into the image or close to it.
+///
+/// The core is given; the control points compensate it. Control points without rays continue the
+/// others with small second differences.
+///
+/// @param lens_from_splined  rotation from the frame of the splined lens to that of `lens`
+/// @return std::nullopt if the rays do not determine a + b ux + c uy + d ux uy: the pieces are
+///     about as large as the image, or outside it
+/// @pre is_splined(model); the core is fx, fy, cx, cy
 std::optional<std::vector<double>> splined_like(
     const Lens& lens, const std::array<int, 2>& imager_px, LensModel model,
     const std::vector<double>& core,
     const Eigen::Matrix3d& lens_from_splined = Eigen::Matrix3d::Identity());
 
-/// One line, when splined_like() gives nothing: how far off its axis the lens sees, and a model
-/// with which it gives something, when there is one.
+/// Describes in one line why splined_like() fails: the field of view of the lens, and a splined
+/// model with which it succeeds, if there is one.
 std::string why_too_coarse(const Lens& lens, const std::array<int, 2>& imager_px, LensModel model,
                            const std::vector<double>& core);
 
-/// A grid of the same order and control points along x that goes so far off the axis along x and y,
-/// in the stereographic plane, its bounds permitting.
+/// Returns a grid that extends to `u` off the axis along x and y, in the stereographic plane,
+/// within the bounds of grids. Its order and number of control points along x are those of `grid`.
 SplineGrid reaching(const SplineGrid& grid, const Eigen::Vector2d& u);
 
-/// The core with which control points have least to make up for, by least squares over the pixels,
-/// when a lens and a splined one share the camera's frame: the lens' centre, and the focal lengths
-/// of the stereographic lens around it. Precondition: the lens has rays at some of the pixels.
+/// Computes the core of a splined lens in the frame of a lens that minimizes the control points, by
+/// least squares over the pixels. The core has the center of the lens, and the focal lengths of the
+/// stereographic lens around it.
+/// @pre the lens has rays at some of the pixels
 std::vector<double> core_like(const Lens& lens, std::span<const Eigen::Vector2d> pixels);
 
 }  // namespace vlp

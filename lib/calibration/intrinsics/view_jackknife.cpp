@@ -9,8 +9,8 @@
 namespace vlp {
 namespace {
 
-/// Normal equations of some rows in what all views share, intrinsics and warp, the poses of the
-/// view solved for.
+/// Normal equations of some rows in the parameters common to all views, intrinsics and warp, with
+/// the poses of the view eliminated.
 struct Share {
   Eigen::MatrixXd normal;
   Eigen::VectorXd gradient;
@@ -22,7 +22,8 @@ struct Layout {
   Eigen::Index shared() const { return intrinsics + states - warp; }
 };
 
-/// Of `count` columns of the transposed Jacobian, of the boards from `pose` on.
+/// Computes the equations of `count` columns of the transposed Jacobian, with the boards from
+/// `pose` on.
 Share share_of(const Linearization& at, const Layout& layout, Eigen::Index first,
                Eigen::Index count, Eigen::Index pose, Eigen::Index boards) {
   const Eigen::Index shared = layout.shared(), own = 6 * boards;

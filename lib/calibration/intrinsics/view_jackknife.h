@@ -8,15 +8,17 @@
 
 namespace vlp {
 
-/// Covariance of the intrinsics by how much they change when each view in turn is left out
-/// (Efron, "The Jackknife, the Bootstrap and Other Resampling Plans", 1982):
+/// Estimates the covariance of the intrinsics by leaving out one view at a time (Efron, "The
+/// Jackknife, the Bootstrap and Other Resampling Plans", 1982):
 ///   (n - 1) / n sum over views (d_v - mean d) (d_v - mean d)',
-/// with d_v the change to first order, poses and warp along. ProjectionUncertainty takes the errors
-/// of different tags for independent, or those of all corners; this one only those of different
-/// views, so that what a view's corners have in common counts: a board that bends otherwise, a
-/// rolling shutter, a lens model that does not fit. With few views it is rough, by
-/// 1 / sqrt(2 (n - 1)), and often too large. Infinite when the rest does not determine a lens.
-/// Precondition: solution.ok().
+/// with d_v the change of the intrinsics to first order; poses and warp change with them.
+///
+/// ProjectionUncertainty assumes independent errors of tags or of corners. This estimate assumes
+/// independence of views only. It includes errors common to the corners of a view: a varying warp
+/// of the board, a rolling shutter, a lens model that does not fit. With few views it is imprecise,
+/// by a relative 1 / sqrt(2 (n - 1)), and often too large. Infinite if the remaining views do not
+/// determine a lens.
+/// @pre solution.ok()
 Eigen::MatrixXd covariance_by_views(const IntrinsicsSolution& solution);
 
 }  // namespace vlp

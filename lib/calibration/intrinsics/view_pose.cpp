@@ -36,7 +36,8 @@ double squares_of(Corners corners, const Lens& lens, const Placed& pose) {
   return squares;
 }
 
-/// The step that minimizes the linearized residuals, the rotation turned on from the left.
+/// Returns the pose after a step that minimizes the linearized residuals; the rotation is updated
+/// from the left.
 std::optional<Placed> stepped(Corners corners, const Lens& lens, const Placed& pose,
                               double damping) {
   Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
@@ -64,7 +65,7 @@ std::optional<Placed> stepped(Corners corners, const Lens& lens, const Placed& p
 
 std::optional<ViewPose> refined(Corners corners, const Lens& lens, Placed pose) {
   constexpr int most_steps = 20;
-  constexpr double enough = 1e-4;  // share of the squares that a step still takes away
+  constexpr double enough = 1e-4;  // relative reduction of the squares by a step
   double damping = 1e-4;
   double squares = squares_of(corners, lens, pose);
   if (!std::isfinite(squares)) return {};
@@ -97,7 +98,7 @@ Placed placed(const cv::Mat& rotation, const cv::Mat& translation) {
 }  // namespace
 
 std::optional<ViewPose> view_pose(Corners corners, const Lens& lens) {
-  // Through a camera turned towards the board, which may be seen at 90 degrees off the axis.
+  // Rotates the camera towards the board, which may be 90 degrees off the axis.
   std::vector<std::pair<const BoardLattice::Corner*, Eigen::Vector3d>> rays;
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   for (const auto& corner : corners) {

@@ -12,17 +12,19 @@
 
 namespace vlp {
 
-/// A board's pose in one view through a known lens, and how well it fits, per axis.
+/// Pose of a board in one view through a known lens, and its RMS residual per axis.
 struct ViewPose {
   BoardPose camera_from_board;
   double rms_px;
 };
 
-/// The pose with the least reprojection error. A plane seen through a lens has two poses that look
-/// almost alike (it is tilted to one side or to the other); both are found in the undistorted image
-/// (of the flat board; Collins and Bartoli, "Infinitesimal plane-based pose estimation", 2014),
-/// refined in pixels by Levenberg and Marquardt's method, and compared. Nothing for fewer than four
-/// corners, or when neither can be projected.
+/// Estimates the pose of a board in a view with the smallest reprojection error.
+///
+/// A plane has two poses that look almost the same: tilted to one side or to the other. Both are
+/// estimated in the undistorted image for a flat board (Collins and Bartoli, "Infinitesimal
+/// plane-based pose estimation", 2014). They are refined in pixels by the method of Levenberg and
+/// Marquardt, and compared.
+/// @return std::nullopt for fewer than four corners, or if neither pose can be projected
 std::optional<ViewPose> view_pose(std::span<const BoardLattice::Corner> corners, const Lens& lens);
 
 }  // namespace vlp

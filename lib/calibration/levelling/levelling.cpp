@@ -23,7 +23,7 @@ constexpr const char* kTooWeak =
     "the captures do not determine it: the lamps they see are too few or in one line; add captures "
     "that see more lamps, at other places and yaws";
 
-/// Captures whose lamps agree with the map and with a camera at one zenith, and where they are.
+/// Captures whose lamps agree with the map and with a camera at one zenith, with their poses.
 struct Placement {
   std::vector<AdjustmentCapture> captures;
   std::vector<Pose> poses;
@@ -31,15 +31,15 @@ struct Placement {
   double height_m = 0;
   /// Number of detections of each lamp of the map.
   std::vector<int> times_seen;
-  /// Sum of the squared residuals in the undistorted image, each capture by itself.
+  /// Sum of the squared residuals of the captures in the undistorted image.
   double squares_px2 = 0;
 
   int detections() const { return std::accumulate(times_seen.begin(), times_seen.end(), 0); }
   int degrees_of_freedom() const { return 2 * detections() - 4 * static_cast<int>(poses.size()); }
 };
 
-/// Returns the captures of three lamps of the map or more, with the detections of those alone, and
-/// counts the others and the detections.
+/// Returns the captures of three lamps of the map or more, without detections of other lamps.
+/// Counts the other captures, and all detections of the returned captures.
 std::vector<AdjustmentCapture> captures_of_three_lamps(std::span<const Frame> frames,
                                                        const LampMap& map,
                                                        const std::vector<KnownMotion>& motions,
@@ -61,7 +61,7 @@ std::vector<AdjustmentCapture> captures_of_three_lamps(std::span<const Frame> fr
   return captures;
 }
 
-/// Places each capture by itself, as a camera that stands, and leaves out lamps and captures that
+/// Locates each capture separately, as a stationary camera. Rejects lamps and captures that
 /// contradict the map.
 Placement place(const std::vector<AdjustmentCapture>& captures, LampMap map,
                 const Calibration& calibration) {
@@ -71,7 +71,8 @@ Placement place(const std::vector<AdjustmentCapture>& captures, LampMap map,
   placement.times_seen.resize(map.lamps.size());
   std::vector<Detection> detections;
   for (const AdjustmentCapture& capture : captures) {
-    // Residuals that the stated noise does not explain may come from the tilt that is sought.
+    // Residuals beyond the given noise may be due to the unknown tilt, so that sigma_px is not
+    // used.
     detections = capture.detections;
     for (Detection& detection : detections) detection.sigma_px.reset();
     const Fix fix = positioner.locate(detections);
@@ -96,10 +97,11 @@ Placement place(const std::vector<AdjustmentCapture>& captures, LampMap map,
   return placement;
 }
 
+/// Variation of yaws and positions of the captures.
 struct Variety {
-  /// Root of the mean squared sine, about, of the yaws from their mean.
+  /// Approximate RMS sine of the yaws relative to their mean.
   double yaw;
-  /// Root of the mean squared distance from the mean place over the height of the lamps.
+  /// RMS distance of the positions from their mean, divided by the height of the lamps.
   double place;
 };
 
@@ -119,8 +121,8 @@ Variety variety_of(const Placement& placement) {
           std::sqrt(square_m2) / placement.height_m};
 }
 
-/// Returns why the captures, from where they were taken, cannot determine the tilt (and the map),
-/// and what to add; empty if they can.
+/// Returns the reason why yaws and positions of the captures cannot determine the tilt (and the
+/// map), and the remedy. Returns an empty string if they can.
 std::string undetermined_by(const Placement& placement, const LampMap& map, bool refine_map) {
   if (placement.captures.size() < 2) {
     return "two captures or more are needed that see three lamps of the map or more which agree "
@@ -152,7 +154,8 @@ std::string undetermined_by(const Placement& placement, const LampMap& map, bool
   return placement.degrees_of_freedom() > 2 + 3 * lamps - 5 ? "" : kTooWeak;
 }
 
-/// Returns the same if a standard deviation is beyond the options' limits.
+/// Returns the reason if a standard deviation exceeds the limits of the options, otherwise an empty
+/// string.
 std::string too_loose(const Levelling& result, const Eigen::Vector2d& focal_px,
                       const LevellingOptions& options) {
   const double sd_rad =
@@ -180,8 +183,9 @@ bool all_stated(std::span<const Frame> frames) {
   });
 }
 
-/// Adjusts the captures that agree with the map. A capture that the map contradicts for a level
-/// camera may agree with it at the zenith that the others determine: it is then used, too.
+/// Adjusts the captures that agree with the map. A capture that contradicts the map for a level
+/// camera may agree with it at the zenith that the other captures determine, and is then used.
+/// Iterates until the number of detections is unchanged, at most six times.
 AdjustmentResult adjust_in_rounds(const std::vector<AdjustmentCapture>& captures,
                                   AdjustmentInput& input, Levelling& result) {
   constexpr int max_rounds = 6;

@@ -14,61 +14,76 @@
 
 namespace vlp {
 
+/// Options of level_by_lamps().
 struct LevellingOptions {
-  /// Estimates corrections of the lamp map, too (AdjustmentInput::frees_map_shape). Captures at
-  /// different yaws separate a tilt of all lamps from the camera's; captures at different places
-  /// determine the distances of the lamps. Lamps that are not seen stay.
+  /// Also estimates corrections of the lamp map (AdjustmentInput::frees_map_shape). Captures at
+  /// different yaws separate a tilt of all lamps from that of the camera. Captures at different
+  /// positions determine the distances of the lamps. Lamps that are not detected keep their
+  /// positions.
   bool refine_map = false;
-  /// How the camera moves in each of the frames; empty: it stands. What is not known of it is
-  /// estimated with the capture's pose. Wants the camera's row time and read-out.
+  /// Motion of the camera in each frame; empty: stationary. Components with a standard deviation
+  /// are estimated together with the pose of the capture. Requires row time and readout direction
+  /// of the camera.
   std::vector<KnownMotion> motions = {};
-  /// A standard deviation of the zenith per axis, and of a lamp's correction per axis, beyond
-  /// which the captures do not determine it.
+  /// Largest standard deviation of the zenith per axis. Beyond it, the tilt counts as undetermined.
   double max_sd_rad = 0.02;
+  /// Largest standard deviation of the correction of a lamp per axis, with `refine_map`. Beyond it,
+  /// the map counts as undetermined.
   double max_lamp_sd_m = 0.01;
 };
 
-/// The tilt, and maybe the lamp map, from captures of three lamps or more taken anywhere, and how
-/// well they are known.
+/// Tilt of a camera, and optionally the corrected lamp map, with their uncertainties.
 struct Levelling {
-  /// Why there is no answer, and what to add; empty when there is one. The figures below hold as
-  /// far as they were reached.
+  /// Reason why there is no result, and the remedy, human-readable. Empty if there is a result. The
+  /// other members are then valid up to the step that failed.
   std::string undetermined;
 
-  /// Model `tilt`. The covariance, of the zenith's image, follows the residuals where they are
-  /// larger than the detections state, and includes the errors of the map by its sd_m.
+  /// Rotation center with model `tilt`. Its covariance is scaled by the residuals if they exceed
+  /// the given noise, and includes the errors of the map by its sd_m.
   RotationCenter center;
-  /// With what was found added; as it was without `refine_map`.
+  /// Lamp map with the corrections; unchanged without `refine_map`.
   LampMap map;
+  /// Correction of one lamp and its standard deviation.
   struct LampCorrection {
     int id;
     Eigen::Vector3d correction_m, sd_m;
   };
-  /// Of the lamps seen, with `refine_map`.
+  /// Corrections of the detected lamps, with `refine_map` only.
   std::vector<LampCorrection> corrections;
 
-  /// Captures that it rests on; of fewer than three lamps of the map, which carry nothing; that
-  /// contradict themselves or the others.
+  /// Number of captures that are used, that contain fewer than three lamps of the map, and that are
+  /// rejected because they contradict the map or the other captures.
   int captures = 0, captures_of_few_lamps = 0, captures_rejected = 0;
-  /// Detections that it rests on, and those of captures of three lamps or more that it does not.
+  /// Number of detections that are used, and of other detections in captures of three lamps or
+  /// more.
   int detections = 0, detections_rejected = 0;
-  /// Residual per axis of a level camera that stands and the map as it was, in the undistorted
-  /// image: sqrt(sum of squares / degrees of freedom).
+  /// RMS residual per axis in the undistorted image, sqrt(sum of squares / degrees of freedom), for
+  /// a level, stationary camera and the original map.
   double residual_before_px = 0;
-  /// The same of the detections used, in the image, with the result.
+  /// RMS residual per axis in the image, with the result, over the detections that are used.
   double residual_px = 0;
-  /// Residuals over the sigma_px of the detections, at least 1; 1 if not all of them state it.
+  /// Ratio of the residuals to the sigma_px of the detections, at least 1. It is 1 if any detection
+  /// lacks sigma_px.
   double excess = 1;
 };
 
-/// Levels the camera from identified lamps: three or more over-determine a fix unless the camera
-/// is level. A preset of adjust_captures(): the lens is exact, no place is known, the map counts by
-/// its sd_m (exact without one), detections without sigma_px weigh as in positioning. The lamps of
-/// each capture first have to agree with the map (Positioner); captures that do so at the zenith
-/// found, but not for a level camera, are taken in again. Outliers beyond 4.5 standard deviations
-/// of the residuals' scatter are then left out. Not determined: fewer than two captures
-/// of three lamps; captures all from one place and yaw (from there an error of the map looks like
-/// a tilt); with `refine_map` all at one yaw or from one place.
+/// Estimates the tilt of a camera from identified lamps. Three lamps or more over-determine a
+/// position fix unless the camera is level.
+///
+/// @return  tilt and optionally map; `undetermined` states the reason if there is none
+///
+/// Calls adjust_captures() with an exact lens and without known positions. The map is weighted by
+/// its sd_m, and exact without one. Detections without sigma_px are weighted as in positioning.
+///
+/// The lamps of each capture first have to agree with the map (Positioner). Captures that do not
+/// agree for a level camera, but do at the estimated zenith, are reinstated. Outliers beyond 4.5
+/// standard deviations of the residuals are rejected.
+///
+/// The tilt is undetermined for
+///   - fewer than two captures of three lamps
+///   - captures that all have the same position and yaw, where an error of the map resembles a tilt
+///   - with `refine_map`, captures at one yaw, or at one position, or a lamp in one capture only
+///   - standard deviations above the limits of `options`
 Levelling level_by_lamps(std::span<const Frame> frames, const LampMap& map, const Camera& camera,
                          const LevellingOptions& options = {});
 

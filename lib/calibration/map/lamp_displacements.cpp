@@ -25,7 +25,7 @@ std::size_t count_detections(const std::vector<CeilingView>& views) {
   return count;
 }
 
-/// Removes detections that tie no lamp to others.
+/// Removes detections that do not connect a lamp to other lamps.
 void keep_tied(std::vector<CeilingView>& views) {
   constexpr std::size_t min_lamps = 3;
   constexpr int min_captures = 2;
@@ -69,7 +69,7 @@ struct ViewEquations {
   std::vector<Eigen::Index> columns;
 };
 
-/// `column` is the first one of each lamp, and `tilt_column` of the tilt if that is unknown.
+/// `column` maps a lamp to its first column; `tilt_column` is that of the tilt if it is unknown.
 ViewEquations equations_of(const CeilingView& view, const std::map<int, Eigen::Index>& column,
                            const std::vector<Eigen::Vector2d>& map_m,
                            std::optional<Eigen::Index> tilt_column) {
@@ -102,7 +102,7 @@ ViewEquations equations_of(const CeilingView& view, const std::map<int, Eigen::I
   return equations;
 }
 
-/// Returns a basis of what captures cannot determine: the similarities of the floor plan.
+/// Returns a basis of the similarities of the floor plan, which captures cannot determine.
 Eigen::MatrixXd gauge_basis(const std::vector<Eigen::Vector2d>& map_m) {
   Eigen::Vector2d mean_m(0, 0);
   for (const Eigen::Vector2d& lamp_m : map_m) mean_m += lamp_m / static_cast<double>(map_m.size());
@@ -171,8 +171,9 @@ std::optional<LampDisplacements> solve(const LampMap& map, const std::vector<Cei
   return found;
 }
 
-/// Removes outliers and counts them per lamp. Removes the largest residual of each view, if it is
-/// half as large as the largest of all, since an outlier also changes the residuals of others.
+/// Removes outliers and adds them to `outliers_m`. Removes the largest residual of each view if it
+/// exceeds half the largest of all, because an outlier also changes the residuals of other
+/// detections. Returns true if any was removed.
 bool reject_outliers(std::vector<CeilingView>& views, const LampDisplacements& found,
                      std::map<int, std::vector<double>>& outliers_m) {
   constexpr double max_sigmas = 6, numeric_tolerance_m = 1e-7;

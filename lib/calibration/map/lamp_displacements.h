@@ -12,13 +12,15 @@
 
 namespace vlp {
 
-/// Lamps of one capture, projected onto the ceiling by an approximate pose of the camera.
+/// Detections of one capture, projected onto the ceiling with an approximate camera pose.
 struct CeilingView {
+  /// Projection of one detection: position on the ceiling, and height of the lamp above the camera.
   struct SeenLamp {
     int lamp;
     Eigen::Vector2d seen_m;
     double above_camera_m;
   };
+  /// Position of the camera.
   Eigen::Vector2d camera_m;
   /// Each lamp at most once.
   std::vector<SeenLamp> lamps;
@@ -26,11 +28,11 @@ struct CeilingView {
   double yaw_rad = 0;
 };
 
-/// Displacement of one lamp: its place according to the other lamps minus its place in the map,
-/// horizontal, in the world. A single lamp that moves by d has the displacement d.
+/// Displacement of one lamp: its position according to the other lamps minus its position in the
+/// map, horizontal, in the world. If a single lamp moved by d, its displacement is d.
 struct LampOffset {
   int lamp;
-  /// Captures that contribute.
+  /// Number of captures that contribute.
   int captures;
   Eigen::Vector2d map_m, offset_m, sd_m;
 };
@@ -39,18 +41,20 @@ struct LampOffset {
 struct LampDisplacements {
   std::vector<int> lamps;
   std::vector<Eigen::Vector2d> map_m;
-  /// Captures per lamp that contribute.
+  /// Number of captures per lamp that contribute.
   std::vector<int> captures;
-  /// Residuals of the detections that are rejected as outliers, by lamp, also of lamps that are not
-  /// in `lamps` because too few detections are left.
+  /// Residuals of the detections rejected as outliers, by lamp. Includes lamps that are absent from
+  /// `lamps` because too few of their detections are left.
   std::map<int, std::vector<double>> outliers_m = {};
-  /// Two rows per lamp. `projector`: onto the displacements that are no similarity of the map.
+  /// Displacements, two rows per lamp.
   Eigen::VectorXd displacement_m;
+  /// Covariance of the displacements; projector onto the displacements that are no similarity of
+  /// the map.
   Eigen::MatrixXd covariance_m2, projector;
-  /// N: the squared residuals of all captures for lamps at p are p' N p, two rows per lamp. Does
-  /// not depend on the map.
+  /// Matrix N: the squared residuals of all captures for lamps at p are p' N p, two rows per lamp.
+  /// Independent of the map.
   Eigen::MatrixXd information;
-  /// Rotation about x and y of the level frame, as the shift (a, b) of a point straight up.
+  /// Rotation about x and y of the level frame, as the displacement (a, b) of a point straight up.
   Eigen::Vector2d tilt{0, 0};
   /// Residuals of each view, two rows per lamp.
   std::vector<Eigen::VectorXd> residuals_m = {};
@@ -60,7 +64,7 @@ struct LampDisplacements {
   /// Fraction of the detections that is not rejected as outliers.
   double inlier_fraction = 1;
 
-  /// Returns the displaced place of a lamp, up to a similarity of all.
+  /// Returns the displaced position of a lamp, up to a similarity of all lamps.
   Eigen::Vector2d displaced_m(std::size_t lamp) const {
     return map_m[lamp] + displacement_m.segment<2>(2 * static_cast<Eigen::Index>(lamp));
   }
@@ -68,27 +72,27 @@ struct LampDisplacements {
 
 /// Estimates the displacements x of all lamps from all captures c:
 ///   sum over c |seen_c - map_c - x_c + B_c t - A_c y_c|^2 -> min,   G' x = 0
-///   y_c  position, yaw and height of the camera, which are free in each capture
+///   y_c  position, yaw and height of the camera, free in each capture
 ///   A_c  derivative of seen_c with respect to y_c
-///   t    tilt that all captures share, only with `tilt_is_free`; B_c its derivative
+///   t    tilt common to all captures, only with `tilt_is_free`; B_c its derivative
 ///   G    similarities of the floor plan, which captures cannot determine
-/// Outliers beyond 6 standard deviations, such as misidentified lamps, are rejected. The covariance
-/// is scaled by the residuals.
+/// Rejects outliers beyond 6 standard deviations, such as misidentified lamps. The covariance is
+/// scaled by the residuals.
 ///
-/// Uses lamps that two captures or more see together with two other lamps or more. Returns
-/// std::nullopt if captures do not tie all these lamps together or there is no redundancy.
-/// @pre the lamps hang at about one height
+/// Uses lamps that at least two captures contain together with at least two other lamps. Returns
+/// std::nullopt if captures do not tie all these lamps together or if there is no redundancy.
+/// @pre the lamps have about the same height
 std::optional<LampDisplacements> estimate_lamp_displacements(const LampMap& map,
                                                              std::vector<CeilingView> views,
                                                              bool tilt_is_free = false);
 
-/// Returns the offset of a lamp from the similarity that takes the lamps without `excluded` to the
-/// map, or std::nullopt if there is none.
+/// Returns the offset of a lamp after the similarity that maps the lamps without `excluded` to the
+/// map. Returns std::nullopt if there is no such similarity.
 std::optional<Eigen::Vector2d> offset_from_others(const LampDisplacements& found, std::size_t lamp,
                                                   const std::vector<std::size_t>& excluded);
 
 /// Computes the offset of each lamp from the similarity that fits the other lamps best. Omits lamps
-/// that the other lamps do not determine.
+/// whose offset the other lamps do not determine.
 std::vector<LampOffset> offsets_from_other_lamps(const LampDisplacements& found);
 
 }  // namespace vlp

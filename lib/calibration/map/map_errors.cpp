@@ -27,13 +27,13 @@ namespace {
 /// Probability of a false alarm per map.
 constexpr double kFalseAlarm = 0.01;
 
-/// A lamp in a capture, seen along (z, 1) by a level camera.
+/// Ray (z, 1) to a lamp in the level frame of the camera.
 struct LevelRay {
   const Lamp* lamp;
   Eigen::Vector2d z;
 };
 
-/// Returns the rays to the lamps of the map. A lamp that is seen twice has none.
+/// Returns the rays to the lamps of the map. Omits lamps that are detected twice.
 std::vector<LevelRay> level_rays(const Frame& frame, const LampMap& map, const Lens& lens,
                                  const Eigen::Matrix3d& level_from_camera) {
   std::vector<LevelRay> rays;
@@ -63,7 +63,7 @@ double rms_radius(const std::vector<Eigen::Vector2d>& points) {
 
 using PlacesOfLamps = std::map<int, Eigen::Vector2d>;
 
-/// Returns the displaced lamps, scaled to the size of the map.
+/// Returns the displaced positions of the lamps, scaled to the size of the map.
 std::vector<Eigen::Vector2d> displaced_places(const LampDisplacements& found) {
   Eigen::Vector2d mean_m(0, 0);
   std::vector<Eigen::Vector2d> places_m;
@@ -77,7 +77,7 @@ std::vector<Eigen::Vector2d> displaced_places(const LampDisplacements& found) {
 }
 
 /// Projects the rays onto the ceiling from the camera pose that fits the displaced lamps best. The
-/// height comes from the sizes of both patterns, so that a wrong map does not change it much.
+/// height is the ratio of the sizes of both patterns, so that errors of the map barely change it.
 std::optional<CeilingView> project(const std::vector<LevelRay>& rays,
                                    const PlacesOfLamps& places_m) {
   std::vector<Eigen::Vector2d> z, lamps_m;
@@ -93,7 +93,7 @@ std::optional<CeilingView> project(const std::vector<LevelRay>& rays,
   };
   Similarity pose{{0, 0}, {1, 0}};
   constexpr int iterations = 3;
-  constexpr double max_factor = 1.25;  // beyond it the lamps do not fit, and the fit means nothing
+  constexpr double max_factor = 1.25;  // beyond it the fit is meaningless
   for (int iteration = 0; iteration < iterations; ++iteration) {
     const auto fit = fit_similarity(
         z.size(), [&](std::size_t i) -> Eigen::Vector2d { return above_m(i) * z[i]; },
@@ -114,7 +114,7 @@ std::optional<CeilingView> project(const std::vector<LevelRay>& rays,
   return view;
 }
 
-/// Captures of a camera that stands.
+/// Captures of a stationary camera.
 struct MapCaptures {
   std::span<const Frame> frames;
   const Calibration& calibration;
@@ -139,8 +139,8 @@ struct MapCaptures {
     return views;
   }
 
-  /// Estimates the displacements. Iterates, because the tilt and lamps of unequal heights are
-  /// linearized at the pose of each capture.
+  /// Estimates the displacements. Iterates, because the equations are linearized at the pose of
+  /// each capture with respect to the tilt and to differences of height.
   std::optional<LampDisplacements> displacements(const LampMap& map) const {
     constexpr int max_iterations = 8;
     constexpr double tolerance_m = 1e-6;
@@ -172,7 +172,7 @@ struct MapCaptures {
   }
 };
 
-/// Displacements as independent coordinates, with what explains them.
+/// Displacements as independent coordinates, and tests of the lamps that explain them.
 class DisplacementTest {
  public:
   struct Fit {
@@ -222,7 +222,7 @@ class DisplacementTest {
     return fit;
   }
 
-  /// Returns the variance to add to those known, so that chi^2 is its degrees of freedom.
+  /// Returns the variance to add to the known ones, so that chi^2 equals its degrees of freedom.
   double added_variance_m2(const std::vector<std::size_t>& free) const {
     const double freedom = static_cast<double>(rank() - 2 * std::ssize(free));
     double low = 0, high = coordinates_.squaredNorm() / freedom;
@@ -243,7 +243,8 @@ class DisplacementTest {
     return freedom * std::expm1(exponent / freedom);
   }
 
-  /// Adds the lamp, other than `excluded`, that explains most beside the free ones. Returns chi^2.
+  /// Adds the lamp, other than `excluded`, that reduces chi^2 most together with the free ones.
+  /// Returns chi^2.
   double add_best(std::vector<std::size_t>& free, double added_m2,
                   std::optional<std::size_t> excluded = {}) const {
     std::size_t best = 0;
@@ -261,7 +262,8 @@ class DisplacementTest {
     return smallest;
   }
 
-  /// Returns true if another lamp in place of any of the free ones is worse by more than the bound.
+  /// Returns true if replacing any of the free lamps by another lamp increases chi^2 by more than
+  /// the bound.
   bool is_significant(const std::vector<std::size_t>& free, double added_m2) const {
     double sets = 1;
     for (std::size_t k = 0; k < free.size(); ++k) {
@@ -276,7 +278,7 @@ class DisplacementTest {
   }
 
  private:
-  /// Rounding of simulated captures without noise.
+  /// Numeric noise of simulated captures without noise.
   static constexpr double kNumericVariance_m2 = 1e-14;
 
   std::size_t lamps_;
@@ -285,7 +287,7 @@ class DisplacementTest {
   bool variance_is_known_ = true;
 };
 
-/// Another map that may explain the captures, with the displacements that it leaves.
+/// Alternative map that may explain the captures, with the displacements relative to it.
 struct OtherMap {
   MapError error;
   LampMap map;
@@ -296,8 +298,8 @@ struct OtherMap {
   }
 };
 
-/// Returns the two maps with two lamps swapped that have the smallest residuals, best first, if
-/// these are smaller than those of the map.
+/// Returns the two maps with two lamps swapped that have the smallest residuals, best first. Omits
+/// maps whose residuals are no smaller than those of the original map.
 std::vector<OtherMap> swapped_maps(const LampDisplacements& found, const LampMap& map) {
   Eigen::Matrix2Xd lamps_m(2, std::ssize(found.lamps));
   for (Eigen::Index i = 0; i < lamps_m.cols(); ++i) {
@@ -337,14 +339,14 @@ std::vector<OtherMap> swapped_maps(const LampDisplacements& found, const LampMap
   return maps;
 }
 
-/// Returns true if most detections are outliers, so that the lamps that are left prove nothing.
+/// Returns true if most detections are outliers, so that the remaining lamps prove nothing.
 bool is_contradicted(const std::optional<LampDisplacements>& found) {
   constexpr double min_inlier_fraction = 0.5;
   return !found || found->inlier_fraction < min_inlier_fraction;
 }
 
-/// Returns true if a map explains the captures: most detections agree, and the lamps are displaced
-/// by less than a tenth of their distances, which survey errors stay far below.
+/// Returns true if a map explains the captures: most detections agree, and the displacement of the
+/// lamps is below 10 % of their distance from their mean. Survey errors stay far below this limit.
 bool explains_captures(const OtherMap& other) {
   if (is_contradicted(other.found)) return false;
   constexpr double max_fraction = 0.1;
@@ -358,8 +360,8 @@ bool explains_captures(const OtherMap& other) {
   return other.size_m() <= max_fraction * std::sqrt(squares_m2);
 }
 
-/// Finds two lamps that are swapped, or a mirrored map. With it the captures have to fit far better
-/// than with the map, and with two lamps swapped better than with any other two.
+/// Finds two lamps that are swapped, or a mirrored map. The captures have to fit the alternative
+/// map far better than the original map, and two swapped lamps better than any other pair.
 std::optional<MapError> find_exchange(const MapCaptures& captures, const LampMap& map,
                                       const std::optional<LampDisplacements>& found) {
   std::vector<OtherMap> others;
@@ -373,7 +375,7 @@ std::optional<MapError> find_exchange(const MapCaptures& captures, const LampMap
     const auto fits = std::ranges::find_if(others, explains_captures);
     return fits == others.end() ? std::nullopt : std::optional(fits->error);
   }
-  // The mirror image of a square is one with two corners swapped.
+  // The mirror image of a square equals a square with two corners swapped.
   const bool is_mirrored = others.back().size_m() <= 2 * others.front().size_m();
   const std::size_t best = is_mirrored ? others.size() - 1 : 0;
   if (!explains_captures(others[best])) return std::nullopt;
@@ -390,9 +392,9 @@ std::optional<MapError> find_exchange(const MapCaptures& captures, const LampMap
   return others[best].error;
 }
 
-/// Finds the lamps that hang elsewhere: the largest set of which each is significant.
+/// Finds the displaced lamps: the largest set in which each lamp is significant.
 std::vector<MapError> find_moved(const LampDisplacements& found, const DisplacementTest& test) {
-  constexpr std::size_t max_lamps = 8;  // more are an error of the whole map
+  constexpr std::size_t max_lamps = 8;  // more lamps indicate an error of the whole map
   std::vector<std::size_t> free, moved;
   while (free.size() < max_lamps && 2 * (free.size() + 1) < found.lamps.size() &&
          test.rank() > 2 * std::ssize(free) + 2) {
@@ -408,7 +410,7 @@ std::vector<MapError> find_moved(const LampDisplacements& found, const Displacem
     const auto row = 2 * static_cast<Eigen::Index>(k);
     errors.push_back({MapErrorKind::moved, {found.lamps[moved[k]]}});
     MapError& error = errors.back();
-    // Exact, where the offset in d is linear.
+    // Exact offset; the one in d is linearized.
     error.offset_m.head<2>() =
         offset_from_others(found, moved[k], moved).value_or(fit.offsets_m.segment<2>(row));
     error.sd_m.head<2>() = fit.covariance_m2.diagonal().segment<2>(row).cwiseSqrt();
@@ -416,8 +418,8 @@ std::vector<MapError> find_moved(const LampDisplacements& found, const Displacem
   return errors;
 }
 
-/// Finds the lamp with most of the outliers, two or more, in more than a tenth of its captures.
-/// Their median has to exceed `min_outlier_m`, and three standard deviations of the lamp's survey.
+/// Finds the lamp with most of the outliers: at least two, in more than 10 % of its captures. Their
+/// median has to exceed `min_outlier_m` and three standard deviations of the lamp's survey.
 std::optional<MapError> find_unsteady(const LampDisplacements& found, const LampMap& map,
                                       double min_outlier_m) {
   constexpr std::size_t min_outliers = 2;
@@ -445,8 +447,8 @@ std::optional<MapError> find_unsteady(const LampDisplacements& found, const Lamp
   return std::nullopt;
 }
 
-/// Returns true if the lamps are displaced by more than Positioner accepts, relative to the size of
-/// the map.
+/// Returns true if the RMS displacement of the lamps exceeds the tolerance of Positioner, relative
+/// to the size of the map.
 bool is_other_room(const LampDisplacements& found) {
   constexpr double max_residual_fraction = 0.1;  // PositionerOptions::max_residual_share
   const double rms_m =
@@ -454,7 +456,8 @@ bool is_other_room(const LampDisplacements& found) {
   return rms_m > max_residual_fraction * rms_radius(found.map_m);
 }
 
-/// Whole millimetres from 10 mm on, else tenths. The height only if it is not rounded to 0.
+/// Describes an offset in whole millimeters from 10 mm on, otherwise in tenths. Includes the height
+/// only if it does not round to 0.
 std::string describe_offset(int lamp, const Eigen::Vector3d& offset_m) {
   const double unit_mm = offset_m.norm() < 9.95e-3 ? 0.1 : 1;
   const int digits = unit_mm < 1 ? 1 : 0;

@@ -15,94 +15,105 @@
 #include "rig/calibration.h"
 #include "rig/lamp_map.h"
 
-/// Errors of a lamp map that captures show: which lamp, by how much, in which direction.
+/// Errors of a lamp map that captures reveal: the lamps concerned, with size and direction of the
+/// error.
 namespace vlp {
 
+/// Kind of a map error.
 enum class MapErrorKind {
-  moved,       // a lamp hangs elsewhere
+  moved,       // the position of a lamp is wrong
   unsteady,    // a lamp contradicts the others in some captures, in varying directions
-  swapped,     // two lamps have each other's place or id
+  swapped,     // positions or ids of two lamps are exchanged
   mirrored,    // the map is the mirror image of the room
-  other_room,  // the lamps are nowhere near their places, without one of the causes above
-  unseen       // a lamp is in no capture
+  other_room,  // the lamps are far from their map positions for none of the causes above
+  unseen       // no capture contains the lamp
 };
 
+/// Error of the map, of one lamp or of several.
 struct MapError {
   MapErrorKind kind;
-  /// Ids; empty if the error concerns the whole map.
+  /// Lamp ids; empty if the error concerns the whole map.
   std::vector<int> lamps = {};
-  /// Kind `moved`: where the lamp hangs minus its place in the map, in the world. z is 0 except
-  /// from an adjustment (calibration/adjustment).
+  /// Kind `moved`: true position of the lamp minus its position in the map, in the world. z is 0
+  /// except in results of an adjustment (calibration/adjustment).
   Eigen::Vector3d offset_m{0, 0, 0}, sd_m{0, 0, 0};
-  /// Kind `unsteady`: captures that contradict, and captures that contain the lamp.
+  /// Kind `unsteady`: number of captures that contradict, and of captures that contain the lamp.
   int contradicting = 0, captures = 0;
 };
 
-/// Describes the error in one line: ids, millimetres, direction, what to check.
+/// Describes the error in one line: ids, offset in millimeters, direction, remedy.
 std::string describe(const MapError& error);
 
-/// Describes the lamps that the map of an adjusted calibration has elsewhere, one or more
+/// Describes the number of lamps whose map position differs from that in an adjusted calibration
 /// (Positioner::lamps_elsewhere()).
+/// @pre lamps >= 1
 std::string describe_lamps_elsewhere(int lamps);
 
 /// Describes all errors in one line.
 std::string describe(std::span<const MapError> errors);
 
+/// Result of find_map_errors().
 struct MapErrors {
   std::vector<MapError> errors;
-  /// Offset of every lamp, significant or not.
+  /// Offset of every lamp, including insignificant ones.
   std::vector<LampOffset> offsets;
 
   /// Returns true if the map cannot be used: two lamps are swapped, or it is mirrored.
   bool is_unusable() const;
 };
 
+/// Options of find_map_errors().
 struct MapErrorOptions {
-  /// Inclination of the base, in the order of the frames; empty: level.
+  /// Inclination of the base in each frame; empty: level.
   std::vector<std::optional<Inclination>> inclinations = {};
-  /// Yaw of the camera on the robot whose inclinations are given.
+  /// Yaw of the camera on the robot that has the inclinations.
   double yaw_in_robot_rad = 0;
-  /// Smallest offset that is an error, as seen in the image: a good lens may have errors of this
-  /// size. Outliers of an unsteady lamp have to be five times as large.
+  /// Smallest offset that is an error, projected to the image; a well calibrated lens may have
+  /// errors of this size. Outliers of an unsteady lamp have to be five times as large.
   double min_offset_px = 0.25;
-  /// Every n-th capture is used if there are more. More captures hardly change the result.
+  /// If there are more captures, every n-th is used. More captures barely change the result.
   std::size_t max_captures = 500;
 };
 
-/// Finds the errors of a lamp map from captures of a camera that stands.
+/// Finds the errors of a lamp map from captures of a stationary camera.
 ///
-/// @param calibration  without a rotation centre the tilt of the camera is estimated, too
+/// @param calibration  without a rotation center, the tilt of the camera is also estimated
+/// @return             no errors if too few captures tie the lamps together
 ///
 /// Tests the displacements x of estimate_lamp_displacements():
 ///   x = P (d + m) + e
 ///   P  projector onto the displacements that are no similarity of the map
 ///   d  offsets of k lamps
-///   m  survey errors: variance sd_m^2 of the lamp plus tau^2 that all lamps share
+///   m  survey errors: variance sd_m^2 of the lamp plus tau^2, common to all lamps
 ///   e  noise of the captures
-/// tau^2 >= 0 is chosen so that the weighted squares chi^2 of x - P d do not exceed their degrees
-/// of freedom f = rank(P) - 2 k. Lamps enter d one by one, by the largest drop of chi^2. The
-/// largest set counts in which no lamp can be replaced by another one with an increase of chi^2
-/// below
+/// tau^2 >= 0 is the smallest value for which the weighted squares chi^2 of x - P d do not exceed
+/// their degrees of freedom f = rank(P) - 2 k.
+///
+/// Lamps enter d one by one, by the largest drop of chi^2. The result is the largest set in which
+/// no lamp can be replaced by another one with an increase of chi^2 below
 ///   f ((p / N)^(-2 / f) - 1)    F distribution with 2 and f degrees of freedom
-///   -2 ln(p / N)                chi-squared instead, if every lamp states its sd_m
+///   -2 ln(p / N)                chi-squared instead, if every lamp has an sd_m
 /// p = 0.01 is the probability of a false alarm. N = binomial(lamps, k) sets are tested together.
 ///
-/// Small numbers: the bound is 800 for one of four lamps, 85 of five, 45 of six, 28 of eight; 12 to
-/// 13 with sd_m. None of three lamps can be named, and of n lamps fewer than n / 2 and eight at
-/// most.
+/// Few lamps: the bound is 800 for one of four lamps, 85 of five, 45 of six, 28 of eight; 12 to 13
+/// with sd_m. For three lamps no displaced lamp can be identified. For n lamps fewer than n / 2 can
+/// be, and at most eight.
 ///
-/// Two lamps are swapped, or the map is mirrored, if with such a map chi^2 is smaller by the bound
-/// with k = 0 and N = all pairs, and for two lamps also smaller than for any other two.
+/// Two lamps are reported as swapped, or the map as mirrored, if chi^2 with such a map is smaller
+/// by the bound with k = 0 and N = all pairs. For two lamps it also has to be smaller than for any
+/// other pair.
 ///
-/// Limits: horizontal errors only. Captures cannot determine scale, position and rotation of the
-/// map; an error of the focal length acts as one of the scale (station/lens_fault.h). Several lamps
-/// that are displaced alike can hide each other. With sd_m smaller than the true errors of the
-/// survey, false alarms are more frequent (3 to 5 % if the errors are twice as large).
-/// Returns no errors if too few captures tie the lamps together.
+/// Limits:
+///   - Only horizontal errors are estimated.
+///   - Captures cannot determine scale, position and rotation of the map. An error of the focal
+///     length acts as one of the scale (station/lens_fault.h).
+///   - Several lamps that are displaced equally can mask each other.
+///   - If sd_m is smaller than the true errors of the survey, false alarms are more frequent (3 to
+///     5 % if the errors are twice as large).
 MapErrors find_map_errors(std::span<const Frame> frames, const LampMap& map,
                           const Calibration& calibration, const MapErrorOptions& options = {});
 
-/// Finds the lamps of the map that are in no frame. In a large room that is no error.
+/// Finds the lamps of the map that no frame contains. In a large room this is no error.
 std::vector<MapError> find_unseen_lamps(std::span<const Frame> frames, const LampMap& map);
 
 }  // namespace vlp

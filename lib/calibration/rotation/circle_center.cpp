@@ -20,7 +20,7 @@
 namespace vlp {
 namespace {
 
-/// The places of one lamp at one height, in units of the focal length.
+/// Observations of one lamp at one height, in units of the focal length.
 struct Trace {
   std::vector<std::size_t> sightings;
   std::vector<Eigen::Vector2d> points;
@@ -47,8 +47,8 @@ std::vector<double> distances(const Circle& circle, const std::vector<Eigen::Vec
   return off;
 }
 
-/// Of circles through three of the points, the one with the least median distance of all (least
-/// median of squares, Rousseeuw 1984), from a fixed choice of triples.
+/// Returns the circle through three of the points that has the smallest median distance to all
+/// points (least median of squares, Rousseeuw 1984). Tries a fixed sequence of triples.
 std::optional<Circle> typical_circle(const std::vector<Eigen::Vector2d>& points) {
   constexpr int triples = 200;
   std::optional<Circle> best;
@@ -72,7 +72,7 @@ constexpr double kOutlierSigmas = 4.5;
 /// Fewer points have too little redundancy to find an outlier.
 constexpr std::size_t kMinPointsToTest = 8;
 
-/// Moves points of a trace to the outliers.
+/// Moves a point of the trace to `outliers`.
 void reject(Trace& trace, std::size_t point, double distance_px,
             std::vector<SpotOutlier>& outliers) {
   outliers.push_back({trace.sightings[point], distance_px});
@@ -80,7 +80,7 @@ void reject(Trace& trace, std::size_t point, double distance_px,
   trace.points.erase(trace.points.begin() + static_cast<std::ptrdiff_t>(point));
 }
 
-/// Rejects points far from the circle that most points agree on.
+/// Rejects points far from the circle on which most points agree.
 void reject_gross_outliers(Trace& trace, double focal_px, std::vector<SpotOutlier>& outliers) {
   constexpr double rounding = 1e-9;
   auto circle = typical_circle(trace.points);
@@ -109,8 +109,8 @@ void reject_gross_outliers(Trace& trace, double focal_px, std::vector<SpotOutlie
   }
 }
 
-/// Rejects the point that is farthest from the circle, if the circle through the other points
-/// contradicts it (Student's t, the deleted residual). Returns true if there was one.
+/// Rejects the point that is farthest from the circle if the circle through the other points
+/// contradicts it (Student's t of the deleted residual). Returns true if a point was rejected.
 bool reject_worst(Trace& trace, const Circle& circle, double focal_px,
                   std::vector<SpotOutlier>& outliers) {
   constexpr double rounding = 1e-9;
@@ -122,7 +122,7 @@ bool reject_worst(Trace& trace, const Circle& circle, double focal_px,
   const auto fit = fit_circle(others);
   if (!fit) return false;
   const double count = static_cast<double>(others.size()), freedom = count - 3;
-  // The circle's own variance where the point is: 3 / n of that of a point, on average.
+  // The variance of the circle at the point is 3 / n of that of a point, on average.
   const double variance =
       std::max(fit->rms * fit->rms * count / freedom, rounding * rounding) * (1 + 3 / count);
   const double distance = distances(fit->circle, {trace.points[worst]}).front();
@@ -131,8 +131,8 @@ bool reject_worst(Trace& trace, const Circle& circle, double focal_px,
   return true;
 }
 
-/// Fits a circle without outliers, which are moved from `trace` to `outliers`. Returns std::nullopt
-/// if the points do not determine one.
+/// Fits a circle without outliers and moves them from `trace` to `outliers`. Returns std::nullopt
+/// if the points do not determine a circle.
 std::optional<CircleFit> trimmed_circle(Trace& trace, double focal_px,
                                         std::vector<SpotOutlier>& outliers) {
   if (trace.points.size() >= kMinPointsToTest) reject_gross_outliers(trace, focal_px, outliers);
@@ -144,13 +144,13 @@ std::optional<CircleFit> trimmed_circle(Trace& trace, double focal_px,
   return fit;
 }
 
-/// Returns true if the centre of a circle is determined by the yaws of its points and not only by
-/// their noise.
+/// Returns true if the yaws of the points, and not only their noise, determine the center of a
+/// circle.
 ///
-/// With unit vectors u from the centre, M = sum of (u - mean u)(u - mean u)' is the information on
-/// the centre for unit noise. Noise of sd s rotates each u by s / R and so adds
-/// (s / R)^2 sum of (t . w)^2 along w, where t is the tangent. Of points at two opposite yaws the
-/// smallest eigenvalue of M is noise alone.
+/// With unit vectors u from the center, M = sum of (u - mean u)(u - mean u)' is the information on
+/// the center for unit noise. Noise of standard deviation s rotates each u by s / R. It adds (s /
+/// R)^2 sum of (t . w)^2 along w, where t is the tangent. For points at two opposite yaws, the
+/// smallest eigenvalue of M contains only noise.
 ///
 /// @param noise  standard deviation of a coordinate, in the unit of the points
 bool is_determined(const Circle& circle, const std::vector<Eigen::Vector2d>& points, double noise) {
@@ -178,10 +178,10 @@ bool is_determined(const Circle& circle, const std::vector<Eigen::Vector2d>& poi
 /// Circles of all lamps at one height.
 struct HeightCircles {
   std::vector<LampCircle> circles;
-  /// Sightings of each circle, without outliers.
+  /// Observations of each circle, without outliers.
   std::vector<Trace> traces;
   std::vector<SpotOutlier> outliers;
-  /// Lamps with three sightings or more and no circle.
+  /// Number of lamps with three observations or more and no circle.
   int without_circle = 0;
   /// Sum of the squared distances from the circles, and its degrees of freedom.
   double squares = 0, freedom = 0;
@@ -206,9 +206,9 @@ HeightCircles fit_circles(const SpotCaptures& spot, std::size_t height, double f
   return result;
 }
 
-/// Estimates the noise of a coordinate in units of the focal length: from the circles, or, if they
-/// have three points each, from the joint fit; at least the stated noise. std::nullopt if neither
-/// residuals nor detections show it.
+/// Estimates the noise of a coordinate in units of the focal length. Uses the circles, or the joint
+/// fit if all circles have three points. Returns at least the given noise, and std::nullopt if
+/// neither residuals nor detections determine it.
 std::optional<double> estimate_noise(const std::vector<HeightCircles>& heights,
                                      const SpotCaptures& spot, const Camera& camera) {
   const double focal_px = camera.focal_px().x();

@@ -12,37 +12,48 @@
 
 namespace vlp {
 
-/// The circle that a lamp traces at one height in the plane of normalized points (x/z, y/z), which
+/// Circle that a lamp traces at one height in the plane of normalized points (x/z, y/z). This plane
 /// is the undistorted image in units of the focal length.
 struct LampCircle {
-  /// Indices in SpotCaptures.
+  /// Index in SpotCaptures::lamps.
   std::size_t lamp;
+  /// Index in SpotCaptures::heights.
   std::size_t height;
   CircleFit fit;
 };
 
+/// Result of fit_circle_centers().
 struct CircleCenters {
-  /// The mean of the centres. `yaws_rad` are those of the captures' fixes. The residual is across
-  /// the circles, each of which has three unknowns.
+  /// Mean of the circle centers. `yaws_rad` are the yaws of the captures' position fixes.
+  /// `residual_px` is the RMS distance of the points from their circles, with three unknowns per
+  /// circle.
   RotationFit mean;
   std::vector<LampCircle> circles;
-  /// Number of lamps and heights with three sightings or more that determine no circle.
+  /// Number of (lamp, height) pairs with three observations or more that determine no circle.
   int undetermined = 0;
-  /// Root of the mean squared distance of the centres from their mean: a symptom of tilt.
+  /// RMS distance of the centers from their mean, in px. A large value is a symptom of tilt.
   double spread_px = 0;
 };
 
-/// The method of Chen and Guan (section 3.1, eq. 9): a circle through the places of each lamp in
-/// the undistorted image, and the mean of their centres. On a camera that is tilted by t the centre
-/// of what a lamp at angle phi from the axis traces is not at f tan t but at
-///   f sin t cos t / (cos^2 t - sin^2 phi),
-/// so that the circles disagree, and their mean is too far out. Of eight points or more on a
-/// circle, those beyond 4.5 standard deviations are rejected: against the median of the distances,
-/// then each against the circle through the others, with Student's t (robust_scatter.h). Needs
-/// three sightings of a lamp at a height that determine the centre rather than their noise: those
-/// at two opposite yaws do not. A height counts only if most of its circles are determined. Not
-/// converged when no height counts. The model is
-/// RotationModel::shift.
+/// Fits a circle to the points of each lamp in the undistorted image and averages the circle
+/// centers.
+///
+/// @return  the mean center with model RotationModel::shift; not converged if no height is used
+///
+/// The result is biased if the camera is tilted. For a tilt t and a lamp at angle phi from the
+/// axis, the center of the lamp's trace is at
+///   f sin t cos t / (cos^2 t - sin^2 phi)
+/// instead of f tan t. The circles then disagree, and their mean is biased outwards.
+///
+/// Outliers are rejected on circles with eight points or more, at 4.5 standard deviations. The
+/// first test compares the distances with their median. The second test compares each point with
+/// the circle through the other points, with Student's t (robust_scatter.h).
+///
+/// A circle needs three observations of a lamp at one height that determine the center rather than
+/// their noise. Observations at two opposite yaws do not determine it. A height is used only if
+/// most of its circles are determined.
+///
+/// Source: Chen and Guan, section 3.1, eq. 9.
 CircleCenters fit_circle_centers(const SpotCaptures& spot, const Camera& camera);
 
 }  // namespace vlp

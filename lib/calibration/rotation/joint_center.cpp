@@ -12,7 +12,8 @@
 namespace vlp {
 namespace {
 
-/// Parameters: the centre (2), the lamp's place about it at yaw 0 (2), the yaw (1).
+/// Residual of fit_joint_center(). Parameters: the center (2), the position of the lamp about it at
+/// yaw 0 (2), the yaw (1).
 struct JointResidual {
   SpotResidual in_image;
 

@@ -7,13 +7,19 @@
 
 namespace vlp {
 
-/// One centre of rotation for all lamps in the undistorted image (lib/THEORY.md, "Rotation centre",
-/// method `joint`): the circles of eq. 9 with an angle per capture that all lamps share. Minimizes
-/// the squared distances, in the image, of the lamps from
+/// Fits one rotation center for all lamps in the undistorted image (lib/THEORY.md, "Rotation
+/// centre", method `joint`). The model is that of eq. 9 with one angle per capture that all lamps
+/// share.
+///
+/// Minimizes the squared distances of the lamps, in the image, from
 ///   z_ik = c + e^{-jg_k} q_ih
-/// over the centre c, the angles, and a place q of each lamp at each height. Exact for a level
-/// camera and captures at one height; on a tilted one c is too far out, as for `circle`
-/// (circle_center.h). The model is RotationModel::shift.
+/// over
+///   c     center
+///   g_k   yaw of capture k
+///   q_ih  position of lamp i about the center, at height h and yaw 0
+///
+/// Exact for a level camera and captures at one height. If the camera is tilted, c is biased
+/// outwards as in fit_circle_centers(). The model of the result is RotationModel::shift.
 RotationFit fit_joint_center(const SpotCaptures& spot, const Camera& camera);
 
 }  // namespace vlp

@@ -11,7 +11,7 @@
 namespace vlp {
 namespace {
 
-/// Below this, in sigmas, residuals are rounding.
+/// Residuals below this many sigmas are numeric noise.
 constexpr double kRounding = 1e-6;
 
 int free_parameters(const ceres::Problem& problem) {
@@ -74,7 +74,7 @@ bool RobustFit::minimize(double loss_width) {
   options.function_tolerance = loss_width > 0 ? 1e-4 : 1e-15;  // the last fits start from the first
   options.gradient_tolerance = 1e-14;
   options.parameter_tolerance = 1e-13;
-  options.num_threads = 1;  // the order of sums, and so their rounding, stays
+  options.num_threads = 1;  // keeps the order of sums and so their rounding
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
   ceres::Solve(options, problem(loss_width).get(), &summary);
@@ -168,7 +168,7 @@ std::vector<const double*> RobustFit::held() const {
 }
 
 std::optional<Matrix2> RobustFit::covariance(const double* parameter, const double* other) const {
-  // Ceres goes through the parameters by their addresses, and with them goes the rounding.
+  // Ceres orders the parameters by their addresses, and rounding depends on that order.
   const Places places = places_in_order();
   parameter = places.of(parameter);
   other = places.of(other);
@@ -186,7 +186,7 @@ std::optional<Matrix2> RobustFit::covariance(const double* parameter, const doub
   }
   ceres::Covariance::Options options;
   options.algorithm_type = ceres::SPARSE_QR;
-  options.sparse_linear_algebra_library_type = ceres::EIGEN_SPARSE;  // SuiteSparse takes threads
+  options.sparse_linear_algebra_library_type = ceres::EIGEN_SPARSE;  // SuiteSparse uses threads
   options.num_threads = 1;
   ceres::Covariance inverse(options);
   Eigen::Matrix<double, 2, 2, Eigen::RowMajor> block;

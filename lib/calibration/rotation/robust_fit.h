@@ -16,49 +16,55 @@
 
 namespace vlp {
 
-/// Least squares on residuals in the plane (pixels over their sigma) of which some are wrong:
-/// Cauchy's loss, its width from the residuals' median, finds them; the last fit is plain least
-/// squares without outliers: residuals beyond 4.5 standard deviations, with the limit raised for
-/// few degrees of freedom (planar_outlier_bound()). Used in this folder only, as it needs Ceres'
-/// headers.
+/// Robust least-squares problem with residuals in the plane, in pixels divided by their sigma.
+///
+/// A Cauchy loss, whose width follows from the median of the residuals, identifies outliers. The
+/// final fit is plain least squares without outliers. Outliers are residuals beyond 4.5 standard
+/// deviations; the limit is raised for few degrees of freedom (planar_outlier_bound()).
+///
+/// For internal use in this folder, because the header includes Ceres.
 class RobustFit {
  public:
-  /// @param noise_is_stated  whether residuals are in units of a stated sigma. Those within 4.5 are
-  ///                         then no outliers, even if the others scatter less
+  /// @param noise_is_stated  true if the residuals are in units of a given sigma; residuals within
+  ///     4.5 are then inliers even if the other residuals scatter less
   explicit RobustFit(bool noise_is_stated) : noise_is_stated_(noise_is_stated) {}
 
-  /// A residual of two rows and the parameters it depends on, which stay the caller's.
+  /// Adds a residual of two rows. The caller owns `parameters`, which must outlive the fit.
   void add(std::unique_ptr<ceres::CostFunction> cost, std::vector<double*> parameters);
-  /// Keeps a parameter at its value.
+  /// Fixes a parameter at its value.
   void hold(const double* parameter) { held_.push_back({parameter}); }
-  /// Keeps the first of them that a residual still depends on: all of them together have a freedom
-  /// that no residual shows.
+  /// Fixes the first of `parameters` on which a used residual depends. Removes a degree of freedom
+  /// that these parameters have in common and that no residual determines.
   void hold_one_of(std::vector<const double*> parameters) {
     held_.push_back(std::move(parameters));
   }
 
-  /// False when it does not converge.
+  /// Runs the robust fit, then refine(). Returns false if Ceres finds no usable solution.
   bool solve();
-  /// The last fit again, from where the parameters are now.
+  /// Repeats the final fit without outliers, from the current parameters. Returns false if Ceres
+  /// finds no usable solution.
   bool refine();
-  /// Indices of the residuals that were left out, in the order in which they were added.
+  /// Returns the indices of the rejected residuals, in the order of add().
   std::vector<std::size_t> outliers() const;
-  /// Length of each residual, the outliers among them.
+  /// Returns the norm of each residual, including outliers, in the order of add().
   const std::vector<double>& lengths() const { return lengths_; }
-  /// Rows of the residuals that are used, less the parameters that are free.
+  /// Returns the number of rows of the used residuals minus the number of free parameters.
   int degrees_of_freedom() const;
-  /// Derivatives of a used residual by each of its parameters, in their order; held ones too.
+  /// Derivatives of a used residual with respect to each of its parameters, including fixed ones,
+  /// in the order of add().
   struct Jacobians {
     std::size_t residual;
     std::vector<double*> parameters;
     std::vector<Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor>> by_parameter;
   };
+  /// Returns the derivatives of all used residuals.
   std::vector<Jacobians> jacobians() const;
-  /// Parameters of used residuals that the last fit held.
+  /// Returns the parameters of used residuals that the last fit kept fixed.
   std::vector<const double*> held() const;
-  /// Of parameter blocks of two, for the scatter found: their block of s^2 (J^T J)^-1, a row for
-  /// each of the first. Nothing when there are no more residuals than parameters, or the residuals
-  /// do not determine it.
+  /// Returns the block of s^2 (J^T J)^-1 of two parameter blocks of size two. Its rows belong to
+  /// `parameter`; s^2 is the variance of the residuals found. Returns std::nullopt if there are no
+  /// more residual rows than parameters, if a block is fixed or unused, or if the residuals do not
+  /// determine it.
   std::optional<Matrix2> covariance(const double* parameter, const double* other) const;
   std::optional<Matrix2> covariance(const double* parameter) const {
     return covariance(parameter, parameter);
@@ -69,7 +75,7 @@ class RobustFit {
     std::unique_ptr<ceres::CostFunction> cost;
     std::vector<double*> parameters;
   };
-  /// Where parameters are for Ceres: copies of some, the others themselves.
+  /// Addresses of the parameters for Ceres: copies of those in `begins`, the original otherwise.
   struct Places {
     mutable std::vector<double> values;
     std::map<const double*, std::size_t> begins;
@@ -80,12 +86,13 @@ class RobustFit {
       return begin == begins.end() ? parameter : &values[begin->second];
     }
   };
-  /// Copies of the parameters that are used, in the order in which residuals name them.
+  /// Returns copies of the used parameters, in the order in which residuals refer to them.
   Places places_in_order() const;
   std::unique_ptr<ceres::Problem> problem(double loss_width, const Places& places = {}) const;
   bool minimize(double loss_width);
   void measure();
-  /// Variance of the used residuals per axis, from their median, above rounding.
+  /// Estimates the variance of the used residuals per axis from their median. Never returns less
+  /// than the numeric noise.
   double variance() const;
 
   bool noise_is_stated_;

@@ -11,45 +11,46 @@
 
 namespace vlp {
 
-/// A sighting that contradicts the others and was left out of the fit.
+/// Observation that contradicts the other observations and is rejected.
 struct SpotOutlier {
   /// Index in SpotCaptures::sightings.
   std::size_t sighting;
-  /// From where the fit sees it.
+  /// Distance from the position that the fit predicts, in px.
   double distance_px;
 };
 
-/// A rotation centre as one of the methods finds it.
+/// Rotation center that one of the methods found.
 struct RotationFit {
-  /// Otherwise there is nothing below.
+  /// If false, the other members are not valid.
   bool converged = false;
-  /// Its covariances are for the scatter that the fit found, whatever sigma_px the detections state
-  /// (that only weighs them), and for the map's sd_m where the method rests on the map. Without one
-  /// if there is no scatter to measure.
+  /// Rotation center with its covariances. They are scaled by the residuals of the fit; sigma_px of
+  /// the detections only sets relative weights. They include the map's sd_m if the method depends
+  /// on the map. There is no covariance if the fit has no redundancy.
   RotationCenter center = {};
-  /// Of each capture in SpotCaptures::captures.
+  /// Yaw of each capture, rad, in the order of SpotCaptures::captures.
   std::vector<double> yaws_rad = {};
-  /// Of the image per axis, without the outliers, degrees of freedom taken off: the noise of a
-  /// pixel that the fit leaves over, sqrt(sum of squares / (measurements - unknowns)). Zero when as
-  /// many are measured as are unknown.
+  /// RMS residual of the inliers per image axis, in px: sqrt(sum of squares / (measurements -
+  /// unknowns)). It estimates the pixel noise. It is 0 if there are as many measurements as
+  /// unknowns.
   double residual_px = 0;
   std::vector<SpotOutlier> outliers = {};
-  /// Sightings that the centre is computed from, as indices in SpotCaptures::sightings.
+  /// Observations that determine the center, as indices in SpotCaptures::sightings.
   std::vector<std::size_t> used_sightings = {};
 };
 
-/// How far a camera leans, and towards where in its image up is: from x to y.
+/// Tilt of a camera. The azimuth is the direction of "up" in the image, from x to y.
 struct Tilt {
   double angle_rad;
   double azimuth_rad;
 };
+/// Returns the tilt that the zenith of `center` corresponds to.
 Tilt tilt_of(const RotationCenter& center);
 
-/// Standard deviation of the axis' direction: of the two across it the root of their mean square.
-/// Nothing without a covariance.
+/// Returns the standard deviation of the axis direction, rad: the RMS over the two directions
+/// across it. Returns std::nullopt if `center` has no covariance.
 std::optional<double> axis_sd_rad(const RotationCenter& center, const Camera& camera);
 
-/// A normalized point in the undistorted image: f * z + c.
+/// Returns the pixel f * z + c of a normalized point in the undistorted image.
 Eigen::Vector2d undistorted_pixel(const Camera& camera, const Eigen::Vector2d& z);
 
 }  // namespace vlp

@@ -64,6 +64,8 @@ SpotCaptures spot_captures(const std::vector<Frame>& frames, const LampMap& map,
   // one height, it can hide the tilt.
   const auto stated = stated_px(frames);
   const double noise_px = stated.value_or(1);
+  // A long lever arm that is mistaken for a tilt can hide a second height. Estimated at one height,
+  // a lever arm can hide the tilt.
   SpotSearch plain(frames, map, camera, noise_px, false),
       with_arm(frames, map, camera, noise_px, true);
   spot.status = plain.run();

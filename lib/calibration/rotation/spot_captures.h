@@ -16,74 +16,84 @@
 
 namespace vlp {
 
-/// One lamp in one capture.
+/// Observation of one lamp in one capture.
 struct SpotObservation {
-  /// Indices in SpotCaptures.
+  /// Index in SpotCaptures::captures.
   std::size_t capture;
+  /// Index in SpotCaptures::lamps.
   std::size_t lamp;
   Eigen::Vector2d pixel;
   double sigma_px;
-  /// Of the pixel, unit length, in the camera.
+  /// Direction of the pixel's ray in the camera, of unit length.
   Eigen::Vector3d ray;
-  /// How the pixel moves with the ray; it takes the ray itself to zero.
+  /// Derivative of the pixel with respect to the ray direction. It maps the ray itself to zero.
   Eigen::Matrix<double, 2, 3> d_pixel_d_ray;
 };
 
+/// Capture of a rotation in place.
 struct SpotCapture {
   std::string image;
   /// Index in SpotCaptures::heights.
   std::size_t height;
+  /// Yaw of the camera's position fix.
   double yaw_rad;
 };
 
-/// The captures at one height.
+/// Captures at one height.
 struct SpotHeight {
-  /// Of the camera.
+  /// Height of the camera in the world.
   double z_m;
-  /// Where the axis of rotation stands.
+  /// Position of the rotation axis in the world.
   Eigen::Vector2d axis_m;
-  /// The full turn less the widest gap between neighbouring yaws.
+  /// Angular range of the yaws: 2 pi minus the largest gap between neighboring yaws.
   double arc_rad;
+  /// Number of captures.
   int captures;
 };
 
-/// Whether captures show a turn on the spot. name and explanation are for people.
+/// Result of the check that captures are a rotation in place.
 enum class SpotStatus {
   ok,
-  other_map,         // no lamp of the map is seen, or those that are do not fit it
+  other_map,         // no lamp of the map is detected, or the detected lamps contradict it
   too_few_lamps,     // fewer than two lamps, or than two in each capture
   too_few_captures,  // fewer than three at any height
-  alike,             // all captures with one yaw
+  alike,             // all captures at one yaw
   short_arc,         // less than 90 degrees at every height
-  moved              // not on one spot
+  moved              // the axis moves between captures
 };
 
-/// What it means and what to add, for people.
+/// Describes the status and the remedy, human-readable.
 std::string_view explanation_of(SpotStatus status);
 
-/// Captures while turning on the spot about a vertical axis. At A with yaw g, the camera at lever
-/// arm e from the axis (level frame) sees lamp P, the axis at the height of the camera being its
-/// origin, at
+/// Captures of a rotation in place about a vertical axis, with approximate values of the unknowns.
+///
+/// A camera with yaw g on an axis at A, with lever arm e from the axis (level frame), sees lamp P
+/// at
 ///   x_in_camera ~ camera_from_level(zenith) (Rz(-g) (P - A) - e).
-/// The values here come from fixes with the lamp map and are good to start from: found in closed
-/// form, without a guess, in a few rounds of
-///   fix_k = A + e^{jg_k} (e + H_k delta),
-/// which is linear in A, e and in delta, what is left of the tilt. Weighted against outliers.
-/// Heights are told apart where there is a gap between the fixes' distances from the lamps, of
-/// three of their standard deviations or more, and of kLeastGap of the distance or more.
+/// The origin is on the axis at the height of the camera.
+///
+/// The values here follow from position fixes with the lamp map and are initial values for the
+/// fits. They need no initial guess: each of a few iterations solves
+///   fix_k = A + e^{jg_k} (e + H_k delta)
+/// which is linear in A, e and delta, the remaining tilt. The weights are robust against outliers.
+///
+/// Heights are separate if there is a gap between the distances of the fixes from the lamps. The
+/// gap has to be at least three of their standard deviations, and at least kLeastGap of the
+/// distance.
 struct SpotCaptures {
   SpotStatus status = SpotStatus::ok;
-  /// Those of the map that are seen, in its order.
+  /// Lamps of the map that are detected, in the order of the map.
   std::vector<Lamp> lamps;
   std::vector<SpotCapture> captures;
-  /// From low to high.
+  /// Heights of the captures, in ascending order.
   std::vector<SpotHeight> heights;
   std::vector<SpotObservation> sightings;
-  /// The middle one of the detections' sigma_px; nothing unless all state it.
+  /// Upper median of the detections' sigma_px; std::nullopt if any detection has none.
   std::optional<double> stated_px = {};
   Eigen::Vector3d zenith_in_camera = Eigen::Vector3d::UnitZ();
-  /// Zero at one height.
+  /// Lever arm in the level frame; zero if there is only one height.
   Eigen::Vector2d lever_arm_m = Eigen::Vector2d::Zero();
+  /// Rejected capture and the reason, human-readable.
   struct LeftOut {
     std::string image;
     std::string reason;
@@ -92,14 +102,16 @@ struct SpotCaptures {
   std::vector<LeftOut> left_out;
 };
 
-/// Noise apart, captures at one height differ by less than this share of their distance from the
-/// lamps: floors are uneven, lamp maps a little wrong.
+/// Smallest gap between two heights, as a fraction of the distance from the lamps. Distances of
+/// captures at one height differ by less than this, because floors are uneven and lamp maps have
+/// errors.
 inline constexpr double kLeastGap = 0.01;
-/// The least arc that determines a centre of rotation.
+/// Smallest angular range that determines a rotation center.
 inline constexpr double kLeastArc_rad = 1.5707963267948966;
 
-/// Precondition: the intrinsics are the lens model's. The other parts of `calibration` do not
-/// matter.
+/// Finds the rotation in place in the captures: yaws, heights, axes, and approximate tilt and lever
+/// arm. Members other than `status` are valid only if the status is `ok`.
+/// @pre the number of intrinsics matches the lens model
 SpotCaptures spot_captures(const std::vector<Frame>& frames, const LampMap& map,
                            const Camera& camera);
 

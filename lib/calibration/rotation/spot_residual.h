@@ -8,10 +8,12 @@
 
 namespace vlp {
 
-/// How far a lamp is seen from where a point p of the camera's frame would be, in the image, over
-/// sigma_px. To first order in the distance, without the lens: with J the derivative of the pixel
-/// at the unit ray v, for which J v = 0,
-///   residual = J p / (p . v) / sigma.
+/// Residual of a lamp observation in the image, divided by sigma_px.
+///
+/// For a lamp at point p in the camera frame, observed along the unit ray v, to first order in the
+/// distance and without evaluating the lens:
+///   residual = J p / (p . v) / sigma
+/// J is the derivative of the pixel at v, with J v = 0.
 struct SpotResidual {
   Eigen::Vector3d ray;
   Eigen::Matrix<double, 2, 3> weighted;
@@ -21,7 +23,7 @@ struct SpotResidual {
 
   template <typename T>
   void operator()(const Eigen::Matrix<T, 3, 1>& p, T* residual) const {
-    // A point to the side or behind is far off; its residual stays finite.
+    // Keeps the residual finite for points to the side or behind the camera.
     constexpr double least_cosine = 0.1;
     const T along = p.dot(ray.cast<T>()), least = p.norm() * T(least_cosine);
     Eigen::Map<Eigen::Matrix<T, 2, 1>> at(residual);

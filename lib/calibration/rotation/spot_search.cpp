@@ -14,7 +14,7 @@ namespace vlp {
 
 namespace {
 
-/// Why there are too few fixes.
+/// Returns the reason why there are too few fixes.
 SpotStatus status_of(const std::vector<FixStatus>& statuses) {
   const auto count = [&](FixStatus status) {
     return std::count(statuses.begin(), statuses.end(), status);
@@ -44,7 +44,7 @@ SpotSearch::SpotSearch(const std::vector<Frame>& frames, const LampMap& map, con
       left_out_(frames.size()) {
   calibration_.camera = camera;
   calibration_.rotation_center = {RotationModel::tilt, {0, 0}, Eigen::Vector3d::UnitZ()};
-  // A tilt that is not corrected yet is not noise.
+  // Removes sigma_px, because a tilt that is not corrected yet is no noise.
   for (Frame& frame : frames_) {
     for (Detection& detection : frame.detections) detection.sigma_px.reset();
   }
@@ -53,7 +53,8 @@ SpotSearch::SpotSearch(const std::vector<Frame>& frames, const LampMap& map, con
 SpotStatus SpotSearch::run() {
   constexpr int rough_rounds = 4, rounds = 40;
   for (int round = 0; round < rounds && !(round > rough_rounds && settled()); ++round) {
-    // Lamps contradict each other a little while the tilt is in them.
+    // The tolerance is larger while the tilt is not corrected, because lamps contradict each other
+    // then.
     locate(round < rough_rounds ? 0.3 : PositionerOptions().max_residual_share);
     if (fixes_.fixes.size() < kLeastCaptures) return status_of(statuses_);
     if (round >= rough_rounds) tell_heights_apart(fixes_, height_noise_m_);
@@ -107,7 +108,8 @@ void SpotSearch::locate(double max_residual_share) {
   height_noise_m_ = height_noise_m(found);
 }
 
-/// What the residuals let expect, a tilt that is not corrected yet among them.
+/// Estimates the standard deviation of the height of a fix from the residuals, which include the
+/// tilt that is not corrected yet.
 double SpotSearch::height_noise_m(const std::vector<Fix>& fixes) const {
   std::vector<double> of_two, of_more;
   for (const Fix& fix : fixes) {

@@ -14,55 +14,63 @@
 
 namespace vlp {
 
-/// The fixes of the captures that have one, each with the frame it is of. A spot is what is at one
-/// height: where the axis stands may change with the height.
+/// Position fixes of the captures that have one, with the index of their frame. A spot is the set
+/// of fixes at one height; each height may have another axis.
 struct SpotFixes {
   std::vector<std::size_t> frames;
   std::vector<TurningFix> fixes;
   std::size_t spots = 1;
 };
 
-/// Captures of a spot, and how far they turn.
+/// Number of captures of a spot and the angular range of their yaws.
 struct SpotArc {
   std::size_t captures;
   double arc_rad;
 };
 
+/// Smallest number of captures of a spot.
 inline constexpr std::size_t kLeastCaptures = 3;
 
-/// Gives the captures of each height a spot of their own, from low to high. `noise_m` is the
-/// standard deviation of a fix's height; see SpotCaptures.
+/// Assigns the fixes to spots by their height, from the lowest height of the camera up. Changes
+/// TurningFix::spot and SpotFixes::spots. See SpotCaptures for the criterion.
+///
+/// @param noise_m  standard deviation of the height of a fix
 void tell_heights_apart(SpotFixes& fixes, double noise_m);
 
+/// Counts the captures of each spot and computes their angular ranges.
 std::vector<SpotArc> arcs_of(const SpotFixes& fixes);
 
-/// Why none of the spots determines a centre; `ok` when one does.
+/// Returns `ok` if at least one spot determines a center, otherwise the reason why none does.
 SpotStatus status_of(const std::vector<SpotArc>& arcs);
 
-/// Takes away spots of too few captures or too small an arc. `arcs` are those of `fixes`.
+/// Removes spots with too few captures or too small an angular range. `arcs` is arcs_of(fixes).
 void drop_weak_spots(SpotFixes& fixes, const std::vector<SpotArc>& arcs);
 
-/// The height in the middle of those of a spot.
+/// Returns the upper median of the heights of a spot, as in TurningFix::height_m.
 double height_of(const SpotFixes& fixes, std::size_t spot);
 
-/// The search for the turning that captures show, see SpotCaptures: fixes of all captures, the
-/// linear fit of the turning to them, the zenith that this gives, and again until it stays.
+/// Iterative search for the rotation in place; see SpotCaptures. Each iteration locates all
+/// captures, fits the rotation model to the fixes, and updates the zenith, until the remaining tilt
+/// is below 1e-10 rad.
 class SpotSearch {
  public:
-  /// `noise_px` is that of the detections, where fixes of three lamps or more do not tell it. With
-  /// `lever_arm` it looks for one before it knows the heights. `map` has to outlive it.
+  /// @param noise_px   noise of the detections; used if no fix has three lamps or more
+  /// @param lever_arm  whether the first iterations estimate a lever arm, before the heights are
+  ///     known
+  /// @pre `map` outlives this object
   SpotSearch(const std::vector<Frame>& frames, const LampMap& map, const Camera& camera,
              double noise_px, bool lever_arm);
 
+  /// Runs the search.
   SpotStatus run();
 
-  // After a run that ended well:
+  // Valid after run() returned `ok`:
 
-  /// How far, typically, the fixes are from where they turn.
+  /// Returns the upper median of the distances of the fixes from their predicted positions, in m.
   double misfit_m() const { return upper_median(turning_.residuals_m); }
-  /// Without lamps and sightings.
+  /// Returns the captures without `lamps`, `sightings` and `stated_px`.
   SpotCaptures result() const;
-  /// Of each capture in result(), its index in the frames.
+  /// Returns the frame index of each capture in result().
   const std::vector<std::size_t>& frames() const { return fixes_.frames; }
 
  private:
@@ -76,10 +84,10 @@ class SpotSearch {
   std::vector<Frame> frames_;
   const LampMap& map_;
   double lamps_z_m_;
-  double noise_px_;  // of the detections, where the fixes do not tell it
+  double noise_px_;  // of the detections; used if the fixes have no redundancy
   bool lever_arm_;
   Calibration calibration_;
-  std::vector<std::string> left_out_;  // why, for each frame; empty for those that are used
+  std::vector<std::string> left_out_;  // reason for each frame; empty if it is used
   std::set<std::size_t> strays_;
   std::vector<FixStatus> statuses_;
   SpotFixes fixes_;

@@ -11,31 +11,34 @@
 
 namespace vlp {
 
-/// A fix of a camera that turns on the spot.
+/// Position fix of a camera that rotates in place.
 struct TurningFix {
   Pose pose;
-  /// Of the lamps over the camera.
+  /// Mean height of the lamps of the map above the camera.
   double height_m;
   /// Index of the spot.
   std::size_t spot;
 };
 
-/// What the fixes tell of the turning: fix_k = A_spot + e^{jg_k} (e + H_k delta).
+/// Rotation model fitted to position fixes: fix_k = A_spot + e^{jg_k} (e + H_k delta).
 struct Turning {
   std::vector<Eigen::Vector2d> axes_m;
   Eigen::Vector2d lever_arm_m;
-  /// What the normalized points lack: the true zenith is seen at -delta.
+  /// Error of the normalized points: the true zenith is seen at -delta.
   Eigen::Vector2d delta;
-  /// Distance of each fix from where the turning puts it.
+  /// Distance of each fix from its predicted position.
   std::vector<double> residuals_m;
 };
 
-/// Least squares with Cauchy weights, so that single wrong fixes do not matter. With `lever_arm`
-/// false it is zero, and all goes into delta. Where the fixes do not determine the answer, it is
-/// the one of least length.
+/// Fits the rotation model to the fixes by least squares with Cauchy weights, which limit the
+/// influence of outliers. If the fixes do not determine the unknowns, returns the solution of
+/// minimum norm.
+///
+/// @param lever_arm  if false, the lever arm is zero, and delta contains its effect
 Turning fit_turning(std::span<const TurningFix> fixes, std::size_t spots, bool lever_arm);
 
-/// The full turn less the widest gap between neighbouring angles; zero for fewer than two.
+/// Returns the angular range of the angles: 2 pi minus the largest gap between neighboring angles,
+/// rad. Returns 0 for fewer than two angles.
 double arc_of(std::vector<double> angles_rad);
 
 }  // namespace vlp

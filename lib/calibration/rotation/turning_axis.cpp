@@ -21,9 +21,12 @@
 namespace vlp {
 namespace {
 
-/// The residual of fit_turning_axis(). Parameters: the zenith's normalized point in the camera (2),
-/// the lever arm (2), the lamp's place on the ceiling (2), the axis and the height of the camera
-/// (3), the yaw (1); all in the world but the first two.
+/// Residual of fit_turning_axis(). Parameter blocks, in the world except for the first two:
+///   zenith    normalized point in the camera (2)
+///   lever arm (2)
+///   lamp      horizontal position (2)
+///   axis      horizontal position, and height of the camera (3)
+///   yaw       (1)
 struct AxisResidual {
   SpotResidual in_image;
   double lamp_z_m;
@@ -54,7 +57,7 @@ struct AxisResidual {
   }
 };
 
-/// What is estimated, in the world.
+/// Unknowns of the fit, in the world.
 struct State {
   Eigen::Vector2d zenith;
   Eigen::Vector2d lever_arm_m;
@@ -79,13 +82,14 @@ void add_residuals(RobustFit& fit, const SpotCaptures& spot, bool lever_arm, Sta
             {state.zenith.data(), state.lever_arm_m.data(), state.lamps_m[sighting.lamp].data(),
              state.axes_m[height].data(), &state.yaws_rad[sighting.capture]});
   }
-  // Nothing shows where the world is, how it is turned, and, of lamps at one height, how large.
+  // Residuals do not determine position and yaw of the world, nor its scale if all lamps have one
+  // height.
   fit.hold(state.axes_m.front().data());
   fit.hold_one_of(pointers_to(state.yaws_rad));
   if (!lever_arm) fit.hold(state.lever_arm_m.data());
 }
 
-/// Gives the world the size that the map has. True when it had that already.
+/// Scales the state to the size of the map. Returns true if the scale was already equal.
 bool scale_to_map(const SpotCaptures& spot, State& state) {
   const auto similarity = fit_similarity(
       spot.lamps.size(), [&](std::size_t i) { return state.lamps_m[i]; },
@@ -119,8 +123,8 @@ bool tells_lever_arm(const RotationCenter& center, const SpotCaptures& spot) {
   return std::sqrt(center.lever_arm_covariance->diagonal().maxCoeff()) <= kLooseLeverArm * height_m;
 }
 
-/// Effect of errors of the map, by its sd_m: of the lamps' heights, and of the size of the whole,
-/// which is the map's along the ceiling.
+/// Effect of errors of the map, by its sd_m, on the fit: errors of the lamps' heights, and of the
+/// size of the lamp pattern along the ceiling.
 struct MapEffect {
   /// Covariance of (zenith, lever arm).
   Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
@@ -128,14 +132,14 @@ struct MapEffect {
   double noise_fraction = 1;
 };
 
-/// Derivatives of the fit by the heights of the lamps and, in the last column, by z_1, the height
-/// of the first axis, which the fit holds: of its unknowns x, dx = -(J'J)^-1 J' (r_Z dZ + r_z1
-/// dz_1).
+/// Derivatives of the fit with respect to the heights of the lamps and, in the last column, to z_1.
+/// The height z_1 of the first axis is fixed in the fit. For the unknowns x,
+///   dx = -(J'J)^-1 J' (r_Z dZ + r_z1 dz_1)
 struct HeightDerivatives {
   /// Row of each estimated parameter in `by_heights`.
   std::map<const double*, Eigen::Index> rows;
   Eigen::MatrixXd by_heights;
-  /// The sum of the squared residuals grows by d' squares d.
+  /// Quadratic form: the sum of the squared residuals grows by d' squares d.
   Eigen::MatrixXd squares;
   double squared_residuals = 0;
 
@@ -161,7 +165,7 @@ HeightDerivatives differentiate_by_heights(const RobustFit& fit, const SpotCaptu
   for (const auto& at : all) {
     const SpotObservation& sighting = spot.sightings[at.residual];
     constexpr std::size_t axis = 3;  // in the order of AxisResidual
-    // The residual depends on the lamp's height minus the axis'.
+    // The residual depends on the height of the lamp minus that of the axis.
     Eigen::MatrixXd by_heights = Eigen::MatrixXd::Zero(2, z_1 + 1);
     by_heights.col(static_cast<Eigen::Index>(sighting.lamp)) = -at.by_parameter[axis].col(2);
     if (spot.captures[sighting.capture].height == 0) {
@@ -187,8 +191,8 @@ HeightDerivatives differentiate_by_heights(const RobustFit& fit, const SpotCaptu
   return result;
 }
 
-/// Propagates the errors of the map. scale_to_map() chooses z_1 so that, with q the lamps' places
-/// from their mean, sum q . dp = sum q . dP for errors dP of the map.
+/// Propagates the errors of the map. scale_to_map() chooses z_1 such that sum q . dp = sum q . dP
+/// for errors dP of the map, where q are the positions of the lamps relative to their mean.
 MapEffect propagate_map(const RobustFit& fit, const SpotCaptures& spot, const State& state) {
   const HeightDerivatives at = differentiate_by_heights(fit, spot);
   Eigen::Vector2d middle_m = Eigen::Vector2d::Zero();
@@ -201,8 +205,7 @@ MapEffect propagate_map(const RobustFit& fit, const SpotCaptures& spot, const St
   }
   Eigen::MatrixXd by_heights(4, at.by_heights.cols());
   by_heights << at.of(state.zenith.data()), at.of(state.lever_arm_m.data());
-  // Errors of (heights, z_1) that the errors of one lamp cause, of its height and along the
-  // ceiling.
+  // Errors of (heights, z_1) that one lamp causes by its error in height and along the ceiling.
   MapEffect effect;
   double of_map = 0;
   const Eigen::Index z_1 = size.size() - 1;
@@ -223,7 +226,7 @@ MapEffect propagate_map(const RobustFit& fit, const SpotCaptures& spot, const St
   return effect;
 }
 
-/// With the lever arm estimated, or held at zero.
+/// Fits the axis with an estimated lever arm, or with a lever arm of zero.
 RotationFit fit_axis(const SpotCaptures& spot, const Camera& camera, bool lever_arm) {
   State state = start_from(spot);
   if (!lever_arm) state.lever_arm_m.setZero();
@@ -240,7 +243,7 @@ RotationFit fit_axis(const SpotCaptures& spot, const Camera& camera, bool lever_
   const bool map_is_exact = std::all_of(spot.lamps.begin(), spot.lamps.end(), [](const Lamp& lamp) {
     return !(lamp.sd_m.value_or(0) > 0);
   });
-  // Without a lever arm any height of a lamp explains its places in the image.
+  // Without a lever arm, any height of a lamp explains its observations.
   const MapEffect map = lever_arm && zenith_covariance && !map_is_exact
                             ? propagate_map(fit, spot, state)
                             : MapEffect();
@@ -279,7 +282,7 @@ RotationFit fit_turning_axis(const SpotCaptures& spot, const Camera& camera) {
     if (!tells_lever_arm(result.center, spot)) result = fit_axis(spot, camera, false);
   }
   if (!result.converged) return result;
-  // The method is exact: what is left is noise, or the captures are of no turn about one axis.
+  // The model is exact. Large residuals mean that the captures are no rotation about one axis.
   constexpr double most_share = 0.007, most_times = 4;
   const double most_px =
       std::max(most_share * camera.focal_px().x(), most_times * spot.stated_px.value_or(0));

@@ -7,29 +7,37 @@
 
 namespace vlp {
 
-/// Lamps at several heights tell a lever arm from a tilt when its standard deviation is below this
-/// share of their height over the camera: 0.3 degrees of tilt.
+/// Largest standard deviation of a lever arm that lamps at several heights determine, as a fraction
+/// of the lamps' height above the camera. It corresponds to 0.3 degrees of tilt.
 inline constexpr double kLooseLeverArm = 0.005;
 
-/// The direction in the camera about which all lamp rays turn (lib/THEORY.md, "Rotation centre",
-/// method `axis`); lens and tilt are exact. Minimizes the squared distances, in the image, of the
-/// lamps from
+/// Fits the direction in the camera about which all lamp rays rotate (lib/THEORY.md, "Rotation
+/// centre", method `axis`). The model is exact in lens and tilt.
+///
+/// @return  the rotation center with model RotationModel::tilt; `center_px` is the zenith in the
+///     undistorted image. Not converged if the RMS residual exceeds 0.007 focal lengths and four
+///     times SpotCaptures::stated_px: the captures are then no rotation about one axis.
+///
+/// Minimizes the squared distances of the lamps, in the image, from
 ///   project(camera_from_level(zenith) (Rz(-g_k) (p_i - A_h) - e, Z_i - z_h))
-/// over the zenith, a yaw g_k per capture, the place p_i of each lamp on the ceiling (the map only
-/// says what to start from, so that its errors do not matter; the heights Z_i are the map's), the
-/// lever arm e, and, when there are captures at several heights, where the axis stands, A_h, at
-/// what height z_h. The scale is the map's: the lamps keep their size as a whole. The covariance
-/// has the errors of heights and scale by the map's sd_m.
+/// over
+///   zenith    up direction in the camera
+///   g_k       yaw of capture k
+///   p_i       horizontal position of lamp i
+///   e         lever arm
+///   A_h, z_h  position of the axis and height of the camera, for captures at several heights
+/// The heights Z_i are those of the map. The map supplies only initial values of p_i, so that its
+/// horizontal errors have no effect. The scale is that of the map: the size of the lamp pattern is
+/// kept. The covariance includes errors of heights and scale by the map's sd_m.
 ///
-/// A lever arm and a tilt shift the image by zeta - e/H, where H is the height of a lamp over the
-/// camera. Captures at several heights tell them apart, and so do, less well, lamps at several
-/// heights, by kLeastGap of H. Where all H are alike nothing does but what is of second order in
-/// the tilt, which a lens that is a little wrong resembles; then, and when the covariance says that
-/// the lamps would tell the lever arm no better than kLooseLeverArm, e is taken as zero: what is
-/// found is where the camera sees the point of the ceiling over the axis. A fix that is corrected
-/// with it is, at this height, of the axis and not of the camera.
+/// A lever arm and a tilt both displace the image, by zeta - e/H, where H is the height of a lamp
+/// above the camera. Captures at several heights separate them. Lamps whose heights differ by
+/// kLeastGap of H or more also separate them, with less precision. With a single H only
+/// second-order effects of the tilt do, which a small lens error resembles.
 ///
-/// The model is RotationModel::tilt; center_px is the zenith in the undistorted image.
+/// The lever arm is set to zero if there is a single H, or if its standard deviation would exceed
+/// kLooseLeverArm. The result is then the image of the ceiling point above the axis. At this
+/// height, a fix that is corrected with it is the position of the axis instead of the camera.
 RotationFit fit_turning_axis(const SpotCaptures& spot, const Camera& camera);
 
 }  // namespace vlp

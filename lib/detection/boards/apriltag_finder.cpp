@@ -14,16 +14,16 @@
 namespace vlp {
 namespace {
 
-/// libapriltag puts (0.5, 0.5) at the centre of the top-left pixel.
+/// Coordinate of the center of the top-left pixel in libapriltag.
 constexpr double kPixelCenter = 0.5;
-/// Half the resolution to search larger images, with equal corners: these are fitted in the full
-/// one.
+/// Number of pixels from which an image is searched at half the resolution. The corners are the
+/// same, because they are fitted at full resolution.
 constexpr int kLargePixels = 1'000'000;
 
 using DetectorPointer = std::unique_ptr<apriltag_detector_t, void (*)(apriltag_detector_t*)>;
 
-/// libapriltag's table of what corrects to which tag of a family: dear to make, only read, and the
-/// same whatever the border.
+/// libapriltag's decoding table of a tag family, which corrects bit errors. It is expensive to
+/// create, read-only, and independent of the border width.
 class Corrections {
  public:
   explicit Corrections(const std::string& name) : family_(tag_family(name)) {
@@ -38,7 +38,8 @@ class Corrections {
   DetectorPointer maker_{apriltag_detector_create(), apriltag_detector_destroy};
 };
 
-/// Made once in a process; processes that are split off afterwards share it.
+/// Returns the decoding table of a family. A process creates it once and shares it with the
+/// children that it forks afterwards.
 void* corrections_of(const std::string& family) {
   static std::mutex making;
   static std::map<std::string, Corrections> made;
@@ -78,7 +79,7 @@ class ApriltagFinder : public TagFinder {
   std::vector<SeenTag> find(const cv::Mat1b& image) const override {
     std::unique_ptr<Detector> mine = take();
     mine->detector->quad_decimate = image.cols * image.rows >= kLargePixels ? 2 : 1;
-    // It does not write, but its interface is without const.
+    // The detector does not write to the image, but its interface lacks const.
     image_u8_t view{image.cols, image.rows, static_cast<int>(image.step), image.data};
     const std::unique_ptr<zarray_t, void (*)(zarray_t*)> found(
         apriltag_detector_detect(mine->detector.get(), &view), apriltag_detections_destroy);
@@ -97,7 +98,8 @@ class ApriltagFinder : public TagFinder {
   }
 
  private:
-  /// A detector serves one thread at a time and is dear to make.
+  /// Returns an idle detector, or a new one. A detector serves one thread at a time and is
+  /// expensive to create.
   std::unique_ptr<Detector> take() const {
     {
       const std::lock_guard lock(taking_);

@@ -19,7 +19,7 @@
 namespace vlp {
 namespace {
 
-/// By OpenCV's own names; those of AprilTags' families, too.
+/// Returns OpenCV's dictionaries by name, including those of the AprilTag families.
 const std::map<std::string, int>& dictionaries() {
   using namespace cv::aruco;
   static const std::map<std::string, int> all{
@@ -97,8 +97,8 @@ class ArucoFinder : public TagFinder {
     parameters->markerBorderBits = border_bits_;
     cv::aruco::detectMarkers(image, dictionary_, corners, ids, parameters);
 #endif
-    // OpenCV counts corners clockwise from the top left; its AprilTags are turned by 180 degrees
-    // against libapriltag's.
+    // OpenCV counts corners clockwise from the top left. Its AprilTags are rotated by 180 degrees
+    // relative to libapriltag's.
     constexpr std::array<std::size_t, 4> of_markers{3, 2, 1, 0}, of_tags{1, 0, 3, 2};
     const auto& opencv_corner = charuco_ ? of_markers : of_tags;
     std::vector<SeenTag> tags(ids.size());

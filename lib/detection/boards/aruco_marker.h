@@ -8,17 +8,16 @@
 
 namespace vlp {
 
-/// A marker of one of OpenCV's dictionaries, as its ArUco module prints it, without the black
-/// border.
+/// Marker of one of OpenCV's dictionaries as printed by its ArUco module, without the black border.
 struct ArucoMarker {
-  /// Bits along an edge.
+  /// Number of bits along an edge.
   int width;
-  /// Row by row from the top left; true is white.
+  /// Bits row by row from the top left; true is white.
   std::vector<bool> white;
 };
 
-/// dictionary: as Board::family of a ChArUco board. Throws std::invalid_argument when it has no
-/// such id.
+/// Returns the marker `id` of a dictionary, named as in Board::family of a ChArUco board.
+/// @throws std::invalid_argument if there is no such dictionary, or no such id in it
 ArucoMarker aruco_marker(const std::string& dictionary, int id);
 
 }  // namespace vlp

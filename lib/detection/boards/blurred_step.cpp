@@ -11,7 +11,8 @@ namespace {
 constexpr int kPerUnit = 64;
 constexpr double kLargest = 6;  // beyond, erf is 1 to the last digit
 
-/// erf(x) = c0 + c1 d + ... + c5 d^5, d from the middle of an interval.
+/// Taylor coefficients: erf(x) = c0 + c1 d + ... + c5 d^5, with d relative to the center of an
+/// interval.
 using Series = std::array<double, 6>;
 
 double middle_of(std::size_t interval) { return (double(interval) + 0.5) / kPerUnit; }
@@ -21,7 +22,7 @@ const auto intervals = [] {
   for (std::size_t i = 0; i < all.size(); ++i) {
     const double a = middle_of(i), square = a * a;
     const double g = 2 * std::numbers::inv_sqrtpi * std::exp(-square);
-    // The slope's derivatives, over the slope: Hermite's polynomials.
+    // The ratios of the derivatives to the slope are Hermite polynomials.
     all[i] = {std::erf(a),
               g,
               g * -2 * a / 2,
@@ -35,7 +36,7 @@ const auto intervals = [] {
 }  // namespace
 
 ErrorFunction::ErrorFunction(double x) {
-  const double size = std::min(kLargest, std::abs(x));  // of no number, too
+  const double size = std::min(kLargest, std::abs(x));  // kLargest for NaN
   const auto nearest = static_cast<std::size_t>(size * kPerUnit);
   const Series& c = intervals[nearest];
   const double d = size - middle_of(nearest);

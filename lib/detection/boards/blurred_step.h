@@ -7,22 +7,23 @@
 
 namespace vlp {
 
-/// erf(x) and its derivative to 1e-11, of which the edges of tags take most of their time: by
-/// Taylor's series about the nearest of many places.
+/// Value and derivative of erf(x), accurate to 1e-11, by a Taylor series about the nearest of many
+/// tabulated positions. Fits of tag edges spend most of their time in it.
 struct ErrorFunction {
   explicit ErrorFunction(double x);
 
   double value, slope;
 };
 
-/// Of a Gaussian point spread: the inverses of its standard deviation and of sqrt(2) times that.
+/// Gaussian point spread: inverse of its standard deviation (`per_px`) and of sqrt(2) times the
+/// standard deviation (`per_scale`), in 1/px.
 struct Blur {
   explicit Blur(double px) : per_px(1 / px), per_scale(per_px / std::numbers::sqrt2) {}
 
   double per_px, per_scale;
 };
 
-/// An edge as a lens with a Gaussian point spread shows it: from -1 to 1 with the distance from it.
+/// Step from -1 to 1 blurred by a Gaussian point spread, at a distance from the edge in px:
 ///   value = erf(distance / (sqrt(2) blur))
 struct BlurredStep {
   BlurredStep(double distance_px, const Blur& blur) {
@@ -35,9 +36,9 @@ struct BlurredStep {
   }
 
   double value;
-  /// Derivatives by the distance, by the blur and by the excess kurtosis k of the line spread
-  ///   exp(-u^2 / 2) (1 + k (u^4 - 6 u^2 + 3) / 24) / (sqrt(2 pi) blur),     u = distance / blur,
-  /// at k = 0 (Gram-Charlier series).
+  /// Derivatives with respect to the distance (`slope`), the blur and the excess kurtosis k of the
+  /// line spread, at k = 0 (Gram-Charlier series):
+  ///   exp(-u^2 / 2) (1 + k (u^4 - 6 u^2 + 3) / 24) / (sqrt(2 pi) blur),     u = distance / blur.
   double slope, by_blur, by_kurtosis;
 };
 

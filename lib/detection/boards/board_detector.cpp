@@ -15,7 +15,8 @@
 namespace vlp {
 namespace {
 
-/// A corner nearer to the image's edge was fitted to edges that are cut short.
+/// Distance from the image border, in px, below which a corner is rejected: its edges are
+/// truncated.
 constexpr double kMargin = 2;
 
 cv::Mat1f smooth(const cv::Mat1b& levels) {
@@ -34,7 +35,8 @@ bool inside(const SeenTag& tag, const cv::Mat& image) {
   });
 }
 
-/// By the pixels of its bounding box, which reach into the white around it.
+/// Returns true if more than 10 % of the pixels in the bounding box of a tag are white. The box
+/// extends into the white around the tag.
 bool overexposed(const SeenTag& tag, const cv::Mat1b& levels) {
   constexpr double white = 254, enough = 0.1;
   std::vector<cv::Point2f> corners;
@@ -115,7 +117,7 @@ cv::Mat1b eight_bits(const cv::Mat& image) {
 }
 
 SeenBoard BoardDetector::detect(const cv::Mat& image) const {
-  // No tag is narrower, and libapriltag reads beyond images of a row or two.
+  // Tags are wider, and libapriltag reads out of bounds for images of one or two rows.
   constexpr int least_px = 10;
   if (std::min(image.cols, image.rows) < least_px) return {};
   const cv::Mat1b levels = eight_bits(image);

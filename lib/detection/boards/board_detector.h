@@ -21,10 +21,11 @@ class TouchingTags;
 class SquareCorners;
 struct GreyLevels;
 
-/// How an edge of a tag bows between its corners, as the pixels beside it show it: outwards of the
-/// straight line by
-///   square_px (w^2 - 1) + cube_px (w^3 - w),     w = -1 at its first corner, 1 at its second,
-/// fitted together with the corners to pixels from -reach to reach. With reach 0 nobody knows.
+/// Curvature of a tag's edge between its corners, measured from the pixels next to it. The outward
+/// distance of the edge from the straight line between the corners is
+///   square_px (w^2 - 1) + cube_px (w^3 - w),     w = -1 at its first corner, 1 at its second.
+/// The curvature is fitted together with the corners to pixels from w = -reach to reach. It is
+/// unknown if reach is 0.
 struct EdgeBow {
   double square_px = 0, cube_px = 0, reach = 0;
 
@@ -32,28 +33,32 @@ struct EdgeBow {
   bool operator==(const EdgeBow&) const = default;
 };
 
-/// Step of the light across an edge of a tag: blur of lens and pixel together, as the sigma of the
-/// Gaussian that has the same MTF50, and the light on both sides in the middle of the edge, in
-/// levels behind no tone curve. A blur of 0 is unknown.
-/// The blur is accurate to 3 % from 0.5 to 2 px, also of a disc of defocus, if the stripe inside
-/// the edge is three blurs wide. In narrower stripes it is too small.
+/// Step of the light across an edge of a tag: blur, and light on the dark and the bright side in
+/// the middle of the edge, in grey levels without tone curve.
+///
+/// The blur is that of lens and pixel together, as the sigma of the Gaussian with the same MTF50.
+/// It is 0 if unknown. It is accurate to 3 % from 0.5 to 2 px, also for the disc of a defocused
+/// lens. This requires that the stripe inside the edge is three blurs wide; in narrower stripes the
+/// blur is too small.
 struct EdgeStep {
   double blur_px = 0, dark = 0, bright = 0;
 
   bool operator==(const EdgeStep&) const = default;
 };
 
-/// A tag as an image shows it.
+/// Detection of a tag in an image.
 struct SeenTag {
-  /// As BoardTag::corners_m: bottom left, bottom right, top right, top left of the black border.
+  /// Corners in the order of BoardTag::corners_m: bottom left, bottom right, top right, top left of
+  /// the black border.
   using Corners = std::array<Eigen::Vector2d, 4>;
-  /// Of the edges from corner k to k + 1.
+  /// Curvatures of the edges from corner k to k + 1.
   using Bows = std::array<EdgeBow, 4>;
-  /// Of a corner, along any direction in the mean, by the noise of the pixels that its edges are
-  /// fitted to, with their bows known; 0 where nobody knows.
+  /// Standard deviation of each corner in px, averaged over all directions, from the noise of the
+  /// pixels that its edges are fitted to. The curvatures of the edges count as known. 0 if unknown.
   using Deviations = std::array<double, 4>;
   /// Steps across the edges from corner k to k + 1, each from a fit of this edge alone.
   using Steps = std::array<EdgeStep, 4>;
+  /// Corners and edges of a tag for one tone curve.
   struct Outline {
     Corners corners_px;
     Bows bows = {};
@@ -67,86 +72,96 @@ struct SeenTag {
   Corners corners_px;
   Bows bows = {};
   Deviations sds_px = {};
-  /// The same behind tone curves of kGammas beyond 1, until one is taken (take_curve()); of
-  /// an image that has none for sure there are none.
+  /// Fits for the tone curves of kGammas above 1, one each, until take_curve() applies a curve.
+  /// Empty for an image that certainly has no tone curve.
   std::vector<Outline> behind_curves = {};
   Steps steps = {};
 };
 
-/// A point of a board's lattice as an image shows it: a corner in which squares touch.
+/// Detection of a point of a board's lattice: a corner where squares touch.
 struct SeenPoint {
-  /// Of boards of squares row by row from the top left, as OpenCV counts a ChArUco board's corners;
-  /// of boards of AprilTags, whose points come from a file, as BoardLattice::index_of() does.
+  /// Index of the point on the board. Boards of squares: row by row from the top left, as OpenCV
+  /// counts the corners of a ChArUco board. Boards of AprilTags, whose points come from a file: as
+  /// BoardLattice::index_of().
   std::size_t index;
   Eigen::Vector2d pixel;
-  /// What its residual is multiplied by.
+  /// Factor of its residual.
   double weight = 1;
 };
 
-/// What of a board an image shows.
+/// Detection of a board in an image.
 struct SeenBoard {
-  /// By id, each once; of a ChArUco board its markers, to a pixel.
+  /// Tags of the board, sorted by id, each once. For a ChArUco board its markers, accurate to 1 px.
   std::vector<SeenTag> tags;
-  /// Tags of the family that the board does not have, in the order found; corners to 1 or 2 px.
+  /// Tags of the family that the board does not have, in the order of detection. Corners are
+  /// accurate to 1 to 2 px.
   std::vector<SeenTag> foreign = {};
-  /// Tags of the board that are left out: seen twice, or with a corner that cannot be found to a
-  /// fraction of a pixel (at the image's edge, hidden, blurred away, overexposed).
+  /// Number of rejected tags of the board: detected twice, or with a corner that cannot be measured
+  /// to a fraction of a pixel (at the image border, occluded, blurred, overexposed).
   int unusable = 0;
-  /// Of these, tags with a tenth of their pixels or more at the image's brightest level, white.
+  /// Number of rejected tags with more than 10 % white pixels (level 254 or 255 of 8 bits) in their
+  /// bounding box.
   int overexposed = 0;
-  /// Of boards of squares, and from files that hold corners without their tags: by index.
+  /// Points sorted by index, of boards of squares and from files of corners without tags.
   std::vector<SeenPoint> points = {};
-  /// Minus the logarithm of the likelihood of what edges of tags show behind curves of kGammas, up
-  /// to a constant: of the first two where there is no curve for sure. Empty where no edges are
-  /// fitted, and when a curve is taken.
+  /// Negative log-likelihood of the edges of tags for the tone curves of kGammas, up to a constant.
+  /// Only the first two if the image certainly has no tone curve. Empty if no edges are fitted, or
+  /// after take_curve().
   std::vector<double> curve_costs = {};
 
-  /// Whether there is something to calibrate from.
+  /// Returns true if there are corners for a calibration.
   bool any() const { return !tags.empty() || !points.empty(); }
 };
 
-/// The corners that a calibration rests on, by a number that is the same in every view, rising.
+/// Returns the corners that a calibration uses: the points, or else the corners of the tags. Their
+/// indices ascend and are the same in every view.
 std::vector<SeenPoint> corners_of(const SeenBoard& seen);
 
-/// Grey levels of 8 bits; of 16 bits with the brightest at 255.
+/// Converts an image to grey levels of 8 bits. 16-bit images are scaled so that their brightest
+/// pixel has level 255.
 cv::Mat1b eight_bits(const cv::Mat& image);
 
-/// Makes what finding the tags of a family takes anyway, 20 ms for tag36h11: in a process before
-/// others are split off, which share it. Throws std::invalid_argument.
+/// Creates the decoding table of a tag family, which every detection of its tags needs (20 ms for
+/// tag36h11). A process that calls it before it forks shares the table with its children.
+/// @throws std::invalid_argument if there is no such family
 void prepare_tag_family(const std::string& name);
 
-/// Finds a board's tags, or the corners of its squares (SquareCorners). Boards of AprilTags without
-/// corner squares by libapriltag, with corners where the
-/// tag's edges cross (find_exact_edges()), or its own where that fails; the gap between tags has to
-/// be white. Boards with corner squares, where tags touch, by OpenCV's ArUco module and from one to
-/// the next, with corners where the squares' edges cross (edge_crossing()). Safe to share between
-/// threads.
+/// Detector of a board's tags, or of the corners of its squares (SquareCorners). Safe to share
+/// between threads.
+///
+/// AprilTags without corner squares are detected by libapriltag. The gap between tags has to be
+/// white. Corners are the intersections of the tag's edges (find_exact_edges()), or libapriltag's
+/// if their fit fails.
+///
+/// AprilTags with corner squares, which touch each other, are detected by OpenCV's ArUco module.
+/// Missing tags are then predicted from their neighbors. Corners are the intersections of the
+/// squares' edges (edge_crossing()).
 class BoardDetector {
  public:
-  /// Throws std::invalid_argument when the detector that the board needs lacks the family or the
-  /// dictionary.
+  /// @throws std::invalid_argument if the detector for the board does not have its family or
+  ///         dictionary
   explicit BoardDetector(const Board& board);
   ~BoardDetector();
   BoardDetector(const BoardDetector&) = delete;
   BoardDetector& operator=(const BoardDetector&) = delete;
 
-  /// image: grey levels of 8 or 16 bits. The result depends on the image only.
+  /// Detects the board in an image of 8 or 16 bits. The result depends on the image only.
   SeenBoard detect(const cv::Mat& image) const;
 
  private:
-  /// With exact corners; nothing when they cannot be found.
+  /// Returns the tag with refined corners; std::nullopt if they cannot be measured.
   std::optional<SeenTag> exact(const SeenTag& tag, const GreyLevels& image) const;
 
   SeenBoard seen_squares(const cv::Mat1b& levels) const;
 
-  /// None of chessboards.
+  /// Tag detector; nullptr for chessboards.
   std::unique_ptr<TagFinder> finder_;
   std::set<int> ids_;
-  /// Of boards of squares.
+  /// Boards of squares only.
   std::unique_ptr<SquareCorners> squares_;
-  /// Of boards without corner squares.
+  /// Boards of AprilTags without corner squares only.
   std::unique_ptr<TagPrint> print_;
-  /// Of boards with corner squares.
+  /// Boards of AprilTags with corner squares only.
   std::unique_ptr<TouchingTags> touching_;
 };
 

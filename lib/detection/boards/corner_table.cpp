@@ -21,7 +21,7 @@
 namespace vlp {
 namespace {
 
-/// The corners of an image: of its tags in the order in which the table has them first.
+/// Corners of an image. The tags are in the order of their first rows in the table.
 struct ImageCorners {
   struct Corner {
     Eigen::Vector2d pixel;
@@ -64,7 +64,7 @@ SeenBoard seen_board(ImageCorners corners, const std::set<int>& ids) {
 
 constexpr std::array kBowColumns{"bow_square_px", "bow_cube_px", "bow_reach"};
 
-/// None where the table has no such columns.
+/// Reads the curvature of an edge; unknown if the table does not have the columns.
 EdgeBow bow_of(const CsvTable& csv, std::size_t row) {
   constexpr double least_reach = 0.01, most_reach = 2;
   if (std::ranges::none_of(kBowColumns, [&](auto name) { return csv.optional(name).has_value(); }))
@@ -91,7 +91,7 @@ double sd_px_of(const CsvTable& csv, std::size_t row) {
   return sd_px;
 }
 
-/// Counted as board.yaml says, points of another board do not lie in rows.
+/// Describes a row length that contradicts board.yaml; empty if the points lie in rows as expected.
 std::string wrong_rows(const Board& board, std::span<const ImageCorners> images) {
   const auto cols = static_cast<std::size_t>(board.cols - 1),
              rows = static_cast<std::size_t>(board.rows - 1);
@@ -111,7 +111,7 @@ std::string wrong_rows(const Board& board, std::span<const ImageCorners> images)
 }  // namespace
 
 std::string outside_words(const Eigen::Vector2d& pixel, const std::array<int, 2>& imager_px) {
-  constexpr double edge = 0.5;  // of the outermost pixels
+  constexpr double edge = 0.5;  // half a pixel
   const auto [width, height] = imager_px;
   if (pixel.x() >= -edge && pixel.y() >= -edge && pixel.x() <= width - edge &&
       pixel.y() <= height - edge) {

@@ -18,8 +18,8 @@ struct CrossingPixel {
   double grey;
 };
 
-/// Parameters: corner (from the guess), the angles of the edges, blur, middle, contrast, light, and
-/// how much the edges bend.
+/// Residuals and Jacobian for ceres::TinySolver. Parameters: corner relative to the guess (2),
+/// angles of the edges (2), blur, middle, contrast, light (2), curvatures of the edges (2).
 struct Crossing {
   using Scalar = double;
   enum { NUM_RESIDUALS = Eigen::Dynamic, NUM_PARAMETERS = 11 };
@@ -80,7 +80,7 @@ std::vector<CrossingPixel> pixels_around(const cv::Mat1b& image, const Eigen::Ve
   return pixels;
 }
 
-/// Middle and contrast that go with the other parameters.
+/// Computes the initial middle and contrast for the other parameters by linear regression.
 void start_levels(const std::vector<CrossingPixel>& pixels, Crossing::Parameters& p) {
   p[5] = 0;
   p[6] = 1;

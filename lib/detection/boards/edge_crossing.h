@@ -9,15 +9,21 @@
 
 namespace vlp {
 
-/// Where the edges cross at a corner in which two black squares touch, by least squares over the
-/// pixels within radius_px of guess_px:
-///   grey = (middle + contrast step(d1) step(d2)) (1 + light . (x - corner)),
-/// with d1 and d2 the distances from two parabolas through the corner, since the lens bends the
-/// edges, and steps blurred alike. The light that changes over the image (vignetting) would draw a
-/// fit without it to one side. along: the directions of the edges, roughly; the pixels should show
-/// nothing but the two squares. Nothing when the pixels look otherwise, or when the corner is more
-/// than 1.5 px from the guess. On rendered boards it is good to 0.01 px, a sixth of what
-/// saddle_point() leaves.
+/// Fits the intersection of the two edges at a corner where two black squares touch, by nonlinear
+/// least squares of the grey levels.
+///
+/// @param guess_px   approximate position of the corner
+/// @param along      approximate directions of the edges, of any length
+/// @param radius_px  radius of the pixels around guess_px; they should show only the two squares
+/// @return           std::nullopt for fewer than 16 pixels, if the pixels do not match the model,
+/// or
+///                   if the corner is more than 1.5 px from the guess
+///
+///   grey = (middle + contrast step(d1) step(d2)) (1 + light . (x - corner))
+///   d1, d2  distances from two parabolas through the corner, because the lens bends the edges
+///   step    blurred step, with the same blur for both edges
+///   light   gradient of the illumination (vignetting), which would bias a fit without it
+/// On rendered boards the corner is accurate to 0.01 px, a sixth of the error of saddle_point().
 std::optional<Eigen::Vector2d> edge_crossing(const cv::Mat1b& image,
                                              const Eigen::Vector2d& guess_px,
                                              const std::array<Eigen::Vector2d, 2>& along,

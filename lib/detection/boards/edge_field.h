@@ -7,29 +7,32 @@
 
 namespace vlp {
 
-/// A positive figure of an edge in an image, as a fit of this edge alone has it.
+/// Positive property of an edge in an image (blur or light), from a fit of this edge alone.
 struct EdgeFigure {
   Eigen::Vector2d at_px;
-  /// Of the edge.
+  /// Direction of the edge, of unit length.
   Eigen::Vector2d along;
   double value;
-  /// Standard deviation of value / the true value.
+  /// Relative standard deviation of `value`.
   double sd;
 };
 
-/// How a figure of an image's edges changes over it, slowly:
+/// Smooth model of a property of the edges over an image:
 ///   log value = c.(1, x, y, x^2, x y, y^2) + d.(cos 2 t, sin 2 t),
-/// with the place (x, y) and the edge's direction t: light falls on paper unevenly, and blur grows
-/// to the image's rim and along a motion. Robust, by least squares with weights.
+/// with the position (x, y) and the direction t of the edge. Illumination of the board is uneven;
+/// blur increases towards the image border and along a motion. Fitted by iteratively reweighted
+/// least squares, which is robust to outliers.
 class EdgeField {
  public:
   enum class Terms { place, place_and_direction };
 
-  /// Of few figures only a constant. Precondition: there is one.
+  /// Fits the model; only a constant for fewer than 32 samples.
+  /// @pre There is at least one sample.
   EdgeField(std::span<const EdgeFigure> figures, Terms terms);
 
   double value(const Eigen::Vector2d& at_px, const Eigen::Vector2d& along) const;
-  /// By how much figures are off it, beyond their own standard deviations, over the value.
+  /// Relative standard deviation of the edges from the model that exceeds their own standard
+  /// deviations.
   double apart() const { return apart_; }
 
  private:

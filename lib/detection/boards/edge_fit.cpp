@@ -18,7 +18,7 @@ namespace {
 
 constexpr double kWhite = 255;
 
-/// A level of light as the image has it, behind a tone curve, and the derivative by the light.
+/// Grey level of a light after a tone curve, and its derivative with respect to the light.
 struct Coded {
   Coded(double light, double gamma) : level(light), slope(1) {
     if (gamma == 1) return;
@@ -35,9 +35,9 @@ double light_behind(double level, double gamma) {
   return gamma == 1 ? level : kWhite * std::pow(level / kWhite, gamma);
 }
 
-/// Parameters: blur, middle, contrast, slope of the light along and across, the polynomial's. A
-/// step that is taken is asked for twice, with its derivatives the second time: they are kept from
-/// the first.
+/// Residuals and Jacobian for ceres::TinySolver. Parameters: blur, middle, contrast, slope of the
+/// light along and across the edge, coefficients of the polynomial. The solver evaluates an
+/// accepted step twice, the second time with derivatives; these are stored at the first evaluation.
 template <int terms>
 class Edge {
  public:
@@ -46,7 +46,7 @@ class Edge {
   using Parameters = Eigen::Matrix<double, NUM_PARAMETERS, 1>;
   using Jacobian = Eigen::Matrix<double, Eigen::Dynamic, NUM_PARAMETERS>;
 
-  /// Levels beyond most_told tell only that.
+  /// Levels above most_told are censored.
   Edge(const std::vector<EdgePixel>& pixels, const EdgePrior& prior, double most_told)
       : pixels_(pixels),
         prior_(prior),
@@ -69,16 +69,16 @@ class Edge {
     if (p != at_) evaluate(p);
     return residuals_.template tail<kPriors>().squaredNorm();
   }
-  /// Of a sum of parameters, by noise of one level.
+  /// Returns the variance of a linear combination `sum` of the parameters for a noise of one level.
   double variance(const Parameters& p, const Parameters& sum) const {
     if (p != at_) evaluate(p);
     const Eigen::Matrix<double, NUM_PARAMETERS, NUM_PARAMETERS> normal =
         jacobian_.transpose() * jacobian_;
     return normal.ldlt().solve(sum).dot(sum);
   }
-  /// Returns the sigma of the Gaussian with the MTF50 of the step, after one Gauss-Newton step in
-  /// which the line spread has an excess kurtosis (BlurredStep). That of a disc is -1, that of a
-  /// Gaussian 0; it stays near 0 where the pixels do not determine it.
+  /// Returns the sigma of the Gaussian with the MTF50 of the step. One Gauss-Newton step first
+  /// estimates the excess kurtosis of the line spread (BlurredStep). That of a disc is -1, that of
+  /// a Gaussian 0; it stays near 0 if the pixels do not determine it.
   double equivalent_blur(const Parameters& p) const {
     constexpr double kurtosis_sd = 0.5, min_noise = 0.3;  // in levels: that of rounding
     constexpr double min_kurtosis = -1.5, max_kurtosis = 3;
@@ -118,7 +118,7 @@ class Edge {
     }
     return blur * gaussian / s;
   }
-  /// Of the ends, in the mean, when the terms of the bow are known.
+  /// Returns EdgeFit::end_variance: the mean variance of both ends with a known curvature.
   double end_variance(const Parameters& p) const {
     constexpr int straight = 7;
     using Square = Eigen::Matrix<double, straight, straight>;
@@ -130,7 +130,7 @@ class Edge {
   }
 
  private:
-  /// The last two are the prior's.
+  /// Number of residuals of the prior, which are the last ones.
   static constexpr Eigen::Index kPriors = 2;
   Eigen::Index rows() const { return static_cast<Eigen::Index>(pixels_.size()) + kPriors; }
 
@@ -180,7 +180,8 @@ class Edge {
   mutable Jacobian jacobian_;
 };
 
-/// The mean light of pixels on both sides, and how much of the brighter one is white.
+/// Mean light of the pixels on both sides of an edge, and fraction of white pixels on the brighter
+/// side.
 struct Sides {
   Sides(const std::vector<EdgePixel>& pixels, const EdgeCurve& edge, double gamma) {
     constexpr double white = 254;
@@ -215,7 +216,7 @@ std::optional<EdgeFit> fit(EdgeCurve& edge, const std::vector<EdgePixel>& pixels
   const double most_told = runs_over ? told_then : std::numeric_limits<double>::infinity();
   const Step step(pixels, prior, most_told);
   ceres::TinySolver<Step> solver;
-  // Blur, contrast and place of a step that is seen in part nearly make up for each other.
+  // Blur, contrast and position of a saturated step are strongly correlated: slow convergence.
   solver.options.max_num_iterations = runs_over ? 60 : 15;
   solver.options.function_tolerance = runs_over ? 1e-6 : 1e-3;  // levels squared
   solver.Solve(step, &p);

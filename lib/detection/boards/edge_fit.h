@@ -8,16 +8,17 @@
 
 namespace vlp {
 
-/// A pixel beside an edge of a tag.
+/// Pixel next to an edge of a tag.
 struct EdgePixel {
-  /// w, -1 to 1 along the edge, and v, in px outwards.
+  /// Coordinates relative to the edge: w, -1 to 1 along it, and v, in px outwards.
   double along, across_px;
   double level;
-  /// How wide the stripe inside the edge is there, and how white what follows upon it, 0 to 1.
+  /// Width of the stripe inside the edge at this w, and white fraction (0 to 1) of the pattern that
+  /// adjoins the stripe.
   double stripe_px, white_behind;
 };
 
-/// A curve v = a + b w + c w^2 + d w^3 beside a straight line; at a pixel x
+/// Curve v = a + b w + c w^2 + d w^3 relative to a straight line. The coordinates of a pixel x are
 ///   w = along.(x - middle) / half_px,  v = across.(x - middle).
 struct EdgeCurve {
   static constexpr int kTerms = 3, kMostTerms = 4;
@@ -26,7 +27,7 @@ struct EdgeCurve {
   Eigen::Vector2d middle, along, across;
   double half_px;
   Coefficients coefficients = Coefficients::Zero();
-  /// d is asked for; else it is 0.
+  /// True if d is fitted; otherwise it is 0.
   bool cubic = false;
   double blur_px = 0.8;
 
@@ -34,55 +35,61 @@ struct EdgeCurve {
     const Coefficients& c = coefficients;
     return c[0] + w * (c[1] + w * (c[2] + w * c[3]));
   }
-  /// How far outside a point is.
+  /// Returns the distance of a point from the curve in px along v, positive outwards.
   double off(const Eigen::Vector2d& x) const {
     return across.dot(x - middle) - value_at(along.dot(x - middle) / half_px);
   }
-  /// Of off().
+  /// Returns the gradient of the distance from the curve.
   Eigen::Vector2d gradient(const Eigen::Vector2d& x) const;
 };
 
-/// Where two curves cross, by Newton's method from a point near it.
+/// Computes the intersection of two curves by Newton's method from a nearby point.
 Eigen::Vector2d crossing(const EdgeCurve& a, const EdgeCurve& b, Eigen::Vector2d point);
 
-/// What is known of the edges of an image before one is fitted.
+/// Prior of the edges of an image.
 struct EdgePrior {
-  /// Of the tone curve, level = 255 (light / 255)^(1 / gamma).
+  /// Tone curve, level = 255 (light / 255)^(1 / gamma).
   double gamma = 1;
-  /// About so much are the blur, and the light on the brighter side where white runs over: what
-  /// counts as pixels with the residuals weight (blur - blur_px) and weight (bright -
-  /// bright_light), in levels.
+  /// Prior of the blur and of the light on the brighter side. Each adds a residual in grey levels:
+  /// blur_weight (blur - blur_px) and bright_weight (bright - bright_light). Weight 0: no prior.
   double blur_px = 0, blur_weight = 0;
   double bright_light = 0, bright_weight = 0;
 };
 
+/// Result of fit_edge().
 struct EdgeFit {
-  /// Of the levels that are left over.
+  /// Sum of the squared residuals, in grey levels squared.
   double squares;
   std::size_t pixels;
-  /// White runs over.
+  /// True if the brighter side is saturated.
   bool runs_over;
-  /// Light on the brighter and on the darker side in the middle of the edge, in levels behind no
+  /// Light on the brighter and on the darker side in the middle of the edge, in grey levels without
   /// tone curve.
   double bright_light, dark_light;
-  /// Of where an end is across the edge, in the mean of both, by noise of one level and with the
-  /// bow known, in px^2.
+  /// Variance of the position of the ends across the edge (mean of both), in px^2. It applies to a
+  /// noise of one grey level and a known curvature.
   double end_variance = 0;
-  /// Sigma of the Gaussian whose MTF50 is that of the step, in px: the line spread may be flatter
-  /// or more peaked than a Gaussian.
+  /// Sigma of the Gaussian with the MTF50 of the step, in px. The line spread may be flatter or
+  /// more peaked than a Gaussian.
   double equivalent_blur_px = 0;
-  /// Of blur and bright_light, by noise of one level; of edges behind no curve, and not over
-  /// white, 0 for that they are well known.
+  /// Variances of the blur and of bright_light for a noise of one grey level. They are not computed
+  /// (0) for gamma 1 without saturation, where both are well determined.
   double blur_variance = 0, bright_variance = 0;
 };
 
-/// Fits an edge, from where it is, by least squares of
+/// Fits an edge to pixels by nonlinear least squares of their grey levels, with the tone curve and
+/// the priors of `prior`.
+///
+/// @param edge  initial curve and blur; overwritten by the fit
+/// @return      std::nullopt for fewer than 24 pixels, or if the pixels do not match the model
+///
 ///   light = (middle + contrast step) (1 + slope . (w, v)),
 ///   step = s(e) + white_behind (1 + s(-e - stripe_px)),     e = v - a - b w - c w^2 - d w^3,
-/// with s(e) = erf(e / (sqrt(2) blur)), in levels, behind the prior's tone curve. Where a quarter
-/// of the brighter side's pixels are white, white runs over: levels beyond 250 tell only that,
-/// since a camera's processing leaves some of them below 255. Nothing when the pixels look
-/// otherwise.
+///   s(e) = erf(e / (sqrt(2) blur))
+///
+/// The edge is saturated if at least 25 % of the pixels on the brighter side are white. Levels
+/// above 250 are then censored: residuals use min(level, 250), because the processing of a camera
+/// leaves some saturated pixels below 255.
 std::optional<EdgeFit> fit_edge(EdgeCurve& edge, const std::vector<EdgePixel>& pixels,
                                 const EdgePrior& prior);
 

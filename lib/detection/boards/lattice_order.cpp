@@ -12,7 +12,7 @@ struct Node {
   int col, row;
 };
 
-/// The mean ways, in the image, to the next point along a row and along a column.
+/// Returns the mean displacement in the image to the next point along a row and along a column.
 std::array<Eigen::Vector2d, 2> ways(const std::vector<SeenPoint>& points, std::size_t cols) {
   std::array<Eigen::Vector2d, 2> sums{Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero()};
   std::array<double, 2> counts{1e-9, 1e-9};

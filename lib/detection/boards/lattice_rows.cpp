@@ -7,7 +7,8 @@
 namespace vlp {
 namespace {
 
-/// How far the points of rows of so many are from lying evenly; NaN with too few.
+/// Returns the mean length of the second differences along rows of `row` points, in px; NaN if
+/// there are none.
 double unevenness(std::span<const LatticePixels> images, std::size_t row) {
   double sum_px = 0, count = 0;
   for (const LatticePixels& points : images) {
@@ -28,7 +29,7 @@ std::size_t row_shown(std::span<const LatticePixels> images, std::size_t stated)
   const std::size_t points = images.front().size();
   std::size_t best = stated;
   double least = std::numeric_limits<double>::infinity();
-  // Parts of a row are as even as it is.
+  // Longer rows are tried first, because a part of a row is as even as the row.
   for (std::size_t row = points / 3; row >= 3; --row) {
     if (points % row != 0) continue;
     const double px = unevenness(images, row);

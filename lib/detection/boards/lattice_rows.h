@@ -10,11 +10,12 @@
 
 namespace vlp {
 
-/// The points of a board's lattice, row by row; nothing where one was not seen.
+/// Pixels of the points of a board's lattice, row by row; std::nullopt for a missing point.
 using LatticePixels = std::vector<std::optional<Eigen::Vector2d>>;
 
-/// How many points a row has: as stated, unless with another number the points of all images
-/// together, which are of one lattice, lie along their rows twice as evenly.
+/// Estimates the number of points in a row of the lattice. Returns `stated`, unless another number
+/// makes the points of all images lie along their rows twice as evenly.
+/// @pre All images show the same lattice.
 std::size_t row_shown(std::span<const LatticePixels> images, std::size_t stated);
 
 }  // namespace vlp

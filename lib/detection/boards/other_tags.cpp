@@ -9,10 +9,10 @@
 namespace vlp {
 namespace {
 
-/// A few may be patterns that look like tags.
+/// Minimum number of tags of another pattern; fewer may be false detections.
 constexpr int kEnough = 4;
 
-/// Tags whose corners can be used, and those of other ids.
+/// Returns the number of usable tags, including those of other ids.
 int tags_in(const SeenBoard& seen) {
   return static_cast<int>(seen.tags.size() + seen.foreign.size());
 }
@@ -21,7 +21,7 @@ SeenBoard seen_in(const cv::Mat& image, const Board& board) {
   return BoardDetector(board).detect(image);
 }
 
-/// Of the largest dictionary of each number of bits.
+/// Describes markers of other dictionaries. Tries the largest dictionary of each number of bits.
 std::string other_markers(const Board& board, const cv::Mat& image) {
   constexpr const char* dictionaries[] = {"DICT_4X4_1000",       "DICT_5X5_1000",
                                           "DICT_6X6_1000",       "DICT_7X7_1000",
@@ -57,11 +57,11 @@ std::string other_tags(const Board& board, const cv::Mat& image) {
     return "the image is mirrored: mirror it back, or tell the camera not to";
   }
   if (board.kind == BoardKind::charuco) return other_markers(board, image);
-  // Families of few tags, which can be searched for quickly.
+  // Small families, whose detection is fast.
   constexpr const char* families[] = {"tag36h11", "tag25h9", "tag16h5", "tagStandard41h12",
                                       "tagCircle21h7"};
-  // Spoilt tags of the board look like a few of others: these have to be as many, and more than
-  // those that are of the board's kind.
+  // Damaged tags of the board can look like tags of other families. Another family therefore needs
+  // at least as many tags as the board's family has with unusable ones, and more than without them.
   const SeenBoard stated = seen_in(image, board);
   const int alike = tags_in(stated);
   int most = std::max({kEnough - 1, alike, alike + stated.unusable - 1});

@@ -9,9 +9,9 @@
 
 namespace vlp {
 
-/// What an image shows that has no tag of a board: a mirrored board, tags of another family, or
-/// with another border, markers of another dictionary. In
-/// one line; empty when it is none of these. It takes a second for each image.
+/// Describes in one line another pattern that an image without tags of `board` shows: a mirrored
+/// board, tags of another family or with another border, or markers of another dictionary. Returns
+/// an empty string if none of them is detected. Takes about a second per image.
 std::string other_tags(const Board& board, const cv::Mat& image);
 
 }  // namespace vlp

@@ -15,7 +15,7 @@ bool has_room(const cv::Mat1f& image, const Eigen::Vector2i& at, int radius) {
          at.y() + radius < image.rows;
 }
 
-/// Minus the determinant of the Hessian, from differences over two pixels.
+/// Returns the negative determinant of the Hessian, from differences over two pixels.
 float saddleness(const cv::Mat1f& image, int column, int row) {
   constexpr int step = 2;
   const auto at = [&](int x, int y) { return image(row + step * y, column + step * x); };
@@ -44,7 +44,8 @@ std::optional<Eigen::Vector2i> strongest_saddle(const cv::Mat1f& image,
   return best;
 }
 
-/// From the middle of the window; nothing when it is no saddle.
+/// Fits a quadratic surface in a window and returns its saddle point relative to the center of the
+/// window; std::nullopt if it has no saddle.
 std::optional<Eigen::Vector2d> offset_of_saddle(const cv::Mat1f& image,
                                                 const Eigen::Vector2i& middle, int radius) {
   Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();

@@ -8,19 +8,27 @@
 
 namespace vlp {
 
-/// An image, and smoothed, as saddle_point() takes it.
+/// Image and its smoothed copy, which saddle_point() uses.
 struct GreyLevels {
   cv::Mat1b sharp;
   cv::Mat1f smoothed;
 };
 
-/// Where two black squares touch at a corner: the saddle point of the grey levels. The pixel with
-/// the most negative determinant of the Hessian within reach_px of guess_px, then the saddle of
+/// Finds the saddle point of the grey levels at a corner where two black squares touch.
+///
+/// @param smoothed   grey levels, smoothed by about 1 px, because pixel noise and the sharp edges
+/// of
+///                   the squares would disturb the fit
+/// @param guess_px   approximate position of the corner
+/// @param reach_px   radius of the search for the initial pixel
+/// @param radius_px  radius of the window of the fit
+/// @return           std::nullopt if the fit is no saddle, its center moves more than 2 px from the
+///                   initial pixel, or a window reaches beyond the image
+///
+/// The initial pixel has the most negative determinant of the Hessian. The saddle of
 ///   a x^2 + b x y + c y^2 + d x + e y + f
-/// fitted to the pixels within radius_px of the nearest pixel, which follows the point found until
-/// it stays. Nothing when it does not stay within 2 px of that pixel, when the fit is no saddle, or
-/// at the image's edge. smoothed: grey levels, smoothed by about a pixel, without which the noise
-/// of single pixels and the squares' sharp edges would count too much.
+/// is fitted in a window around the nearest pixel. The window is moved to the fitted point until
+/// its center does not change (five iterations at most).
 std::optional<Eigen::Vector2d> saddle_point(const cv::Mat1f& smoothed,
                                             const Eigen::Vector2d& guess_px, int reach_px,
                                             int radius_px);

@@ -19,13 +19,13 @@ namespace {
 
 constexpr int kFlags = cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_EXHAUSTIVE;
 
-/// Whether the pixel lies in the image, which one that is not finite does not.
+/// Returns true if the pixel lies in the image; false if it is not finite.
 bool in_image(const Eigen::Vector2d& pixel, const cv::Mat& image) {
   return pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < image.cols && pixel.y() < image.rows;
 }
 
-/// A large image is searched in one of a half or a third of its width, which takes OpenCV a
-/// fraction of the memory; what is found there is looked at in the image itself.
+/// Returns the factor by which a large image is reduced for OpenCV's search, which then needs a
+/// fraction of the memory. Corners are refined in the full image.
 int reduction_of(const cv::Mat& image) {
   constexpr double large_px = 8e6;
   return static_cast<int>(std::ceil(std::sqrt(static_cast<double>(image.total()) / large_px)));
@@ -38,12 +38,12 @@ cv::Mat reduced(const cv::Mat& image, int times) {
   return small;
 }
 
-/// Where in a row of the image a place in the reduced one is; sizes are no multiples.
+/// Converts a coordinate in the reduced image to the full image. Their sizes need not be multiples.
 double enlarged(float at, int large, int small) {
   return (static_cast<double>(at) + 0.5) * large / small - 0.5;
 }
 
-/// Nothing is left to chance: what OpenCV draws is the same for every image.
+/// Seeds OpenCV's random number generator equally for each image, so that results are reproducible.
 void start_chance() { cv::theRNG().state = 1; }
 
 }  // namespace
@@ -102,7 +102,7 @@ std::vector<SeenPoint> SquareCorners::of_chessboard(const GreyLevels& image) con
   for (int row = 0; row < rows_; ++row) {
     for (int col = 0; col < cols_; ++col) {
       const Eigen::Vector2d here = at(col, row);
-      // The last ones look back.
+      // The last corners of a row or column use the preceding corner.
       const Eigen::Vector2d right = at(col + (col + 1 < cols_ ? 1 : -1), row);
       const Eigen::Vector2d down = at(col, row + (row + 1 < rows_ ? 1 : -1));
       guesses.push_back({static_cast<std::size_t>(row * cols_ + col),
@@ -112,7 +112,7 @@ std::vector<SeenPoint> SquareCorners::of_chessboard(const GreyLevels& image) con
     }
   }
   auto corners = exact(guesses, image);
-  // One that is hidden makes the others doubtful, too: OpenCV drew the lattice on.
+  // A single missing corner makes all others doubtful, because OpenCV extrapolates the lattice.
   return corners.size() == guesses.size() ? corners : std::vector<SeenPoint>();
 }
 
@@ -177,7 +177,7 @@ std::array<int, 2> chessboard_shown(const cv::Mat& image) {
                                    squares)) {
     return {0, 0};
   }
-  // The meta data have an entry for each corner.
+  // The metadata have one entry per corner.
   return {squares.cols + 1, squares.rows + 1};
 }
 

@@ -13,22 +13,24 @@
 
 namespace vlp {
 
-/// Finds the corners in which the squares of a chessboard or of a ChArUco board touch, where their
-/// edges cross (edge_crossing()), or else at the saddle point. Safe to share between threads.
+/// Detector of the corners where the squares of a chessboard or of a ChArUco board touch. Corners
+/// are the intersections of the edges (edge_crossing()), or the saddle points if their fit fails.
+/// Safe to share between threads.
 class SquareCorners {
  public:
   explicit SquareCorners(const Board& board);
 
-  /// Every corner of a chessboard, which has to be wholly in view, by OpenCV's
-  /// findChessboardCornersSB(); else none. Which end of it is up is not told (order_lattice()).
+  /// Detects the corners of a chessboard by OpenCV's findChessboardCornersSB(). Returns all
+  /// corners, or none if the board is not completely in view. The two ends of the board cannot be
+  /// distinguished (order_lattice()).
   std::vector<SeenPoint> of_chessboard(const GreyLevels& image) const;
 
-  /// The corners beside the markers that were found, to a pixel or two.
+  /// Detects the corners next to markers whose own corners are accurate to 1 to 2 px.
   std::vector<SeenPoint> beside(const std::vector<SeenTag>& markers, const GreyLevels& image) const;
 
  private:
-  /// A corner where it is expected, the next ones along the row and along the column, and the
-  /// distance within which there is nothing but the squares that touch there.
+  /// Prediction of a corner: its pixel, the next corners along the row and the column, and a
+  /// radius. Within this radius only the squares that touch at the corner are visible.
   struct Guess {
     std::size_t index;
     Eigen::Vector2d pixel;
@@ -42,8 +44,8 @@ class SquareCorners {
   std::vector<BoardTag> layout_;
 };
 
-/// How many squares of a chessboard, along one edge and along the other, the image shows: all, or
-/// those that are in it; {0, 0} when it shows none. image: grey levels of 8 or 16 bits.
+/// Counts the squares of a chessboard that an image of 8 or 16 bits shows, along both edges of the
+/// board. Returns {0, 0} if it shows no chessboard.
 std::array<int, 2> chessboard_shown(const cv::Mat& image);
 
 }  // namespace vlp

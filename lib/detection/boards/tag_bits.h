@@ -10,9 +10,12 @@
 
 namespace vlp {
 
-/// Whether the image shows, between the corners of `tag`, the bits of the tag with its id: the grey
-/// levels at the bits' middles, taken for white above the mean of the brightest and the darkest,
-/// differ from them in two at most. border_bits: of the printed tag.
+/// Returns true if the image shows the bits of the tag's id between the corners of `tag`. Bits are
+/// sampled at their centers. A bit is white above the mean of the brightest and the darkest sample.
+/// Up to two bits may differ. Returns false if a bit lies outside the image.
+///
+/// @param levels       grey levels of the image
+/// @param border_bits  width of the printed border, in bits
 bool shows_its_bits(const SeenTag& tag, const cv::Mat1f& levels, const apriltag_family_t& family,
                     int border_bits);
 

@@ -24,11 +24,11 @@ struct Band {
   double inside_px, outside_px;
 };
 
-/// Blur that is assumed of edges before it is known.
+/// Initial blur of edges.
 constexpr double kRoughBlur_px = 0.8;
 
-/// What follows upon the black stripe inside an edge: how wide that is, start + by_along w, and
-/// where along the edge white bits begin and end.
+/// Pattern that adjoins the black stripe inside an edge: width of the stripe, start + by_along w,
+/// and begin and end of white bits along the edge.
 struct Behind {
   double start_px = 0, by_along_px = 0;
   std::vector<std::array<double, 2>> white;
@@ -36,7 +36,7 @@ struct Behind {
   double stripe_px(double w) const { return start_px + by_along_px * w; }
 
   double white_at(double w, double half_px, double blur_px) const {
-    const Blur along_edge(blur_px);  // about; it is not solved for
+    const Blur along_edge(blur_px);  // approximate; not estimated
     double sum = 0;
     for (const auto& [from, to] : white) {
       sum += BlurredStep((w - from) * half_px, along_edge).value -
@@ -46,11 +46,11 @@ struct Behind {
   }
 };
 
-/// Returns the pixels along an edge of a tag, by where its edges are roughly, and how blurred.
+/// Returns the pixels along edge k of a tag, from approximate edges and blur.
 std::vector<EdgePixel> pixels_beside(const cv::Mat1b& image,
                                      const std::array<EdgeCurve, 4>& roughly, std::size_t k,
                                      const Behind& behind, const Band& band, double blur_px) {
-  // Of the edges beside it, which are as blurred; so the corners, which are round, are away.
+  // Distance from the two adjacent edges, in blurs. It excludes the corners, which the blur rounds.
   constexpr double free_blurs = 3.125, max_free_fraction = 0.3;
   const EdgeCurve &edge = roughly[k], &next = roughly[(k + 1) % 4],
                   &previous = roughly[(k + 3) % 4];
@@ -78,12 +78,12 @@ std::vector<EdgePixel> pixels_beside(const cv::Mat1b& image,
   return pixels;
 }
 
-/// The edges of a tag, each fitted from corner to corner.
+/// Edges of a tag, each fitted from corner to corner.
 class TagEdges {
  public:
   TagEdges(const SeenTag& tag, const cv::Mat1b& image, const TagPrint& print);
 
-  /// Whether all edges are there.
+  /// Returns true if the fits of all edges succeeded.
   bool found() const { return found_; }
   double width_px() const { return width_px_; }
   const std::array<EdgeCurve, 4>& edges() const { return edges_; }
@@ -91,17 +91,18 @@ class TagEdges {
   double squares() const;
   double pixels() const;
 
-  /// To the same pixels again, from where the edges are roughly.
+  /// Fits all edges to the same pixels again, from the approximate edges.
   void fit(const std::function<EdgePrior(const EdgeCurve& edge)>& prior_of);
 
-  /// Where the edges cross, and how they bow in between. Nothing when an edge is none, or a corner
-  /// has gone too far.
+  /// Returns the intersections of the edges, with the curvatures of the edges and the standard
+  /// deviations of the corners. Returns std::nullopt if the fit of an edge failed or a corner moved
+  /// too far.
   std::optional<SeenTag::Outline> crossed() const;
 
-  /// Returns the steps across the edges behind a tone curve; unknown ones if an edge is missing or
-  /// white runs over it. Edges that are more blurred than assumed are fitted again for them,
-  /// without the corners and bits that are as blurred. Corners remain as fitted: they lose by fewer
-  /// pixels.
+  /// Returns the steps across the edges for a tone curve; unknown ones if the fit of an edge failed
+  /// or the edge is saturated. Edges with a larger blur than the initial one are fitted again for
+  /// the steps. These fits exclude pixels near corners and bits, which are blurred as well. Corners
+  /// remain as fitted, because fewer pixels would make them less precise.
   SeenTag::Steps steps(const cv::Mat1b& image, double gamma) const;
 
  private:
@@ -113,13 +114,13 @@ class TagEdges {
   std::array<Behind, 4> behind_;
   std::array<std::vector<EdgePixel>, 4> pixels_;
   Band band_{};
-  double width_px_ = INFINITY;  // where it is narrowest
-  double bow_px_ = 0;           // of the most bent
+  double width_px_ = INFINITY;  // smallest width of the tag
+  double bow_px_ = 0;           // largest curvature of the edges
   std::array<EdgeFit, 4> fits_{};
   bool found_ = false;
 };
 
-/// Of an edge between its corners.
+/// Returns the curvature of an edge between its corners.
 EdgeBow bow_between(const EdgeCurve& edge, const Eigen::Vector2d& from, const Eigen::Vector2d& to,
                     const std::vector<EdgePixel>& pixels) {
   const Eigen::Vector2d chord = to - from, along = chord.normalized();
@@ -133,15 +134,16 @@ EdgeBow bow_between(const EdgeCurve& edge, const Eigen::Vector2d& from, const Ei
         edge.middle + edge.along * (at * edge.half_px) + edge.across * edge.value_at(at);
     return across.dot(x - from);
   };
-  // As far as pixels that lie evenly reach.
+  // Half extent of evenly distributed pixels with the same mean square.
   double squares = 0;
   for (const EdgePixel& pixel : pixels) squares += pixel.along * pixel.along;
   const double reach = std::sqrt(3 * squares / static_cast<double>(pixels.size()));
   return {-off_px(0), (off_px(-0.5) - off_px(0.5)) / 0.75, reach * 2 / (end - begin)};
 }
 
-/// Of where two edges cross: of the place of one across it, and the other,
-///   mean of both axes = (v_a + v_b) / (2 sin^2 of the angle between them).
+/// Returns the standard deviation of the intersection of two edges, averaged over both axes. With
+/// the variances v_a and v_b of the edges' positions across them:
+///   variance = (v_a + v_b) / (2 sin^2 of the angle between the edges).
 double crossing_sd_px(const EdgeCurve& a, const EdgeFit& fit_a, const EdgeCurve& b,
                       const EdgeFit& fit_b) {
   const auto variance = [](const EdgeFit& fit) {
@@ -161,9 +163,9 @@ double difference_px(const std::array<EdgeCurve, 4>& a, const std::array<EdgeCur
 
 EdgePrior without_curve(const EdgeCurve&) { return {}; }
 
-/// From the sides of the quad, which libapriltag has.
+/// Starts from the straight sides between libapriltag's corners.
 TagEdges::TagEdges(const SeenTag& tag, const cv::Mat1b& image, const TagPrint& print) : tag_(tag) {
-  // The stripe's other side outside is kept away from by 2 px: it is blurred, too.
+  // Pixels keep 2 px away from the other side of a stripe, because it is blurred, too.
   constexpr double least_px = 1.5, most_px = 4.5, away_px = 2;
   constexpr double bent_px = 0.5, no_parabola_px = 1, settled_px = 0.05;
   constexpr int most_rounds = 4;
@@ -188,7 +190,7 @@ TagEdges::TagEdges(const SeenTag& tag, const cv::Mat1b& image, const TagPrint& p
            std::clamp(print.outside() * bit_px - away_px, least_px, most_px)};
   look_beside(image, kRoughBlur_px);
   fit(without_curve);
-  // A wide lens bends an edge out of a band along the quad's side, which ends beside the corners.
+  // A wide lens bends an edge out of the band along the straight side, which misses the corners.
   for (int round = 0; round < most_rounds && found_ && bow_px_ > bent_px; ++round) {
     if (round > 0 && difference_px(edges_, roughly_) < settled_px) break;
     for (EdgeCurve& edge : edges_) {
@@ -230,7 +232,7 @@ void TagEdges::look_beside(const cv::Mat1b& image, double blur_px) {
 }
 
 void TagEdges::fit(const std::function<EdgePrior(const EdgeCurve& edge)>& prior_of) {
-  constexpr double most_bow = 0.25;  // of the tag: beyond, the fit went to something else
+  constexpr double most_bow = 0.25;  // fraction of the tag; the fit of a larger one is an outlier
   bow_px_ = 0;
   found_ = false;
   for (std::size_t k = 0; k < 4; ++k) {
@@ -247,8 +249,8 @@ void TagEdges::fit(const std::function<EdgePrior(const EdgeCurve& edge)>& prior_
 std::optional<SeenTag::Outline> TagEdges::crossed() const {
   constexpr double moved_px = 1.5, moved_share = 0.03;
   if (!found_) return {};
-  // A straight line through all of an edge ends beside it by two thirds of what that bends, and at
-  // a corner two do.
+  // A straight line fitted to an edge misses its ends by two thirds of the curvature. Two such
+  // edges meet at a corner.
   const double most_moved_px = std::max(moved_px, moved_share * width_px_) + bow_px_;
   SeenTag::Outline outline;
   SeenTag::Corners& corners = outline.corners_px;
@@ -293,8 +295,8 @@ double TagEdges::pixels() const {
   return static_cast<double>(fits_[0].pixels + fits_[1].pixels + fits_[2].pixels + fits_[3].pixels);
 }
 
-/// Minus the logarithm of the likelihood of what some tags show, up to a constant, whatever the
-/// noise; enormous when one looks otherwise.
+/// Returns the negative log-likelihood of the edges of some tags, up to a constant, with the noise
+/// eliminated; a very large value if the fit of a tag failed.
 double cost_of(std::span<const TagEdges> tags, std::span<const std::size_t> asked) {
   constexpr double least_rms = 0.1, otherwise = 1e9;
   double squares = 0, pixels = 0;
@@ -306,12 +308,12 @@ double cost_of(std::span<const TagEdges> tags, std::span<const std::size_t> aske
   return pixels * std::log(std::max(std::sqrt(squares / pixels), least_rms));
 }
 
-/// Some of an image's tags.
+/// Selection of an image's tags.
 struct SomeTags {
   std::span<const TagEdges> all;
   std::span<const std::size_t> which;
 
-  /// Each edge of those that are found.
+  /// Calls edge(curve, fit) for each edge of the tags whose fits succeeded.
   template <typename Edge>
   void for_each_edge(Edge edge) const {
     for (const std::size_t i : which) {
@@ -326,25 +328,25 @@ struct SomeTags {
   }
 };
 
-/// What the edges of an image have in common.
+/// Smooth models of the blur and the light of all edges of an image, as priors for single edges.
 class CommonEdges {
  public:
-  /// Their blur and the noise, from fits of each by itself.
+  /// Estimates the blur and the noise from independent fits of the edges.
   explicit CommonEdges(const SomeTags& tags);
-  /// The light, from fits with the blur.
+  /// Estimates the light from fits with a prior of the blur.
   void take_light(const SomeTags& tags);
 
-  /// Of an edge behind a tone curve: of its blur alone, or of its light, too.
+  /// Return the prior of an edge for a tone curve, of its blur only or of its blur and light.
   EdgePrior with_blur(const EdgeCurve& edge, double gamma) const;
   EdgePrior with_light(const EdgeCurve& edge, double gamma) const;
 
  private:
-  /// Of a level.
+  /// Standard deviation of a grey level.
   double noise_ = 0;
   std::optional<EdgeField> blur_, light_;
 };
 
-/// Nothing of figures that a fit did not tell.
+/// Fits a model to the valid samples; std::nullopt if there are none.
 std::optional<EdgeField> field_of(std::vector<EdgeFigure> figures, EdgeField::Terms terms) {
   std::erase_if(figures, [](const EdgeFigure& figure) {
     return !(figure.value > 0 && figure.sd >= 0 && std::isfinite(figure.value + figure.sd));
@@ -434,7 +436,7 @@ std::vector<double> find_exact_edges(std::span<SeenTag> tags, const cv::Mat1b& i
       }
     };
     take();
-    // The fits below share one blur, in which a blurred part of the image would be lost.
+    // The fits below use a common model of the blur, which would hide a blurred part of the image.
     for (const std::size_t i : widest) outlines[i].steps = edges[i].steps(image, gamma);
     const SomeTags found{edges, widest};
     const bool over = found.run_over();

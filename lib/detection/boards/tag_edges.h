@@ -11,27 +11,34 @@
 
 namespace vlp {
 
-/// Puts the corners of an image's tags where their four edges cross, each fitted to the pixels
-/// beside it, from corner to corner, as a parabola, since the lens bends it (fit_edge()). An edge
-/// that bends by more than 0.5 px is fitted again to the pixels beside what was found, and beyond
-/// 1 px with a cubic term: libapriltag's straight lines, where the pixels are looked for at first,
-/// end up to 4 px beside the corners of a tag at the rim of a wide lens. On rendered boards corners
-/// are good to 0.02 px, of tags of 16 px and at the rim of a lens of 190 degrees, too. The corners
-/// of a tag stay of which an edge looks otherwise, or one would move by more than 1.5 px, and than
-/// 3 % of the tag, and what its edges bend.
+/// Refines the corners of tags in an image: moves them to the intersections of the four edges of
+/// each tag. Sets their curvature, standard deviation and steps.
 ///
-/// Behind a tone curve an edge is steeper on its dark side, which draws the fit there, by more the
-/// narrower the stripes are. So they are fitted behind each of kGammas (SeenTag::behind_curves),
-/// unless the image tells that there is none.
+/// @param tags   tags with the corners of libapriltag; corrected in place
+/// @return       SeenBoard::curve_costs, from the eight widest tags
 ///
-/// Behind a curve, and more so where white runs over, blur, contrast and place of an edge are hard
-/// to tell apart: at 1.5 times white its place alone is known ten times worse than with the blur
-/// known, and 2.5 times better again with the light that its white would show. Both change slowly
-/// over an image (EdgeField). So edges are fitted again with the blur that the others have there,
-/// and where white runs over once more with the light, too; each may differ from the others by as
-/// much as they do beyond their noise.
+/// Edges. Each edge is fitted to the pixels next to it, from corner to corner, as a parabola,
+/// because the lens bends it (fit_edge()). The pixels are first those next to libapriltag's
+/// straight lines. At the rim of a wide lens these lines miss the corners by up to 4 px. An edge
+/// with a curvature above 0.5 px is therefore fitted again to the pixels next to the fitted curve.
+/// Above 1 px the curve has a cubic term.
 ///
-/// Returns what the eight widest tags tell of the curve (SeenBoard::curve_costs).
+/// Limits. On rendered boards corners are accurate to 0.02 px, also for tags of 16 px and at the
+/// rim of a lens of 190 degrees. A tag keeps its corners if the fit of an edge fails. It also keeps
+/// them if a corner would move by more than max(1.5 px, 3 % of the tag width) plus the largest
+/// curvature of its edges.
+///
+/// Tone curve. A tone curve makes an edge steeper on its dark side, which biases the fit towards
+/// that side. The bias grows as the stripes get narrower. Edges are therefore fitted for each of
+/// kGammas (SeenTag::behind_curves), unless the image shows that it has no tone curve.
+///
+/// Blur and saturation. With a tone curve, and even more if white is saturated, the blur, contrast
+/// and position of an edge are strongly correlated. At an exposure of 1.5 times white, a known blur
+/// improves the standard deviation of the position by a factor of 10. The known light of the bright
+/// side improves it by another factor of 2.5. Both change slowly over an image (EdgeField). Edges
+/// are therefore fitted again with the blur of the neighboring edges as a prior, and saturated
+/// edges once more with their light. The prior allows for the differences between edges that exceed
+/// their noise.
 std::vector<double> find_exact_edges(std::span<SeenTag> tags, const cv::Mat1b& image,
                                      const TagPrint& print);
 

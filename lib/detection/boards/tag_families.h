@@ -11,14 +11,15 @@ namespace vlp {
 
 using TagFamily = std::unique_ptr<apriltag_family_t, void (*)(apriltag_family_t*)>;
 
-/// libapriltag's family of that name, one of those of Board::family; not to be shared between
-/// detectors. Throws std::invalid_argument.
+/// Creates libapriltag's family with a name of Board::family. Detectors must not share it.
+/// @throws std::invalid_argument if there is no such family
 TagFamily tag_family(const std::string& name);
 
-/// How many bits wide a tag is whose border is printed border_bits wide, for the family's one.
+/// Returns the width of a tag in bits if its border is `border_bits` wide, instead of one bit as in
+/// the family.
 int width_in_bits(const apriltag_family_t& family, int border_bits);
 
-/// Whether a bit of a tag, one of family.nbits, is white.
+/// Returns true if bit `bit` (below family.nbits) of the tag `id` is white.
 bool is_white(const apriltag_family_t& family, int id, uint32_t bit);
 
 }  // namespace vlp

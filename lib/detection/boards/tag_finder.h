@@ -10,20 +10,21 @@
 
 namespace vlp {
 
-/// Finds every tag of a board's family in an image of 8 bits: corners in libapriltag's order, pixel
-/// centres at whole numbers. Safe to share between threads.
+/// Detector of all tags of a board's family in an image of 8 bits. Corners are in libapriltag's
+/// order; pixel centers have integer coordinates. Safe to share between threads.
 class TagFinder {
  public:
   virtual ~TagFinder() = default;
   virtual std::vector<SeenTag> find(const cv::Mat1b& image) const = 0;
 };
 
-/// By libapriltag: tags with white around them; corners are good to 0.05 px.
+/// Creates a detector by libapriltag, for tags surrounded by white. Corners are accurate to 0.05
+/// px.
 std::unique_ptr<TagFinder> apriltag_finder(const Board& board);
 
-/// By OpenCV's ArUco module: also tags that black squares touch; corners are good to 1 or 2 px.
-/// Or the markers of a ChArUco board. Throws std::invalid_argument for families and dictionaries
-/// that it lacks.
+/// Creates a detector by OpenCV's ArUco module, for tags whose corners touch black squares and for
+/// the markers of ChArUco boards. Corners are accurate to 1 to 2 px.
+/// @throws std::invalid_argument if OpenCV does not have the family or dictionary
 std::unique_ptr<TagFinder> aruco_finder(const Board& board);
 
 }  // namespace vlp

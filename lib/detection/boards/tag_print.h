@@ -11,24 +11,26 @@
 
 namespace vlp {
 
-/// What is printed beside the edges of a board's tags, in bits, from a tag's edge.
+/// Printed pattern next to the edges of a board's tags, in bits.
 class TagPrint {
  public:
-  /// From and to, along a side from its first corner.
+  /// Segment along a side; distances from the first corner of the side.
   struct Run {
     double from, to;
   };
-  /// Of the sides from corner k to k + 1, as SeenTag has them.
+  /// Segments of each side, from corner k to k + 1 in the order of SeenTag.
   using Sides = std::array<std::vector<Run>, 4>;
 
-  /// Throws std::invalid_argument for a family that libapriltag lacks.
+  /// @throws std::invalid_argument if libapriltag does not have the family
   explicit TagPrint(const Board& board);
 
+  /// Width of a tag, with its border.
   double width() const { return width_; }
-  /// How wide the stripes of one colour along an edge are.
+  /// Width of the uniform stripe along an edge, inside and outside the tag.
   double inside() const { return inside_; }
   double outside() const { return outside_; }
-  /// Where white bits follow upon the black stripe inside; none of families whose border is white.
+  /// Returns the segments in which white bits adjoin the black stripe inside the edge. Empty for
+  /// families with a white border.
   Sides white_behind(int id) const;
 
  private:

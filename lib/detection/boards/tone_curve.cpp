@@ -9,13 +9,14 @@
 namespace vlp {
 namespace {
 
-/// Through values at three of kGammas, from `first` on, over x, the logarithm of gamma.
+/// Parabola through values at three successive entries of kGammas from `first` on, as a function of
+/// x = log(gamma).
 struct Parabola {
   std::size_t first;
 
   double x(std::size_t i) const { return std::log(kGammas[first + i]); }
 
-  /// What the three values count at an x.
+  /// Returns the weights of the three values at an x (Lagrange interpolation).
   std::array<double, 3> weights(double at) const {
     std::array<double, 3> weights{1, 1, 1};
     for (std::size_t i = 0; i < 3; ++i) {
@@ -26,7 +27,7 @@ struct Parabola {
     return weights;
   }
 
-  /// Where it is least between its ends.
+  /// Returns the x of the minimum between both ends.
   double least(const std::array<double, 3>& values) const {
     const double low = (values[1] - values[0]) / (x(1) - x(0));
     const double high = (values[2] - values[1]) / (x(2) - x(1));
@@ -36,7 +37,7 @@ struct Parabola {
   }
 };
 
-/// Through the least of some costs and its neighbours.
+/// Returns the parabola through the smallest cost and its neighbors.
 Parabola near_least(const PerCurve& costs) {
   const auto best =
       static_cast<std::size_t>(std::min_element(costs.begin(), costs.end()) - costs.begin());
@@ -92,7 +93,7 @@ double take_curve(std::vector<BoardView>& views, const PerCurve& costs) {
       for (std::size_t k = 0; k < 4; ++k) {
         tag.corners_px[k].setZero();
         tag.bows[k].square_px = tag.bows[k].cube_px = 0;
-        // A parabola can go below 0.
+        // Linear interpolation, because a parabola can become negative.
         const double below_px = behind[below].sds_px[k], above_px = behind[below + 1].sds_px[k];
         const bool known = below_px > 0 && above_px > 0;
         tag.sds_px[k] = known ? (1 - share) * below_px + share * above_px : 0;

@@ -10,25 +10,27 @@
 
 namespace vlp {
 
-/// Of the tone curves level = 255 (light / 255)^(1 / gamma) behind which edges are fitted: from
-/// none to the steepest of cameras for people.
+/// Gammas of the tone curves level = 255 (light / 255)^(1 / gamma) for which edges are fitted: from
+/// no curve to the steepest curve of consumer cameras.
 inline constexpr std::array kGammas{1.0, 1.3, 1.6, 2.0, 2.4};
 
-/// A figure for each of kGammas.
+/// One cost per entry of kGammas.
 using PerCurve = std::array<double, kGammas.size()>;
 
-/// What the levels beside the edges of tags say against each curve (SeenBoard::curve_costs), of all
-/// images together: each counts 1000 at most, whatever is in it.
+/// Sums the costs of the tone curves (SeenBoard::curve_costs) over all images. The costs of an
+/// image are relative to its smallest one and limited to 1000.
 PerCurve costs_of_levels(const std::vector<BoardView>& views);
 
-/// Gamma where costs are least, by a parabola through the least and its neighbours, over the
-/// logarithm of gamma.
+/// Estimates the gamma with the smallest cost, by a parabola over log(gamma) through the smallest
+/// of `costs` and its neighbors.
 double gamma_of(const PerCurve& costs);
 
-/// Puts corners where they are behind the curve of gamma_of(), which is returned: by a parabola
-/// through those of the same three of kGammas. Of less than 1.2 it is taken for none, 1, as
-/// sharpening makes so much. An image that has none for sure keeps its corners. What curves make of
-/// corners is gone from the views then.
+/// Corrects the tags of all views for the tone curve with gamma_of(costs) and returns this gamma.
+/// Returns 1 and changes no corner if gamma is below 1.2: sharpening has a similar effect.
+///
+/// Interpolates corners and edge curvatures by a parabola through the fits for the same three of
+/// kGammas, and standard deviations and steps linearly. An image that certainly has no tone curve
+/// keeps its corners. Clears SeenTag::behind_curves and SeenBoard::curve_costs in all views.
 double take_curve(std::vector<BoardView>& views, const PerCurve& costs);
 
 }  // namespace vlp

@@ -60,7 +60,7 @@ std::optional<SeenTag> TouchingTags::exact(SeenTag tag, const GreyLevels& image)
 std::optional<SeenTag> TouchingTags::expected(const BoardTag& missing,
                                               const std::vector<SeenTag>& tags) const {
   constexpr std::size_t enough = 4;
-  constexpr double reach = 2.2;  // in tags: neighbours, with those across a corner
+  constexpr double reach = 2.2;  // in tags: neighbors, including diagonal ones
   std::vector<std::pair<double, const SeenTag*>> near;
   for (const SeenTag& tag : tags) {
     const auto at = std::find_if(layout_.begin(), layout_.end(),

@@ -13,17 +13,19 @@
 
 namespace vlp {
 
-/// The exact corners of tags that black squares touch, and the tags that were not found at first.
+/// Refinement of tags whose corners touch black squares, and detection of tags that the first
+/// detector missed.
 class TouchingTags {
  public:
   explicit TouchingTags(const Board& board);
 
-  /// The tag with its corners where edges cross near the saddle points near them; nothing when one
-  /// is not found, or when the bits between them are not the tag's.
+  /// Returns the tag with refined corners: the intersections of the edges next to the saddle points
+  /// at its corners, or the saddle points. Returns std::nullopt if a saddle point is not found, or
+  /// if the bits between the corners are not those of the tag.
   std::optional<SeenTag> exact(SeenTag tag, const GreyLevels& image) const;
 
-  /// The tags of the board that are not among `tags`, which are exact, but lie where a homography
-  /// of the nearest of these takes them, as far as they can be made exact.
+  /// Finds tags of the board that are missing in `tags`, which are refined. Predicts their position
+  /// by a homography of the nearest tags. Returns those that exact() accepts.
   std::vector<SeenTag> others(const std::vector<SeenTag>& tags, const GreyLevels& image) const;
 
  private:
@@ -33,7 +35,8 @@ class TouchingTags {
   TagFamily family_;
   int border_bits_;
   double tag_size_m_;
-  /// Of a tag's edge: the width of a corner square or of the black border, what is less.
+  /// Width of a corner square or of the black border, whichever is smaller, as a fraction of a
+  /// tag's edge.
   double free_share_;
 };
 

@@ -11,28 +11,32 @@
 
 namespace vlp {
 
-/// Bias against scatter, over the stations that have two fixes or more.
+/// Bias and repeatability over the reference points with two fixes or more.
 struct BiasAndScatter {
+  /// Reference point and the statistics of its fixes.
   struct Station {
-    /// Where its first capture was.
+    /// True position of its first capture.
     Eigen::Vector2d xy_m;
     std::size_t fixes;
-    /// The mean of its horizontal errors e.
+    /// Mean of its horizontal errors e.
     Eigen::Vector2d bias_m;
-    /// sqrt(sum |e - bias|^2 / (fixes - 1)): horizontal, of x and y together.
+    /// Horizontal standard deviation of x and y together, sqrt(sum |e - bias|^2 / (fixes - 1)).
     double sd_m;
   };
-  /// In the order of the truth.
+  /// Reference points in the order of the ground truth.
   std::vector<Station> stations;
   std::size_t fixes;
-  /// sqrt(sum |e - bias of its station|^2 / (fixes - stations)): what repeating a fix changes.
+  /// Repeatability within reference points, sqrt(sum |e - bias of its station|^2 / (fixes -
+  /// stations)).
   double scatter_m;
-  /// What it does not: root of the mean, over the fixes, of |bias of the station|^2, less what
-  /// chance puts into the means: (sum |bias|^2 - stations scatter^2) / fixes, and not below zero.
+  /// RMS bias of the reference points, weighted by fixes and corrected for the scatter of the
+  /// means: sqrt((sum |bias|^2 - stations scatter^2) / fixes), where the sum is over the fixes. Not
+  /// below zero.
   double bias_m;
 };
 
-/// Of errors_against_truth(). Nothing when no station has two fixes.
+/// Computes bias and scatter from the errors of errors_against_truth(). Returns std::nullopt if no
+/// reference point has two fixes.
 std::optional<BiasAndScatter> bias_and_scatter(const std::vector<FixError>& errors,
                                                const std::vector<TruthRow>& truth);
 

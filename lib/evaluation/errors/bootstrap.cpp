@@ -17,12 +17,13 @@ namespace {
 
 constexpr std::size_t kDraws = 2000, kMostParts = 1000, kRanks = 256;
 
-/// In [0, count). Precondition: count < 2^32.
+/// Draws a number in [0, count).
+/// @pre count < 2^32
 std::size_t below(std::size_t count, SplitMix& random) {
   return static_cast<std::size_t>(((random() >> 32) * count) >> 32);
 }
 
-/// The part that each error belongs to, and how many parts there are.
+/// Group of each error, number of groups, number of clusters.
 struct Parts {
   std::vector<std::uint32_t> of_error;
   std::size_t count = 0, units = 0;
@@ -31,7 +32,7 @@ struct Parts {
 Parts dealt_out(std::span<const std::size_t> units) {
   const std::size_t numbers = *std::max_element(units.begin(), units.end()) + 1;
   constexpr std::uint32_t none = ~std::uint32_t{0};
-  std::vector<std::uint32_t> part_of(numbers, none);  // at first: the unit's place among all
+  std::vector<std::uint32_t> part_of(numbers, none);  // rank of the cluster by first occurrence
   Parts parts;
   for (const std::size_t unit : units) {
     if (part_of[unit] == none) part_of[unit] = static_cast<std::uint32_t>(parts.units++);
@@ -50,7 +51,7 @@ Parts dealt_out(std::span<const std::size_t> units) {
   return parts;
 }
 
-/// The errors in a form in which a draw of parts costs little.
+/// Errors preprocessed so that a resample of groups is cheap.
 class Resampler {
  public:
   Resampler(std::span<const double> errors, const Parts& parts)
@@ -100,14 +101,14 @@ class Resampler {
     double count = 0, sum = 0, squares = 0;
   };
 
-  /// The sum of the weights of all errors before rank * step_.
+  /// Returns the sum of the weights of all errors before rank * step_.
   double weight_below(const std::vector<std::uint32_t>& weights, std::size_t rank) const {
     const auto counts = counts_below_.begin() + static_cast<std::ptrdiff_t>(rank * parts_);
     return static_cast<double>(
         std::inner_product(weights.begin(), weights.end(), counts, std::uint64_t{0}));
   }
 
-  /// The smallest error such that it and those before it weigh `wanted`.
+  /// Returns the smallest error for which the cumulative weight reaches `wanted`.
   double quantile(const std::vector<std::uint32_t>& weights, double wanted) const {
     constexpr double rounding = 1e-6;
     wanted -= rounding;
@@ -127,7 +128,7 @@ class Resampler {
   std::size_t parts_, step_ = 1;
   std::vector<Totals> totals_;
   std::vector<Error> sorted_;
-  std::vector<std::uint32_t> counts_below_;  // at each multiple of step_, of each part
+  std::vector<std::uint32_t> counts_below_;  // at each multiple of step_, by group
 };
 
 Interval percentiles(std::vector<double> drawn) {

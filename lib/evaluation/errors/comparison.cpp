@@ -13,7 +13,7 @@
 namespace vlp {
 namespace {
 
-/// That every image of `fixes` is in `others`.
+/// Checks that every image of `fixes` is in `others`.
 void check_images_in(const FromFile<FixRow>& fixes, const FromFile<FixRow>& others) {
   NameIndex images(others.rows.size());
   for (const FixRow& row : others.rows) images.insert(row.image);

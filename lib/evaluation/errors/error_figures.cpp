@@ -8,7 +8,7 @@
 namespace vlp {
 namespace {
 
-/// Where the quantile stands among so many sorted values.
+/// Returns the index of a quantile in `count` sorted values.
 std::size_t rank_of(double share, std::size_t count) {
   constexpr double rounding = 1e-9;  // 0.07 x 100 is more than 7
   const double below = std::ceil(share * static_cast<double>(count) - rounding);

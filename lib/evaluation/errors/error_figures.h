@@ -9,28 +9,31 @@
 
 namespace vlp {
 
-/// What errors amount to, in their unit. Quantiles are the smallest error that such a share of all
-/// does not exceed: always one that is there, never one in between.
+/// Statistics of errors, in their unit. A quantile is the smallest error that the given fraction of
+/// all errors does not exceed. It is an element of the data, never interpolated.
 struct ErrorFigures {
   std::size_t count;
   double mean, median, p90, max, rms;
 };
 
-/// The smallest of the sorted values that `share` of all do not exceed. Preconditions: not empty,
-/// 0 < share <= 1.
+/// Returns the smallest of the sorted values that the given fraction of all does not exceed.
+/// @pre not empty, 0 < fraction <= 1
 double quantile(std::span<const double> sorted, double share);
 
-/// Of errors without sign. Precondition: not empty.
+/// Computes the statistics of errors without sign.
+/// @pre not empty
 ErrorFigures figures_of(std::vector<double> errors);
 
-/// Errors with a sign, such as those of heights: their mean, and the figures of their sizes.
+/// Statistics of errors with a sign, such as heights: their mean, and the statistics of their
+/// absolute values.
 struct SignedFigures {
   double bias;
   ErrorFigures sizes;
 };
 SignedFigures signed_figures_of(std::vector<double> errors);
 
-/// The distribution function: shares, and the quantiles there. At 1 %, 2 %, ..., 100 %.
+/// Returns the cumulative distribution as pairs of fraction and quantile, at 1 %, 2 %, ..., 100 %.
+/// @pre not empty
 std::vector<std::pair<double, double>> distribution_of(std::vector<double> errors);
 
 }  // namespace vlp

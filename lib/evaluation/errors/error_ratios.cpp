@@ -12,7 +12,7 @@
 namespace vlp {
 namespace {
 
-/// Of errors in units of their standard deviations: root of the mean of squares, share within 95 %.
+/// Accumulator of normalized errors: root mean square, and fraction within 95 %.
 class Ratios {
  public:
   void add(double value) {
@@ -64,7 +64,7 @@ std::optional<LimitRatio> limit_ratio(const std::vector<FixError>& errors,
                                       const std::vector<TruthRow>& truth, const LampMap& lamps,
                                       const Camera& camera, double noise_px, int threads) {
   const Lens lens(camera.lens_model, camera.intrinsics);
-  std::vector<Eigen::Matrix2d> limits_m2(errors.size(), Eigen::Matrix2d::Zero());  // 0: none
+  std::vector<Eigen::Matrix2d> limits_m2(errors.size(), Eigen::Matrix2d::Zero());  // 0: no limit
   in_parallel(errors.size(), threads, [&](std::size_t i) {
     const TruthRow& place = truth[errors[i].truth];
     if (!place.z_m || !place.yaw_rad) return;

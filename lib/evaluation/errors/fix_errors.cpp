@@ -12,7 +12,7 @@
 namespace vlp {
 namespace {
 
-/// Finds rows of the truth by image, fastest in the order in which they stand.
+/// Finds rows of the ground truth by image; fastest for images in the order of the rows.
 class RowOfImage {
  public:
   explicit RowOfImage(const std::vector<TruthRow>& truth) : truth_(truth) {}
@@ -34,7 +34,7 @@ class RowOfImage {
   std::optional<NameIndex> index_;
 };
 
-/// The truth's row of each fix.
+/// Returns the row of the ground truth for each fix.
 std::vector<std::size_t> matched(const FromFile<FixRow>& fixes, const FromFile<TruthRow>& truth) {
   RowOfImage row_of_image(truth.rows);
   std::vector<std::size_t> rows;

@@ -16,47 +16,55 @@
 
 namespace vlp {
 
-/// How wrong a fix is: fix minus truth, in the world.
+/// Error of a fix: fix minus ground truth, in the world.
 struct FixError {
-  std::size_t fix;  // of the rows of fixes
+  std::size_t fix;  // index into the rows of fixes
   Eigen::Vector2d horizontal_m;
-  /// Where the truth says the height, or the yaw.
+  /// Only if the ground truth has the height, or the yaw.
   std::optional<double> height_m, yaw_rad;
-  /// Errors of one unit go together, those of two are taken for independent: the station, or the
-  /// run of fixes along a path.
+  /// Cluster of correlated errors; errors of different clusters are assumed independent. It is a
+  /// reference point, or a run of fixes along a path.
   std::size_t unit;
-  /// Of the rows of the truth; 0 when there is none.
+  /// Index into the rows of the ground truth; 0 without one.
   std::size_t truth = 0;
 };
 
+/// Errors of all fixes and the captures without a fix.
 struct FixErrors {
-  /// Captures that should have a fix.
+  /// Number of captures that should have a fix.
   std::size_t captures = 0;
-  /// Those without, by their status.
+  /// Number of captures without a fix, by status.
   std::map<std::string, std::size_t> missing;
-  /// In the order of the fixes.
+  /// Errors in the order of the fixes.
   std::vector<FixError> errors;
 };
 
-/// A table and the file it came from, for what there is to say about its rows.
+/// Table with the file it was read from, for messages about its rows.
 template <typename Row>
 struct FromFile {
   std::filesystem::path file;
   std::vector<Row> rows;
 };
 
-/// Errors by image. Captures are the truth's; one that has no row in the fixes is missing with the
-/// status "no row". Units are stations: captures whose true places are within `station_m`. Throws
-/// InputError when images of the fixes are not in the truth: how many, and where the first stands.
+/// Computes errors against a ground truth, matched by image.
+///
+/// The captures are those of the ground truth. Captures without a row in the fixes are missing with
+/// the status "no row". Clusters are reference points: captures whose true positions are within
+/// `station_m`.
+/// @throws InputError if images of the fixes are not in the ground truth, with the count and the
+/// line of the first
 FixErrors errors_against_truth(const FromFile<FixRow>& fixes, const FromFile<TruthRow>& truth,
                                double station_m);
 
-/// Errors against the nearest point of a path, seen from above: what they are along the path does
-/// not show. Captures are the rows of the fixes. Units are kPathRuns runs of as many consecutive
-/// fixes, because errors that follow each other on a drive are alike (non-overlapping batch means;
-/// Schmeiser, "Batch Size Effects in the Analysis of Simulation Output", 1982, who advises 10 to
-/// 30); single fixes when there are no more.
+/// Maximum number of clusters along a path, see errors_against_path().
 inline constexpr std::size_t kPathRuns = 30;
+/// Computes errors against the nearest point of a path, seen from above. Errors along the path are
+/// not visible.
+///
+/// The captures are the rows of the fixes. Clusters are kPathRuns runs of equally many consecutive
+/// fixes, because successive errors on a drive are correlated. If there are no more than kPathRuns
+/// fixes, each is a cluster. Source: non-overlapping batch means; Schmeiser, "Batch Size Effects in
+/// the Analysis of Simulation Output", 1982, recommends 10 to 30 batches.
 FixErrors errors_against_path(const std::vector<FixRow>& fixes, const Path& path);
 
 }  // namespace vlp

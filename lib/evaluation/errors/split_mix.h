@@ -6,15 +6,15 @@
 
 namespace vlp {
 
-/// A number whose every bit depends on every bit of `value` (the output function of SplitMix64;
-/// Steele, Lea and Flood, "Fast Splittable Pseudorandom Number Generators", 2014).
+/// Returns a hash whose every bit depends on every bit of `value`: the output function of
+/// SplitMix64 (Steele, Lea and Flood, "Fast Splittable Pseudorandom Number Generators", 2014).
 constexpr std::uint64_t mix(std::uint64_t value) {
   value = (value ^ (value >> 30)) * 0xbf58476d1ce4e5b9;
   value = (value ^ (value >> 27)) * 0x94d049bb133111eb;
   return value ^ (value >> 31);
 }
 
-/// SplitMix64: random numbers that cost nothing to seed and are the same everywhere.
+/// SplitMix64: random generator with negligible seeding cost and the same numbers on every machine.
 class SplitMix {
  public:
   explicit SplitMix(std::uint64_t seed) : state_(mix(seed)) {}

@@ -13,20 +13,20 @@ namespace {
 
 using Cell = Eigen::Array3d;  // whole numbers
 
-/// The stations' first places by the cell of a cubic lattice that they are in: a hash table with
-/// open addressing. Its time goes to waiting for memory.
+/// First positions of the reference points by the cell of a cubic grid: a hash table with open
+/// addressing. Its time is dominated by memory latency.
 class StationTable {
  public:
   StationTable(std::size_t most, double radius_m)
       : radius_m_(radius_m), cell_m_(4 * radius_m), slots_(std::bit_ceil(2 * most + 1)) {}
 
-  /// Has the memory that find() will look at brought nearer.
+  /// Prefetches the memory that find() will access.
   void prefetch(const Eigen::Vector3d& place_m) const {
     for_each_cell_near(place_m,
                        [&](std::uint64_t hash) { __builtin_prefetch(&slots_[slot_of(hash)]); });
   }
 
-  /// The first station within the radius; firsts_m.size() when there is none.
+  /// Returns the first station within the radius; firsts_m.size() if there is none.
   std::size_t find(const Eigen::Vector3d& place_m,
                    const std::vector<Eigen::Vector3d>& firsts_m) const {
     std::size_t found = firsts_m.size();
@@ -55,7 +55,8 @@ class StationTable {
     std::uint32_t next_station = 0;  // 0: free
   };
 
-  /// The ball around a place is in one or two cells along each axis.
+  /// Calls `action` with the hash of each cell near a position. The ball around a position covers
+  /// one or two cells along each axis.
   template <typename Action>
   void for_each_cell_near(const Eigen::Vector3d& place_m, const Action& action) const {
     const Cell low = ((place_m.array() - radius_m_) / cell_m_).floor();
@@ -69,12 +70,12 @@ class StationTable {
   static std::uint64_t hash_of(const Cell& cell) {
     std::uint64_t hash = 0;
     for (const double number : cell) {
-      // + 0: there is a zero with a minus sign, whose bits are others.
+      // + 0.0 turns a negative zero, which has other bits, into a positive one.
       hash = mix(hash ^ std::bit_cast<std::uint64_t>(number + 0.0));
     }
     return hash;
   }
-  /// Of the hash's bits those that the choice of the slot leaves over.
+  /// Returns the bits of the hash that do not select the slot.
   static std::uint32_t upper(std::uint64_t hash) { return static_cast<std::uint32_t>(hash >> 32); }
   std::size_t slot_of(std::uint64_t hash) const { return hash & (slots_.size() - 1); }
   std::size_t next(std::size_t slot) const { return (slot + 1) & (slots_.size() - 1); }

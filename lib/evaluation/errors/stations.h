@@ -9,9 +9,11 @@
 
 namespace vlp {
 
-/// Which places are one station: a place belongs to the first station whose first place is within
-/// `radius_m` of it, or else begins a station. Numbered from 0 in the order of the places. Time in
-/// proportion to the places. Precondition: radius_m > 0.
+/// Returns the reference point of each position, numbered from 0 in the order of the positions.
+///
+/// A position belongs to the first reference point whose first position is within `radius_m` of it,
+/// or else begins a new one. The time is proportional to the number of positions.
+/// @pre radius_m > 0
 std::vector<std::size_t> stations_of(std::span<const Eigen::Vector3d> places_m, double radius_m);
 
 }  // namespace vlp

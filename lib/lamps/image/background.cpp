@@ -27,13 +27,13 @@ class Histogram {
     for_each([&](int level, int count) { sum += level >= low && level <= high ? count : 0; });
     return sum;
   }
-  /// The level that so many are below, or of.
+  /// Returns the level of the pixel with this rank in ascending order.
   int level_at(int rank) const {
     int level = 0;
     for (int passed = counts_[0]; passed <= rank; passed += counts_[std::size_t(level)]) ++level;
     return level;
   }
-  /// Calls a function for the levels that occur, the lowest first.
+  /// Calls `function` for each level that occurs, in ascending order.
   template <typename Function>
   void for_each(Function&& function) const {
     for (int level = 0; level <= highest_; ++level) {
@@ -51,7 +51,7 @@ template <typename Level>
 Histogram sample_of(const ImageView& image) {
   constexpr double enough = 8000;
   const double pixels = static_cast<double>(image.height) * image.width;
-  // An odd step that shifts from row to row meets every kind of row and column.
+  // An odd step that shifts from row to row samples all rows and columns of a periodic pattern.
   const int step = static_cast<int>(std::sqrt(pixels / enough)) | 1;
   Histogram sample(std::numeric_limits<Level>::max() + 1);
   for (int row = std::min(step / 2, image.height / 2); row < image.height; row += step) {
@@ -64,8 +64,8 @@ Histogram sample_of(const ImageView& image) {
   return sample;
 }
 
-/// The least difference between two levels: of 12 bits in 16, or of 8, it is more than 1. Few
-/// levels do not tell.
+/// Returns the smallest difference between two levels: above 1 for images of 12 bits in 16, or of 8
+/// in 16. Returns 1 if few levels occur, which do not determine it.
 double step_of(const Histogram& sample) {
   constexpr int enough = 16;
   int step = std::numeric_limits<int>::max(), levels = 0, before = 0;
@@ -76,9 +76,10 @@ double step_of(const Histogram& sample) {
   return levels >= enough ? step : 1;
 }
 
-/// Whether levels below the median are missing, because it is the least there is: with noise, which
-/// fills the levels next to the dark more than those that one pixel of ten is above. What is lit
-/// does not, and a dark without noise has nothing below, either.
+/// Returns true if noise below the median is clipped at the smallest level. The median is then the
+/// smallest level, and noise fills the levels next to it more than those that 10 % of the pixels
+/// exceed. Lit pixels do not have this distribution, and a noiseless dark level has nothing below
+/// it either.
 bool clipped(const Histogram& sample, int median, double step) {
   const int tenth = sample.level_at(static_cast<int>(std::int64_t{sample.count()} * 9 / 10));
   const double next = median + std::max(step, (tenth - median) / 2.0);
@@ -89,8 +90,9 @@ bool clipped(const Histogram& sample, int median, double step) {
   return 4 * below < above && 10 * near >= above;
 }
 
-/// One pixel of five is brighter than 0.84 standard deviations, and one of ten than 1.28; or, if
-/// so many are lit, much brighter.
+/// Estimates the noise from the pixels above the median. 20 % of them are brighter than 0.84
+/// standard deviations, and 10 % than 1.28. If this many pixels are lit, the estimate is too large,
+/// so the smaller one is used.
 double noise_above(const Histogram& sample, int median) {
   const auto above = [&](int per_cent) {
     const auto rank = std::int64_t{sample.count()} * per_cent / 100;
@@ -102,7 +104,7 @@ double noise_above(const Histogram& sample, int median) {
 Background background(const Histogram& sample) {
   const double step = step_of(sample);
   const int half = sample.count() / 2, median = sample.level_at(half);
-  // Lit pixels are above; what is below is noise alone.
+  // Lit pixels are above the median; the pixels below contain only noise.
   double squares = 0;
   sample.for_each([&](int level, int count) {
     if (level < median) squares += count * std::pow(median - level, 2);
@@ -110,7 +112,7 @@ Background background(const Histogram& sample) {
   double noise = std::sqrt(squares / std::max(1, half));
   const bool no_noise_below = clipped(sample, median, step);
   if (no_noise_below) noise = std::max(noise, noise_above(sample, median));
-  // Grey levels are coarse: of those around, the mean and the scatter say more.
+  // Grey levels are coarse: mean and scatter of the surrounding levels are more precise.
   constexpr double around = 3;
   const double min_noise = 0.3 * step;
   double near = 0, sum = 0, sum_of_squares = 0;

@@ -6,18 +6,19 @@
 
 namespace vlp {
 
-/// Dark level and noise of an image of lamps, from a sample of its pixels.
+/// Dark level and noise of an image of lamps, estimated from a sample of its pixels.
 struct Background {
-  /// Mean of the pixels around the median, and their standard deviation, in grey levels. If the
-  /// dark is clipped, at black or above it, the pixels brighter than the median determine them.
+  /// Mean and standard deviation of the pixels around the median, in grey levels. If the dark level
+  /// is clipped, at black or above, the standard deviation is derived from the pixels brighter than
+  /// the median.
   double level;
   double noise;
-  /// Level above which pixels are lit: level + 4.5 noise, and at least level + 1.6 steps between
-  /// the levels that occur in the image.
+  /// Level above which pixels are lit: level + 4.5 noise, and at least level + 1.6 times the
+  /// smallest difference between the levels of the image.
   double threshold;
 };
 
-/// Estimates the background of an image. @pre The image is not empty.
+/// Estimates dark level, noise and threshold of an image. @pre The image is not empty.
 Background background_of(const ImageView& image);
 
 }  // namespace vlp

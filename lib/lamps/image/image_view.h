@@ -10,10 +10,10 @@
 
 namespace vlp {
 
-/// A grey image in memory that the caller owns and that stays valid as long as the view is used.
+/// Non-owning view of a grey image. The memory has to stay valid as long as the view is used.
 struct ImageView {
-  /// First pixel of the first row. Pixels are std::uint8_t where bits is 8, and std::uint16_t in
-  /// the machine's byte order where it is 16, aligned as such.
+  /// First pixel of the first row. Pixels are std::uint8_t if `bits` is 8. If `bits` is 16, pixels
+  /// are aligned std::uint16_t in native byte order.
   const void* data = nullptr;
   int width = 0, height = 0;  ///< pixels
   /// Bytes from the start of a row to the start of the next one.
@@ -22,10 +22,11 @@ struct ImageView {
 
   bool empty() const { return data == nullptr || width <= 0 || height <= 0; }
   ImageSize size() const { return {width, height}; }
-  /// Returns the level of white: 255 or 65535.
+  /// Returns the largest level: 255 or 65535.
   int max_level() const { return (1 << bits) - 1; }
 
-  /// Returns the first pixel of row y. `Level` is std::uint8_t or std::uint16_t, as `bits` has it.
+  /// Returns the first pixel of row y. `Level` is std::uint8_t or std::uint16_t, according to
+  /// `bits`.
   template <typename Level>
   const Level* row(int y) const {
     return reinterpret_cast<const Level*>(static_cast<const std::byte*>(data) + y * stride);
@@ -36,7 +37,8 @@ struct ImageView {
     return bits == 8 ? row<std::uint8_t>(y)[x] : row<std::uint16_t>(y)[x];
   }
 
-  /// Returns a view of the part of a box that is in the image; it is empty if there is none.
+  /// Returns a view of the intersection of `box` and the image; an empty view if they do not
+  /// overlap.
   ImageView part(const PixelBox& box) const {
     const PixelBox inside = intersection(box, {0, 0, width, height});
     const auto* first = static_cast<const std::byte*>(data) + inside.y * stride;
@@ -45,8 +47,8 @@ struct ImageView {
   }
 };
 
-/// Calls a function with a value of the type of an image's levels, std::uint8_t or std::uint16_t,
-/// and returns its result.
+/// Calls `function` with a value of the level type of the image, std::uint8_t or std::uint16_t, and
+/// returns its result.
 template <typename Function>
 decltype(auto) visit_levels(const ImageView& image, Function&& function) {
   return image.bits == 8 ? std::forward<Function>(function)(std::uint8_t{})

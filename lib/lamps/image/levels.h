@@ -6,10 +6,10 @@
 
 namespace vlp {
 
-/// Returns the level of the brightest pixel; 0 of an empty image.
+/// Returns the level of the brightest pixel; 0 for an empty image.
 int brightest_level(const ImageView& image);
 
-/// Returns how many pixels have that level.
+/// Returns the number of pixels with this level.
 int count_pixels_at(const ImageView& image, int level);
 
 }  // namespace vlp

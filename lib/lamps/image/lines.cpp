@@ -16,7 +16,7 @@
 namespace vlp {
 namespace {
 
-/// Pixels that `Lines` owns.
+/// Pixels owned by `ScanlineImage`.
 template <typename Level>
 struct Pixels {
   Level* first;
@@ -25,8 +25,8 @@ struct Pixels {
   Level* row(int y) const { return first + std::ptrdiff_t(y) * width; }
 };
 
-/// Allocates a black image. The system gives such memory page by page, when it is used first: large
-/// pages, because it takes longer to get a small one than to turn what it holds.
+/// Allocates a black image. The system provides such memory page by page at its first use. Large
+/// pages are requested, because getting a small page takes longer than transposing its pixels.
 std::shared_ptr<void> black_pixels(const ImageSize& size, int bits) {
   const std::size_t bytes =
       std::size_t(size.width) * std::size_t(size.height) * std::size_t(bits / 8);
@@ -40,18 +40,19 @@ PixelBox grown(const PixelBox& tiles, int by) {
   return {tiles.x - by, tiles.y - by, tiles.width + 2 * by, tiles.height + 2 * by};
 }
 
-/// The background's level around each group of lit tiles, as far as it is large.
+/// Fills a margin around each group of lit tiles with the background level. The margin is the size
+/// of the group.
 template <typename Level>
 void fill_around(const TileMask& lit, Level level, const Pixels<Level>& pixels) {
   for (const PixelBox& tiles : group_boxes(lit)) {
     const int size = std::max(tiles.width, tiles.height);
-    if (size == 1) continue;  // the tiles around it are turned
+    if (size == 1) continue;  // the tiles around it are transposed
     const PixelBox box = pixels_of_tiles(grown(tiles, size), {pixels.width, pixels.height});
     for (int y = box.y; y < box.bottom(); ++y) std::fill_n(pixels.row(y) + box.x, box.width, level);
   }
 }
 
-/// Turns a box of an image over its diagonal, in squares that stay in the cache's lines.
+/// Transposes a box of an image, in squares that fit the cache lines.
 template <typename Level>
 void transpose(const ImageView& image, const PixelBox& box, const Pixels<Level>& turned) {
   constexpr int square = 16;

@@ -11,19 +11,20 @@
 
 namespace vlp {
 
-/// An image with the lines that the shutter reads as its rows.
+/// Image whose rows are the scanlines, that is the rows or columns that the shutter reads.
 struct Lines {
   ImageView pixels;
-  /// Tiles that may have runs, see lit_tiles().
+  /// Tiles that may contain runs, see lit_tiles().
   TileMask lit;
-  /// Memory of `pixels` if they are not the image's.
+  /// Memory of `pixels` if it is not that of the input image.
   std::shared_ptr<void> memory;
 };
 
-/// Returns the lines of an image. An image that is read along columns is transposed, but only in
-/// the tiles with more than one pixel above the background's threshold and in those around them,
-/// because transposing all of a large image takes longer than detecting its lamps. The next tiles
-/// have the level of the background; those beyond are black, and their memory is not touched.
+/// Returns an image whose rows are the scanlines. An image that is read along columns is
+/// transposed, but only in the tiles with more than one pixel above the background's threshold and
+/// in their neighbors. Transposing a large image completely takes longer than detecting its lamps.
+/// The tiles next to the transposed ones are filled with the background level. All other tiles are
+/// black; their memory is not touched.
 Lines lines_of(const ImageView& image, Readout readout, const Background& background);
 
 }  // namespace vlp

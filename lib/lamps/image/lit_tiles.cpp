@@ -9,13 +9,13 @@
 namespace vlp {
 namespace {
 
-/// Rows that are searched together: every second one of 17.
+/// Number of rows that are searched together: every second one of 17.
 constexpr int kRowsAtOnce = 9;
 
 template <typename Level>
 using Rows = std::array<const Level*, kRowsAtOnce>;
 
-/// Returns every row, or every second one, from `first` on; rows below the image are its last one.
+/// Returns every `step`-th row from `first` on; rows below the image are replaced by its last row.
 template <typename Level, int step>
 Rows<Level> rows_from(const ImageView& image, int first) {
   Rows<Level> rows;
@@ -25,8 +25,8 @@ Rows<Level> rows_from(const ImageView& image, int first) {
   return rows;
 }
 
-/// Returns the brightest level in some columns. There is no branch in it, so that it is compiled to
-/// vectors.
+/// Returns the brightest level in a range of columns. Has no branches, so that it is compiled to
+/// vector instructions.
 template <typename Level>
 Level brightest_in(const Rows<Level>& rows, int begin, int count) {
   const auto [a, b, c, d, e, f, g, h, l] = rows;
@@ -39,7 +39,7 @@ Level brightest_in(const Rows<Level>& rows, int begin, int count) {
   return brightest;
 }
 
-/// Marks the tiles that are lit in one of the rows that are searched.
+/// Marks the tiles that are lit in one of the searched rows.
 template <typename Level>
 void search(const ImageView& image, Level threshold, TileMask& found) {
   constexpr int span = 2 * (kRowsAtOnce - 1);  // rows from 0 to 16, from 15 to 31, and so on
@@ -71,7 +71,7 @@ std::uint8_t count_above(const ImageView& image, const PixelBox& box, Level thre
   return static_cast<std::uint8_t>(std::min<std::ptrdiff_t>(count, 2));
 }
 
-/// Calls a function with the column and row of each tile around one, and of that one itself.
+/// Calls `function` with the column and row of a tile and of each of its neighbors.
 template <typename Function>
 void for_each_around(const TileMask& mask, int column, int row, Function&& function) {
   const PixelBox box = intersection({column - 1, row - 1, 3, 3}, {0, 0, mask.columns, mask.rows});
@@ -80,7 +80,7 @@ void for_each_around(const TileMask& mask, int column, int row, Function&& funct
   }
 }
 
-/// Calls a function with the column and row of each tile that is not 0.
+/// Calls `function` with the column and row of each nonzero tile.
 template <typename Function>
 void for_each_set(const TileMask& mask, Function&& function) {
   for (int row = 0; row < mask.rows; ++row) {

@@ -11,10 +11,10 @@
 
 namespace vlp {
 
-/// Rows and columns of a tile, in pixels. Tiles at the right and at the bottom may have less.
+/// Width and height of a tile, in pixels. Tiles at the right and bottom border may be smaller.
 inline constexpr int kTile_px = 64;
 
-/// A value for each tile of an image.
+/// Value for each tile of an image.
 struct TileMask {
   int columns = 0, rows = 0;
   std::vector<std::uint8_t> values;  ///< row by row
@@ -27,24 +27,24 @@ struct TileMask {
   const std::uint8_t* row(int y) const { return values.data() + std::ptrdiff_t(y) * columns; }
 };
 
-/// Finds the tiles with pixels above `threshold`: more than one in the tile and those around it,
-/// because one alone is noise, and no run.
+/// Finds the tiles with pixels above `threshold`. The tile and its neighbors have to contain more
+/// than one such pixel, because a single pixel is noise and forms no run.
 ///
-/// Searches every second row, the odd ones and the even ones in turns of 16 rows, and then every
-/// row of the tiles with light and of those around them. So a light is found if two rows in
-/// succession are lit. One whose stripes are a single row each, at an even period, is found surely
-/// if it is 16 rows and a period high. A lamp needs at least 8 lit lines to be identified.
+/// Searches every second row, alternating between odd and even rows every 16 rows. Then searches
+/// every row of the tiles with light and of their neighbors. A light is found if two consecutive
+/// rows are lit. A light with single-row stripes at an even period is guaranteed to be found if its
+/// height is at least 16 rows and a period. Identification of a lamp needs at least 8 lit lines.
 TileMask lit_tiles(const ImageView& image, double threshold);
 
-/// Adds the tiles around those that are not 0, corners included.
+/// Returns the mask with all eight neighbors of its nonzero tiles added.
 TileMask dilated(const TileMask& mask);
 
 TileMask transposed(const TileMask& mask);
 
-/// Returns the boxes, in tiles, around the groups of tiles that touch, corners included.
+/// Returns the bounding boxes, in tiles, of the 8-connected groups of nonzero tiles.
 std::vector<PixelBox> group_boxes(TileMask mask);
 
-/// Returns the pixels of a box of tiles in an image of that size.
+/// Converts a box of tiles to a box of pixels, clipped to an image of `size`.
 PixelBox pixels_of_tiles(const PixelBox& tiles, const ImageSize& size);
 
 }  // namespace vlp

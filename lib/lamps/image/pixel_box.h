@@ -13,7 +13,7 @@ struct ImageSize {
   bool operator==(const ImageSize&) const = default;
 };
 
-/// Pixels in columns x to before x + width and rows y to before y + height.
+/// Pixel box of columns x to x + width - 1 and rows y to y + height - 1.
 struct PixelBox {
   int x = 0, y = 0, width = 0, height = 0;
 
@@ -24,7 +24,7 @@ struct PixelBox {
   bool operator==(const PixelBox&) const = default;
 };
 
-/// Returns the pixels that both boxes have; width and height are 0 if there are none.
+/// Returns the intersection of two boxes; width and height are 0 if they do not overlap.
 inline PixelBox intersection(const PixelBox& a, const PixelBox& b) {
   const int x = std::max(a.x, b.x), y = std::max(a.y, b.y);
   const int width = std::min(a.right(), b.right()) - x;
@@ -32,7 +32,7 @@ inline PixelBox intersection(const PixelBox& a, const PixelBox& b) {
   return width > 0 && height > 0 ? PixelBox{x, y, width, height} : PixelBox{};
 }
 
-/// Returns the smallest box around two boxes that are not empty.
+/// Returns the bounding box of two boxes. @pre Both boxes are not empty.
 inline PixelBox around(const PixelBox& a, const PixelBox& b) {
   const int x = std::min(a.x, b.x), y = std::min(a.y, b.y);
   return {x, y, std::max(a.right(), b.right()) - x, std::max(a.bottom(), b.bottom()) - y};

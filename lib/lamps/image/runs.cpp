@@ -8,8 +8,8 @@
 namespace vlp {
 namespace {
 
-/// Whether a pixel of a tile's row is lit. Without a branch inside, so that it is compiled to
-/// vectors.
+/// Returns true if a pixel of a tile's row is lit. The loop has no branches, so that it is compiled
+/// to vector instructions.
 template <typename Level>
 bool any_above(const Level* pixels, int count, Level threshold) {
   Level brightest = 0;
@@ -25,7 +25,7 @@ template <typename Level>
 void add_runs_of_row(const Level* pixels, int columns, int row, Level threshold,
                      const std::vector<int>& tiles, std::vector<Run>& runs) {
   constexpr int max_gap = 2, min_width = 3;
-  Run run{row, 0, -1};  // none yet
+  Run run{row, 0, -1};  // empty
   const auto finish = [&] {
     if (run.width() >= min_width) runs.push_back(run);
     run.end = -1;
@@ -60,7 +60,7 @@ std::vector<Run> runs_of(const ImageView& image, Level threshold, const TileMask
   return runs;
 }
 
-/// A blob while it grows, and the columns of its last two lit rows.
+/// Blob under construction, with the columns of its last two lit rows.
 struct Growing {
   Growing(const Run& run) : blob{{run}}, last_row(run.row), last(run), before(run) {}
 

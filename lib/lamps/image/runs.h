@@ -10,7 +10,7 @@
 
 namespace vlp {
 
-/// Consecutive lit pixels of a row: columns from begin to before end.
+/// Consecutive lit pixels of a row: columns begin to end - 1.
 struct Run {
   int row, begin, end;
 
@@ -18,14 +18,14 @@ struct Run {
 };
 
 /// Finds the runs of pixels above `threshold`, row by row. Gaps of up to two pixels do not end a
-/// run; runs of less than three pixels are noise. Searches the tiles that are not 0 in `lit`, or
-/// all if it is empty.
+/// run; runs of less than three pixels are discarded as noise. Searches the nonzero tiles of `lit`,
+/// or all tiles if `lit` is empty.
 std::vector<Run> find_runs(const ImageView& image, double threshold, const TileMask& lit = {});
 
-/// Runs that belong to one light: they overlap from row to row, across up to `max_dark_rows` dark
-/// ones. Lights that touch are one blob.
+/// Runs of one light: they overlap from row to row, across up to `max_dark_rows` dark rows. Lights
+/// that touch form one blob.
 struct Blob {
-  std::vector<Run> runs;  // by row
+  std::vector<Run> runs;  // ordered by row
 
   int top() const { return runs.front().row; }
   int bottom() const { return runs.back().row; }

@@ -13,92 +13,92 @@
 
 namespace vlp {
 
-/// Kind of a light in an image.
+/// Class of a light in an image.
 enum class LightKind {
-  lamp,     ///< wholly in the image and identified: fit for a fix
-  cut,      ///< identified, but cut by the image's edge
+  lamp,     ///< identified and fully inside the image: usable for a position fix
+  cut,      ///< identified, but cut by the image border
   unknown,  ///< modulated, but not identified as one lamp of the map, see LightReason
   steady,   ///< not modulated
-  formless  ///< bright, but neither modulated nor of a known outline
+  formless  ///< bright, but neither modulated nor with a known outline
 };
 
-/// Reason why a light is no lamp; of several the first that applies.
+/// Reason why a light is not a lamp; the first one that applies.
 enum class LightReason {
-  identified,       ///< a lamp, or one that is cut
+  identified,       ///< a lamp, possibly cut by the image border
   overexposed,      ///< steady: contrast below kMinContrast, most pixels at full scale
   steady,           ///< steady: contrast below kMinContrast
-  too_few_periods,  ///< less than kMinPeriods, or less than kEnoughPeriods and no lamp with more
-  no_clear_period,  ///< no period explains it, its parts differ, or its stripes are irregular
-  unknown_period,   ///< its period is that of no lamp, or of several
-  reflection,       ///< softer, dimmer or smaller than another light, or like its mirror image
-  wrong_shape,      ///< its outline is not that of its lamp, or cannot be fitted
-  incomplete        ///< cut by the image's edge, or too small for an outline
+  too_few_periods,  ///< below kMinPeriods, or no lamp of the image has kEnoughPeriods
+  no_clear_period,  ///< no period fits, its parts differ, or its stripes are irregular
+  unknown_period,   ///< no lamp has its period, or several have
+  reflection,       ///< blurrier, dimmer or smaller than another light, or its mirror image
+  wrong_shape,      ///< its outline differs from that of its lamp, or cannot be fitted
+  incomplete        ///< cut by the image border, or too small for an outline
 };
 
-/// A light in an image. A formless one has its box, with `pixel` in the middle, and its outline; no
-/// stripes and no sigma.
+/// Light in an image. A formless light has only a box, with `pixel` at its center, and an outline;
+/// it has no stripes and no sigma.
 struct Light {
   LightKind kind;
   LightReason reason;
-  /// Id of a lamp, and of one that is cut.
+  /// Id of the lamp; also set for a lamp that the image border cuts.
   std::optional<int> lamp;
-  /// Image of the centre of its outline, (u, v).
+  /// Image of the center of the outline, (u, v).
   Eigen::Vector2d pixel;
-  /// Standard deviation of `pixel` per axis. Without a lens unknown_lens_sd_px() is included.
+  /// Standard deviation of `pixel` per axis. Includes unknown_lens_sd_px() if the lens is unknown.
   double sigma_px;
-  /// Shape of its outline; a disc if it has none.
+  /// Shape of the outline; a disc if the light has no outline.
   ShapeKind shape;
-  /// Radius; for other shapes than discs that of the disc of equal area.
+  /// Radius; for other shapes than discs the radius of the disc of equal area.
   double radius_px;
   /// Outline of a round light in the plane of LightShape: |unit_from_plane (p - plane_center)| = 1.
   Eigen::Vector2d plane_center;
   Matrix2 unit_from_plane;
-  /// Top left and bottom right corner of the box around the outline, (u, v).
+  /// Top left and bottom right corner of the bounding box of the outline, (u, v).
   Eigen::Vector2d low, high;
   Stripes stripes;
-  /// coherence_of(), or ModulatedLight::phase_coherence if `by_modulation`; 0 if the stripes have
-  /// no period.
+  /// Result of coherence_of(), or ModulatedLight::phase_coherence if `by_modulation`. 0 if the
+  /// stripes have no period.
   double coherence;
-  /// Fraction of the pixels in the middle of a steady light that have the level of its brightest
-  /// pixel, if that is full scale.
+  /// Steady lights only: fraction of the pixels in the middle that have the level of the light's
+  /// brightest pixel. 0 if this level is not full scale.
   double clipped;
-  /// Level of its brightest lines above the dark, in grey levels.
+  /// Level of the brightest scanlines above the dark level, in grey levels.
   double peak;
-  /// Whether it was found by its modulation, which decided its stripes.
+  /// True if the light was found by its modulation, which then also determined its stripes.
   bool by_modulation;
-  /// Whether it has no outline: its centre is that of the area that it lights.
+  /// True if the light has no outline; its center is then the centroid of the lit area.
   bool glows;
-  /// Whether its outline may be another one than the lamp's: soft, seen in part, or of a source in
-  /// a reflector, much brighter inside than next to it.
+  /// True if the outline may differ from the outline of the lamp: blurred, partly visible, or that
+  /// of a source in a reflector, much brighter inside than next to its outline.
   bool is_doubtful;
-  /// Whether it is lit unevenly and its outline is a rim, see rim_of(). Its roundness is the
-  /// fraction of the ends of its lit lines that show the rim.
+  /// True if the light is lit unevenly and its outline is a rim, see rim_of(). Its roundness is
+  /// then the fraction of the ends of its lit scanlines that show the rim.
   bool uneven;
-  /// Width of the edge from 25 % to 75 % of the level.
+  /// Width of the edge from 25 % to 75 % of the level, in pixels.
   double rise_px;
-  /// Polygon within the edges, (u, v); empty for discs.
+  /// Polygon inside the edges, (u, v); empty for discs.
   std::vector<Eigen::Vector2d> face;
-  /// Long axis over short axis behind the lens, and the standard deviation of its logarithm; for
-  /// discs 1 and 0.
+  /// Ratio of the long to the short axis in the plane of LightShape, and the standard deviation of
+  /// its logarithm; 1 and 0 for discs.
   double aspect = 1, aspect_sd = 0;
-  /// Fraction of the blob's edge that lies on the circle. Rectangles: fraction of the pixels along
-  /// the worst edge that agree with an edge.
+  /// Discs: fraction of the blob's edge points that lie on the circle. Rectangles: fraction of the
+  /// pixels along the worst edge that agree with the edge model.
   double roundness;
-  /// Number of points of the blob's edge outside all lights of the blob, over the number on the
-  /// circle.
+  /// Ratio of the number of the blob's edge points outside all lights of the blob to the number of
+  /// edge points on the outline.
   double outside;
-  /// Points as (column, line): (v, u) for a read-out along columns.
+  /// Points of the outline, (column, line): (v, u) for readout along columns.
   std::vector<EdgePoint> outline;
-  /// Residuals of a circle in the level plane; empty for other outlines.
+  /// Normal equations of the circle fit in the level plane; empty for other outlines.
   OutlineSums sums;
 };
 
-/// Minimum Light::roundness of an identified lamp.
+/// Minimum of Light::roundness for an identified lamp.
 inline constexpr double kMinRoundness = 0.45;
 
 inline bool is_disc(const Light& light) { return light.shape == ShapeKind::disc; }
 
-/// Returns whether a light may be a lamp, of this map or another.
+/// Returns true if a light is modulated: it may be a lamp of this map or of another one.
 inline bool flickers(const Light& light) {
   return light.kind != LightKind::steady && light.kind != LightKind::formless;
 }

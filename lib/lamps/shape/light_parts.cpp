@@ -15,7 +15,7 @@ bool covers(const Light& light, const Eigen::Vector2d& pixel) {
   return (light.pixel - pixel).norm() < light.radius_px;
 }
 
-/// Returns whether two blobs may be parts of one light.
+/// Returns true if two blobs may be parts of one light.
 bool near(const PixelBox& a, const PixelBox& b) {
   const int gap_across = std::max(a.x, b.x) - std::min(a.x + a.width, b.x + b.width);
   const int gap_along = std::max(a.y, b.y) - std::min(a.y + a.height, b.y + b.height);
@@ -23,14 +23,14 @@ bool near(const PixelBox& a, const PixelBox& b) {
   return 2 * gap_across < size && 2 * gap_along < size;
 }
 
-/// Returns whether a part is no piece of a light that an occluder splits.
+/// Returns true if a part is not a piece of a light that an occluder splits.
 bool whole(const LightPart& part) {
   return part.light && (part.light->glows || part.light->uneven || !is_disc(*part.light));
 }
 
 std::size_t points_of(const LightPart& part) { return part.light ? part.light->outline.size() : 0; }
 
-/// Returns whether a light consists of both parts: two lamps side by side have more of their points
+/// Returns true if a light consists of both parts. Two lamps side by side have more of their points
 /// on a circle each than on a common one. `points` is the number of all points.
 bool is_of_both(const Light& whole, const LightPart& a, const LightPart& b, std::size_t points) {
   constexpr double min_share = 0.6, min_gain = 1.25, min_of_both = 0.8, max_hidden = 1.5;
@@ -42,13 +42,13 @@ bool is_of_both(const Light& whole, const LightPart& a, const LightPart& b, std:
          on_circle >= min_gain * std::max(of_a, of_b);
 }
 
-/// Returns the reason why a part has no shape.
+/// Returns the reason for the lack of a fitted outline.
 LightReason reason_of(const LightPart& part, const ImageSize& size) {
   const PixelBox& box = part.box;
   const bool inside =
       box.x > 0 && box.y > 0 && box.right() < size.width && box.bottom() < size.height;
   if (!inside) return LightReason::incomplete;
-  // What is not of the light itself takes up some of the points.
+  // Some of the points belong to other objects.
   const bool small = part.outline.size() < 2 * kMinOutlinePoints;
   return small ? LightReason::incomplete : LightReason::wrong_shape;
 }
@@ -60,7 +60,7 @@ bool overlap(const Light& a, const Light& b) {
   return covers(a, b.pixel) || covers(b, a.pixel);
 }
 
-/// Removes lights that overlap one with more outline points: they are pieces of it.
+/// Removes lights that overlap one with more outline points, because they are pieces of it.
 std::vector<Light> without_pieces(std::vector<Light> found) {
   std::stable_sort(found.begin(), found.end(), [](const Light& a, const Light& b) {
     return a.outline.size() > b.outline.size();
@@ -78,7 +78,7 @@ std::vector<Light> without_pieces(std::vector<Light> found) {
 
 std::vector<Light> join(std::vector<LightPart>& parts, const LightShape& shape,
                         const Background& background) {
-  // A lamp is in a few pieces; an image of thousands of them shows something else.
+  // A lamp has few pieces; an image with thousands of pieces contains other objects.
   constexpr int max_tries = 2000;
   int tries = 0;
   for (std::size_t i = 0; i < parts.size() && tries < max_tries; ++i) {
@@ -92,7 +92,7 @@ std::vector<Light> join(std::vector<LightPart>& parts, const LightShape& shape,
       if (!one || !is_of_both(*one, parts[i], parts[j], both.size())) continue;
       parts[i] = {std::move(one), std::move(both), around(parts[i].box, parts[j].box)};
       parts.erase(parts.begin() + std::ptrdiff_t(j));
-      j = i;  // the whole may have more parts
+      j = i;  // the joined part may have further pieces
     }
   }
   std::vector<Light> found;

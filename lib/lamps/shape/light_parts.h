@@ -12,21 +12,23 @@
 
 namespace vlp {
 
-/// A blob: the light that it is, if it is round, and all of its outline.
+/// Blob with its complete outline, and the light fitted to it if the fit succeeded.
 struct LightPart {
   std::optional<Light> light;
   std::vector<EdgePoint> outline;
   PixelBox box;
 };
 
-/// The lights that the parts are of: what stands in the way splits a lamp, but its parts lie on one
-/// circle. Of lights that overlap the one with more of an outline stands. What is left in `parts`
-/// has no form.
+/// Joins parts of one light: an occluder splits a lamp, but all parts lie on one circle. Of lights
+/// that overlap, keeps the one with more outline points. Returns the lights; removes parts with a
+/// light from `parts`, so that only parts without a fitted outline remain.
 std::vector<Light> join(std::vector<LightPart>& parts, const LightShape& shape,
                         const Background& background);
 
-/// Parts without a form, but those inside one of `lights`, as lights, with the reason. What is less
-/// than five pixels wide or high is a speck, and no light. `size` is that of the lines.
+/// Converts parts without a fitted outline to lights of kind `formless` and sets their reason.
+/// Skips parts inside one of `lights` and parts less than five pixels wide or high.
+///
+/// @param size  size of the image whose rows are the scanlines
 std::vector<Light> formless_lights(std::vector<LightPart> parts, const std::vector<Light>& lights,
                                    const LightShape& shape, const ImageSize& size);
 

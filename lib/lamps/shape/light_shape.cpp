@@ -18,7 +18,7 @@
 namespace vlp {
 namespace {
 
-/// The diagonal of the box around the points.
+/// Returns the diagonal of the bounding box of the points.
 double extent(const std::vector<Eigen::Vector2d>& points) {
   Eigen::AlignedBox2d box;
   for (const Eigen::Vector2d& point : points) box.extend(point);
@@ -32,8 +32,8 @@ double median_rise_px(const std::vector<EdgePoint>& outline) {
   return upper_median(std::move(rises));
 }
 
-/// The points of the circle, but those next to a point that is not: where the edge of what hides a
-/// part of the light meets the outline, both are blurred.
+/// Selects the points on the circle, without those next to an outlier: where the edge of an
+/// occluder meets the outline, both are blurred.
 std::vector<bool> on_circle(const std::vector<EdgePoint>& outline,
                             const std::vector<bool>& inliers) {
   constexpr double reach_px = 4;
@@ -53,7 +53,7 @@ std::vector<bool> on_circle(const std::vector<EdgePoint>& outline,
   return 2 * count(clear) < count(inliers) ? inliers : clear;
 }
 
-/// The ratio of an ellipse's axes.
+/// Returns the axis ratio of an ellipse.
 double slenderness(const Matrix2& rim_from_circle) {
   const double half_square = rim_from_circle.squaredNorm() / 2;
   const double area = std::abs(rim_from_circle.determinant());
@@ -61,9 +61,10 @@ double slenderness(const Matrix2& rim_from_circle) {
   return (half_square + difference) / area;
 }
 
-/// Returns the number of points with a common error: the sum of the products of their errors with
-/// those of their neighbours and their own, over that of their squares. Of points that err each by
-/// itself the fit, which takes off three unknowns, leaves products of -3 / n of the mean square.
+/// Returns the number of points with a common error. It is the sum of the products of the errors of
+/// neighboring points, including their own squares, divided by the sum of squares. For independent
+/// errors the fit, which removes three degrees of freedom, causes products of -3 / n of the mean
+/// square; this is corrected.
 double points_together(const std::vector<Eigen::Vector2d>& points,
                        const std::vector<EdgePoint>& outline, const std::vector<bool>& counted,
                        const RobustEllipse& fit) {
@@ -88,7 +89,7 @@ double points_together(const std::vector<Eigen::Vector2d>& points,
   return std::max(1.0, 1 + products / squares + taken);
 }
 
-/// A circle is an ellipse, too.
+/// Converts a circle fit to an ellipse fit.
 RobustEllipse as_ellipse(RobustCircle fit) {
   return {fit.circle.center, fit.circle.radius * Matrix2::Identity(), fit.center_covariance,
           std::move(fit.inliers), fit.count};
@@ -138,7 +139,8 @@ std::optional<Light> LightShape::light_of(std::vector<EdgePoint> outline,
   for (const EdgePoint& edge : outline) weights.push_back(std::pow(edge.level / brightest, 2));
   const double per_px = extent(points) / extent(pixels);
   if (!(per_px > 0)) return std::nullopt;
-  // Half a level is passed within half a pixel or so; noise blurs that, and a soft edge.
+  // The half-level position is accurate to about half a pixel; noise and a soft edge increase its
+  // error.
   const double tolerance_px =
       std::max({0.35, 8 * background.noise / brightest, 0.4 * median_rise_px(outline)});
   const double tolerance = tolerance_px * per_px;
@@ -229,7 +231,7 @@ void LightShape::shift(const Oval& oval, const Eigen::Vector2d& motion_per_line,
 
 std::vector<EdgePoint> LightShape::outside(const Light& light,
                                            const std::vector<EdgePoint>& outline) const {
-  // Of the ellipse in its box, although the light may be one that lies aslant in it.
+  // Uses the axis-aligned ellipse in the box, although the ellipse of the light may be rotated.
   constexpr double clear = 1.1, clear_px = 1.5;
   const Eigen::Vector2d center = (light.low + light.high) / 2;
   const Eigen::Vector2d half =

@@ -13,62 +13,70 @@
 
 namespace vlp {
 
-/// Minimum number of points on a circle or an ellipse.
+/// Minimum number of outline points on a circle or an ellipse.
 inline constexpr std::size_t kMinOutlinePoints = 10;
 
 /// Camera parameters of a detector. Identification needs the row time.
 struct DetectorCamera {
   Readout readout;
   std::optional<double> row_time_s;
-  /// Lens; without it ellipses are fitted in the image.
+  /// Lens; if unknown, ellipses are fitted in the image.
   std::optional<Lens> lens;
-  /// Rotation of a tilted camera.
+  /// Rotation from the camera frame to the level frame; identity if the tilt is not calibrated.
   Eigen::Matrix3d level_from_camera = Eigen::Matrix3d::Identity();
-  /// Maximum ratio of the axes of an ellipse: that of a disc seen 60 degrees off its axis.
+  /// Maximum ratio of the axes of an ellipse: that of a disc 60 degrees off its axis.
   double max_axis_ratio = 2;
 };
 
-/// The shape of lights by their outline. Edge points go through the lens into the level plane; a
-/// circle is fitted there robustly, and its centre is projected back, because the centre of an
-/// outline in the image is not the image of the centre (lib/THEORY.md, "Lamp centroid"). Without a
-/// lens an ellipse is fitted in the image.
+/// Estimates the shape of lights from their outline. Edge points are projected through the lens
+/// into the level plane, where a circle is fitted robustly. The center of the circle is projected
+/// back to the image, because the center of an outline in the image is not the image of the center
+/// (lib/THEORY.md, "Lamp centroid"). Without a lens an ellipse is fitted in the image.
 class LightShape {
  public:
   explicit LightShape(const DetectorCamera& camera) : camera_(camera) {}
 
-  /// Fits a light to an outline, or to most of it: all members but kind, lamp and stripes. The
-  /// sigma of a mottled light, see RefinedOutline, allows for the common error of neighbouring
-  /// points. Returns std::nullopt if the outline is not round, or if its centre is not determined
-  /// to about a pixel.
+  /// Fits a light to the majority of the points of an outline. Sets all members but kind, lamp and
+  /// stripes. Returns std::nullopt if the outline is not round, or if the sigma of its center
+  /// exceeds kMaxSigma_px, about a pixel.
+  ///
+  /// @param outline     edge points, (column, line)
+  /// @param background  dark level and noise of the image
+  /// @param is_mottled  RefinedOutline::is_mottled: sigma then allows for correlated errors of
+  ///        neighboring points
   std::optional<Light> light_of(std::vector<EdgePoint> outline, const Background& background,
                                 bool mottled = false) const;
 
-  /// Corrects the centre and sigma_px of a light for the oval of its outline and its motion in the
-  /// level plane per line.
+  /// Corrects center and sigma_px of a light for camera motion.
+  ///
+  /// @param oval             ovality of its outline
+  /// @param motion_per_line  motion of the light in the level plane per scanline
   void shift(const Oval& oval, const Eigen::Vector2d& motion_per_line, Light& light) const;
 
-  /// Returns the points outside a light.
+  /// Returns the outline points outside a light, beyond a margin of 10 % and 1.5 px.
   std::vector<EdgePoint> outside(const Light& light, const std::vector<EdgePoint>& outline) const;
 
-  /// Converts (u, v) of the image to (column, line) and back.
+  /// Converts (u, v) of the image to (column, line), and back.
   Eigen::Vector2d turned(const Eigen::Vector2d& at) const;
   std::vector<Eigen::Vector2d> turned(std::vector<Eigen::Vector2d> points) const;
 
   bool has_lens() const { return camera_.lens.has_value(); }
   bool knows_level() const { return !camera_.level_from_camera.isIdentity(0); }
   /// Converts (u, v) to a point of the level plane at height 1, and back. Without a lens both are
-  /// equal.
+  /// equal. Return std::nullopt if the lens or the plane does not cover the point.
   std::optional<Eigen::Vector2d> plane_of(const Eigen::Vector2d& pixel) const;
   std::optional<Eigen::Vector2d> pixel_of(const Eigen::Vector2d& plane) const;
 
  private:
-  /// Returns the derivative of the line in which a point is read by its x, y.
+  /// Returns the derivative of the scanline at which a point near the circle is read with respect
+  /// to its x, y.
   Eigen::Vector2d line_slope_at(const Circle& circle) const;
 
-  /// Returns the error of the centre of a circle's outline because the lens bends the lines that it
-  /// is read in: on the whole the outline is read later, or sooner, than the centre. In direction a
-  /// it is displaced by m (l(a) - l), with the motion m and the lines l; the error is the part
-  /// along a that varies as cos a and sin a. Parts of an outline are treated as whole ones.
+  /// Returns the center error of a circle's outline that lens distortion of the scanlines causes:
+  /// on average the outline is read later, or earlier, than the center. The outline in direction a
+  /// is displaced by m (l(a) - l), where m is the motion per scanline, l(a) the scanline of the
+  /// outline and l that of the center. The error is the component along a that varies as cos a and
+  /// sin a. Partly visible outlines are treated as complete ones.
   Eigen::Vector2d read_off(const Circle& circle, const Eigen::Vector2d& motion_per_line) const;
 
   DetectorCamera camera_;

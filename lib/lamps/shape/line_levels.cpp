@@ -13,7 +13,7 @@ namespace vlp {
 
 namespace {
 
-/// Mean of the pixels of a chord above the dark, and their moment about the middle.
+/// Mean of the pixels of a chord above the dark level, and their moment about the middle column.
 struct ChordSums {
   double middle, mean, moment, spread;
 };
@@ -84,8 +84,8 @@ std::optional<LineLevel> LineLevels::at(int line) const {
 
 LineLevel LineLevels::predicted(int line) const {
   constexpr int most = 4;
-  constexpr double lamp_sd = 0.01, alone_sd = 0.05;  // how alike the stripes of a lamp are
-  constexpr double missed = 1.5;  // between two lines where a stripe begins or ends
+  constexpr double lamp_sd = 0.01, alone_sd = 0.05;  // repeatability of the stripes of a lamp
+  constexpr double missed = 1.5;  // interpolation error between two lines at the edge of a stripe
   const int last = first_ + static_cast<int>(measured_.size()) - 1;
   const int sign = line < first_ ? 1 : -1;
   double sum = 0, squares = 0, variance = 0;
@@ -112,8 +112,8 @@ LineLevel LineLevels::predicted(int line) const {
   const double mean = sum / count;
   const double scatter =
       count > 1 ? std::max(0.0, squares - count * mean * mean) / (count - 1) : alone_sd * alone_sd;
-  // Levels that change from period to period, as vignetting makes them, scatter by that change, and
-  // their mean is wrong by as much: the scatter is not divided by their number.
+  // Vignetting changes the levels from period to period. They scatter by this change, and their
+  // mean has an error of the same size. The scatter is therefore not divided by their number.
   return {mean, std::sqrt(lamp_sd * lamp_sd + variance / count + scatter)};
 }
 

@@ -12,28 +12,28 @@
 
 namespace vlp {
 
-/// Level of a light on a line above the dark, as a fraction of the brightest, and its standard
-/// deviation.
+/// Level of a light on a scanline above the dark level, as a fraction of its brightest scanline,
+/// and its standard deviation.
 struct LineLevel {
   double level, sd;
 };
 
-/// Levels of a light on lines, in the middle of it; along the lines its level changes linearly, by
-/// vignetting. Lines next to its edge have no pixels inside. Stripes repeat, so that their level is
-/// that of the lines whole periods away. Its standard deviation combines the scatter of these, the
-/// interpolation between lines and the uncertainty of the period. Steady light has the level of the
-/// neighbouring lines.
+/// Predicts the level of a light on each scanline, at its middle column. Along a scanline the level
+/// changes linearly, because of vignetting. Scanlines next to the edge of the light have no pixels
+/// inside it. For modulated light their level is the mean of the scanlines whole periods away. Its
+/// standard deviation combines the scatter of these, the interpolation between scanlines and the
+/// uncertainty of the period. For steady light it is the mean of the neighboring scanlines.
 class LineLevels {
  public:
   /// @pre `chords` are those of at least eight consecutive lines.
   LineLevels(const ImageView& lines, const std::vector<Run>& chords, const Background& background);
 
-  /// Returns the brightest level above the dark, in grey levels.
+  /// Returns the brightest level above the dark level, in grey levels.
   double brightest() const { return brightest_; }
   std::optional<LineLevel> at(int line) const;
   /// Returns the period of the stripes; 0 for steady light.
   double period_lines() const { return period_lines_; }
-  /// Returns the level at a column over that in the middle.
+  /// Returns the ratio of the level at a column to that at the middle column.
   double share_at(double column) const { return std::max(0.1, 1 + slope_ * (column - middle_)); }
 
  private:

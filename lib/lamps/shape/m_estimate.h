@@ -15,31 +15,32 @@
 
 namespace vlp {
 
-/// Signed distance of a point from a curve, and its derivative by the N parameters of the curve.
+/// Signed distance of a point from a curve, and its derivative with respect to the N parameters of
+/// the curve.
 template <int N>
 struct CurveDistance {
   double error;
   Eigen::Matrix<double, N, 1> slope;
 };
 
-/// A step of Gauss-Newton on Tukey's biweight of the distances (Huber 1981).
+/// Gauss-Newton step for Tukey's biweight of the distances (Huber 1981).
 template <int N>
 struct MEstimateStep {
   /// Step to subtract from the parameters.
   Eigen::Matrix<double, N, 1> step;
   /// Covariance of the parameters, from the scatter of the points on the curve.
   Eigen::Matrix<double, N, N> covariance;
-  /// Points that belong to it, and their number.
+  /// Inliers, by the index of the point, and their number.
   std::vector<bool> inliers;
   int count;
-  /// RMS distance of these.
+  /// RMS distance of the inliers.
   double rms;
 };
 
-/// Computes a step from `distance(i)`, the distance of point i, of weights.size() points. The scale
-/// is the median distance of the points closer than four tolerances, at least a tenth of the
-/// tolerance. Returns std::nullopt if less than N + 2 points remain, or if they do not determine
-/// the curve.
+/// Computes a Gauss-Newton step from `distance(i)`, the CurveDistance of point i, for
+/// weights.size() points. The scale is the median distance of the points closer than four
+/// tolerances, and at least a tenth of the tolerance. Returns std::nullopt if less than N + 2
+/// points remain, or if they do not determine the curve.
 template <int N, typename Distance>
 std::optional<MEstimateStep<N>> m_estimate_step(std::span<const double> weights, double tolerance,
                                                 const Distance& distance) {

@@ -20,7 +20,8 @@ void add_edge(const Profile<Level>& profile, int width, int row, double dark,
               std::vector<EdgePoint>& points) {
   constexpr int outside = -6, inside = 3, samples = 4;
   if (!profile.has(outside)) return;
-  // Of the light: a few pixels from 3 px inside on; further in for soft edges, whose run is wide.
+  // Samples a few pixels of the light from 3 px inside on; further inside for soft edges, whose run
+  // is wide.
   const auto level_at = [&](int first) {
     double sum = 0;
     for (int i = first; i < first + samples; ++i) sum += profile(i);
@@ -51,7 +52,7 @@ std::vector<EdgePoint> outline(const ImageView& image, const Blob& blob, double 
     add_edge(Profile<Level>{row, image.width, run.begin, 1}, run.width(), run.row, dark, points);
     add_edge(Profile<Level>{row, image.width, run.end - 1, -1}, run.width(), run.row, dark, points);
   }
-  // Between the stripes of a saturated lamp its charge spills over: no outline of its own.
+  // Between the stripes of a saturated lamp, spilled charge has no outline of its own.
   constexpr double min_share = 0.35;
   double brightest = 0;
   for (const EdgePoint& point : points) brightest = std::max(brightest, point.level);
@@ -59,17 +60,17 @@ std::vector<EdgePoint> outline(const ImageView& image, const Blob& blob, double 
   return points;
 }
 
-/// The ellipse of a disc's rim, upright in its box.
+/// Axis-aligned ellipse of a disc's rim in its box.
 class RimEllipse {
  public:
   explicit RimEllipse(const DiscImage& disc)
       : disc_(disc), center_((disc.low + disc.high) / 2), half_((disc.high - disc.low) / 2) {}
 
-  /// Across the rim, outwards. Precondition: the point is near it.
+  /// Returns the outward normal of the rim. @pre The point is near the rim.
   Eigen::Vector2d normal_at(const Eigen::Vector2d& point) const {
     return (point - center_).cwiseQuotient(half_.cwiseAbs2()).normalized();
   }
-  /// Returns the radius of curvature at the point with that normal.
+  /// Returns the radius of curvature at the point with this normal.
   double radius_px(const Eigen::Vector2d& normal) const {
     return std::pow(half_.prod(), 2) / std::pow(half_.cwiseProduct(normal).norm(), 3);
   }
@@ -77,11 +78,11 @@ class RimEllipse {
     const double up = (row - center_.y()) / half_.y();
     return 2 * half_.x() * std::sqrt(std::max(0.0, 1 - up * up));
   }
-  /// From the image of the disc's centre to the rim's first or last column.
+  /// Returns the distance from the image of the disc's center to the rim's first or last column.
   double half_width_px(bool begins) const {
     return begins ? disc_.center.x() - disc_.low.x() : disc_.high.x() - disc_.center.x();
   }
-  /// From the image of the disc's centre outwards.
+  /// Returns the outward distance from the image of the disc's center.
   double outwards_px(double column, bool begins) const {
     return begins ? disc_.center.x() - column : column - disc_.center.x();
   }
@@ -91,8 +92,8 @@ class RimEllipse {
   Eigen::Vector2d center_, half_;
 };
 
-/// The standard deviation of the blur along the rows, times the cosine there, from how steeply the
-/// levels rise. Of a slower rise no more is corrected: it may be the lamp itself.
+/// Estimates the standard deviation of the blur across the rim from the rise of the levels. The
+/// result is limited, because a slower rise may belong to the lamp itself.
 double blur_px(const std::vector<EdgePoint>& points, const RimEllipse& rim) {
   constexpr double quarters = 1.349;  // of a normal distribution, in standard deviations
   constexpr double most = 1.5;
@@ -104,17 +105,17 @@ double blur_px(const std::vector<EdgePoint>& points, const RimEllipse& rim) {
   return std::min(upper_median(std::move(blurs)), most);
 }
 
-/// The light next to the edge in a row: a line through a few pixels further in, because lamps
-/// darken towards their rim, and the lens towards the image's.
+/// Level of the light next to the edge in a row: a line fit to a few pixels further inside, because
+/// lamps darken towards their rim, and the lens darkens towards the image border.
 struct InnerLevel {
   EdgePoint point;
   Eigen::Vector2d normal;
-  /// The column from which a profile inwards counts.
+  /// Column of pixel 0 of the inward profile.
   int origin;
-  /// The first pixel of the line in that profile, and the middle of all.
+  /// First pixel of the line fit in this profile, and the middle of its pixels.
   int first;
   double middle;
-  /// At the middle, above the dark; how much more with each pixel inwards.
+  /// Level at the middle above the dark level, and its change per pixel inwards.
   double level, slope;
 
   int direction() const { return point.begins ? 1 : -1; }
@@ -123,7 +124,7 @@ struct InnerLevel {
 };
 
 constexpr int kBefore = 8, kSamples = 8;
-/// Variance of the places on a line.
+/// Variance of the pixel positions of a line fit.
 constexpr double kVariance = (kSamples * kSamples - 1) / 12.0;
 
 template <typename Level>
@@ -140,7 +141,7 @@ std::vector<InnerLevel> inner_levels(const ImageView& image, const std::vector<E
   std::vector<InnerLevel> result;
   result.reserve(points.size());
   for (const EdgePoint& point : points) {
-    // The cosine of the angle between the row and the outline's normal.
+    // Skips rows that cut the outline at a flat angle.
     InnerLevel inner{};
     inner.point = point;
     inner.normal = rim.normal_at(point.pixel);
@@ -159,21 +160,22 @@ std::vector<InnerLevel> inner_levels(const ImageView& image, const std::vector<E
     }
     inner.level = sum / kSamples - dark;
     inner.slope = moment / square;
-    // What hides the light further in bends the line too much.
+    // An occluder further inside makes the line too steep.
     const double change = std::abs(inner.slope) * (inner.middle - kBefore);
     if (change < max_bent * inner.level) result.push_back(inner);
   }
   return result;
 }
 
-/// Fits the edge of a profile near `at` to all of its pixels there; `width` is the standard
-/// deviation of the blur along it. See refined().
+/// Fits the edge of a profile near `at` to all pixels there; `width` is the standard deviation of
+/// the blur along the profile. See refine_outline().
 template <typename Level>
 std::optional<double> blurred_edge(const Profile<Level>& profile, double at, double width,
                                    double level, double dark) {
   constexpr int rounds = 4;
   constexpr double reach = 3, min_reach_px = 2, further_in_px = 1, far = 2;
-  const double reach_px = std::max(reach * width, min_reach_px);  // four unknowns want more pixels
+  const double reach_px =
+      std::max(reach * width, min_reach_px);  // four unknowns need enough pixels
   const int begin = static_cast<int>(std::ceil(at - reach_px));
   const int end = static_cast<int>(std::floor(at + reach_px + further_in_px));
   if (!profile.has(begin) || !profile.has(end)) return std::nullopt;
@@ -198,11 +200,11 @@ std::optional<double> blurred_edge(const Profile<Level>& profile, double at, dou
   return edge;
 }
 
-/// Returns the curvature q of a light's levels 1 + q (u / w)^2, u pixels along a row from the image
-/// of the disc's centre, w from there to the rim. It is negative if the light is darker at its rim.
-/// It is the mean of the medians of the slopes of both sides, on which a linear change across the
+/// Returns the curvature q of a light's level profile 1 + q (u / w)^2: u pixels along a row from
+/// the image of the disc's center, w from there to the rim. It is negative if the light is darker
+/// at its rim. It is the mean of the medians of both sides, so that a linear change across the
 /// light has no effect. Returns 0 for a light that is too small for slopes away from the middle, or
-/// of which a side is hidden.
+/// if a side is hidden.
 double bend_of(const std::vector<InnerLevel>& levels, const RimEllipse& rim) {
   constexpr double min_u = 1 / 3.0;  // of w: nearer to the middle no slope shows the bend
   constexpr double most = 0.8;
@@ -221,10 +223,10 @@ double bend_of(const std::vector<InnerLevel>& levels, const RimEllipse& rim) {
   return std::clamp(bend, -most, most);
 }
 
-/// Whether what the lines of the levels leave, bent as they are, goes on from pixel to pixel:
-/// beyond chance, and by enough to move the outline. Of noise the mean product of neighbours is
-/// -1/4 of the mean square, because a line was taken off, and of the n = 6 that 8 pixels have left
-/// per line its standard deviation is 1 / sqrt(n).
+/// Returns true if the residuals of the curved line fits are correlated between neighboring pixels,
+/// beyond chance and enough to move the outline. For pure noise the mean product of neighbors is
+/// -1/4 of the mean square, because a line was fitted. With the n = 6 degrees of freedom of 8
+/// pixels per line, its standard deviation is 1 / sqrt(n).
 template <typename Level>
 bool mottled(const ImageView& image, const std::vector<InnerLevel>& levels, const RimEllipse& rim,
              double bend, double dark) {
@@ -254,9 +256,9 @@ bool mottled(const ImageView& image, const std::vector<InnerLevel>& levels, cons
 template <typename Level>
 RefinedOutline refine(const ImageView& image, const std::vector<EdgePoint>& points,
                       const DiscImage& disc, double dark) {
-  // Of more blur the tail reaches the samples, and would pass for a bend.
+  // With more blur its tail reaches the samples and is mistaken for curvature.
   constexpr double max_blur_to_bend_px = 1.3;
-  // Of the blur that rises show: they are taken from levels between pixels.
+  // Variance that interpolation between pixels adds to the measured rises.
   constexpr double between_pixels = 1 / 8.0;
   constexpr double min_width_px = 0.4;
   if (points.empty()) return {};
@@ -277,12 +279,13 @@ RefinedOutline refine(const ImageView& image, const std::vector<EdgePoint>& poin
     const auto profile = profile_of<Level>(image, inner);
     const auto at = profile.crossing(dark + level / 2, 0, inner.first);
     if (!at) continue;
-    // The lamp's own slope at its rim, inwards: the lens darkens what is blurred already.
+    // Slope of the lamp's own profile at its rim, inwards. Vignetting acts on levels that are
+    // already blurred.
     const double rim_px = rim.outwards_px(inner.column(kBefore), begins);
     const double slope = -2 * bend * inner.level * rim_px / (width_px * width_px);
-    // Blurred, the half of a level lies further out where the light grows inwards, and further in
-    // behind a bent rim: for a standard deviation s of the blur across it and a radius r of the
-    // rim by s^2 slope / level and s^2 / (2 r), to first order.
+    // Blur moves the half-level point outwards if the level increases inwards, and inwards at a
+    // curved rim. For a standard deviation s of the blur across it and a radius r of the rim, the
+    // displacements are s^2 slope / level and s^2 / (2 r), to first order.
     const double cosine = inner.cosine();
     const double behind_bend = square_across / (2 * rim.radius_px(inner.normal) * cosine);
     double edge = *at + square * slope / (level * cosine * cosine) - behind_bend;

@@ -6,7 +6,8 @@
 
 namespace vlp {
 
-/// A row seen from outside a light towards its inside: pixel i is `edge + direction * i`.
+/// Profile of a row from outside a light towards its inside: pixel i is in column `edge + direction
+/// * i`.
 template <typename Level>
 struct Profile {
   const Level* row;
@@ -18,7 +19,8 @@ struct Profile {
   }
   double operator()(int i) const { return row[edge + direction * i]; }
 
-  /// Returns the first place from `begin` on where the profile rises through a level.
+  /// Returns the first position from `begin` to before `end` where the profile rises through
+  /// `level`; std::nullopt if there is none.
   std::optional<double> crossing(double level, int begin, int end) const {
     for (int i = begin; i < end && has(i) && has(i + 1); ++i) {
       const double below = (*this)(i), above = (*this)(i + 1);

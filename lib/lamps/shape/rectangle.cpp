@@ -43,7 +43,8 @@ Sides sides_of(const Corners& corners) {
           {corners[3], corners[0]}};
 }
 
-/// Corner i is where side i begins.
+/// Returns the corners; corner i is the begin of side i. Returns std::nullopt if neighboring sides
+/// are nearly parallel.
 std::optional<Corners> corners_of(const Sides& sides) {
   Corners corners;
   for (std::size_t i = 0; i < 4; ++i) {
@@ -60,7 +61,7 @@ std::optional<Eigen::Vector2d> center_of(const Sides& sides) {
   return meeting({(*corners)[0], (*corners)[2]}, {(*corners)[1], (*corners)[3]});
 }
 
-/// Whether the angles are right, nearly.
+/// Returns true if all angles are right angles within 20 degrees.
 bool rectangular(const Sides& sides) {
   const double max_off = std::sin(rad_from_deg(20));
   for (std::size_t i = 0; i < 4; ++i) {
@@ -70,7 +71,7 @@ bool rectangular(const Sides& sides) {
   return true;
 }
 
-/// Long over short.
+/// Returns the ratio of the long to the short side.
 double aspect_of(const Sides& sides) {
   const auto length = [&](std::size_t i) { return (sides[i].to - sides[i].from).norm(); };
   const double ratio = (length(0) + length(2)) / (length(1) + length(3));
@@ -79,9 +80,9 @@ double aspect_of(const Sides& sides) {
 
 double square(double value) { return value * value; }
 
-/// Returns the standard deviation of the angles and of the logarithm of the ratio of sides in the
-/// plane: a calibrated tilt is known to some tenths of a degree. Every tilt that is stated counts
-/// as calibrated, and a level camera as one of unknown tilt.
+/// Returns the standard deviation of the angles and of the log aspect ratio in the plane: a
+/// calibrated tilt is accurate to some tenths of a degree. Every given tilt counts as calibrated,
+/// and an identity rotation as an unknown tilt.
 double get_tilt_sd(const LightShape& shape) {
   return shape.knows_level() ? kLeanedOff / 30 : kLeanedOff;
 }
@@ -89,7 +90,7 @@ double get_tilt_sd(const LightShape& shape) {
 /// Returns the variance of the distance of an edge's middle, in square pixels.
 double compute_middle_variance(const StraightEdge& edge) { return edge.covariance_px.sum() / 4; }
 
-/// Returns the distance of the middle of one side from another one.
+/// Returns the distance of the middle of side `to` from side `from`.
 double compute_distance(const Side& from, const Side& to) {
   return std::abs(((to.from + to.to) / 2 - (from.from + from.to) / 2).dot(from.inwards()));
 }
@@ -106,8 +107,8 @@ double aspect_sd_of(const std::array<StraightEdge, 4>& edges, double per_px) {
   return std::sqrt(variance);
 }
 
-/// Returns the convex hull, counter-clockwise as x and y are seen with x to the right and y up
-/// (Andrew's monotone chain).
+/// Returns the convex hull, counter-clockwise with x to the right and y up (Andrew's monotone
+/// chain).
 std::vector<Eigen::Vector2d> convex_hull(std::vector<Eigen::Vector2d> points) {
   std::sort(points.begin(), points.end(), [](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
     return a.x() != b.x() ? a.x() < b.x() : a.y() < b.y();
@@ -122,14 +123,14 @@ std::vector<Eigen::Vector2d> convex_hull(std::vector<Eigen::Vector2d> points) {
       }
       hull.push_back(*point);
     }
-    hull.pop_back();  // it begins the other chain
+    hull.pop_back();  // first point of the other chain
   };
   add_chain(points.begin(), points.end());
   add_chain(points.rbegin(), points.rend());
   return hull;
 }
 
-/// Computes the rectangle of the least area around the points, the light on the left of its sides.
+/// Computes the minimum-area rectangle around the points, with the light on the left of its sides.
 /// One of its sides lies on a side of their convex hull (Freeman and Shapira 1975).
 Corners rectangle_around(const std::vector<Eigen::Vector2d>& points) {
   const auto hull = convex_hull(points);
@@ -165,7 +166,8 @@ std::size_t nearest(const Sides& sides, const Eigen::Vector2d& point) {
                                   sides.begin());
 }
 
-/// The sides through the points next to them; a side along the lines has few, and stays.
+/// Fits each side to the points next to it. A side along the scanlines has too few points and is
+/// unchanged.
 Sides through(const std::vector<Eigen::Vector2d>& points, Sides sides, double within) {
   constexpr std::size_t least = 6;
   constexpr double min_spread = 0.25;
@@ -193,7 +195,7 @@ Sides through(const std::vector<Eigen::Vector2d>& points, Sides sides, double wi
   return sides;
 }
 
-/// Corners of a rectangle by its outline, before its edges are fitted, and the fraction of the
+/// Corners of a rectangle from its outline, before its edges are fitted, and the fraction of the
 /// points next to its sides.
 struct FirstCorners {
   Corners corners;
@@ -222,8 +224,9 @@ std::optional<FirstCorners> first_corners(const std::vector<Eigen::Vector2d>& po
   return FirstCorners{corners, double(near) / double(points.size())};
 }
 
-/// The same of a slender one that a lens bends which nobody knows: its corners are those of the
-/// best of many that are bent back, which leaves its ends where they are.
+/// Returns the corners of a slender rectangle whose sides an unknown lens curves. Tries many
+/// curvatures, straightens the points by each of them, which does not change the ends, and selects
+/// the best corners.
 std::optional<FirstCorners> bent_corners(const std::vector<Eigen::Vector2d>& points) {
   constexpr double max_px = 6, step_px = 0.5, min_aspect = 3;
   const Sides around = sides_of(rectangle_around(points));
@@ -245,11 +248,13 @@ std::optional<FirstCorners> bent_corners(const std::vector<Eigen::Vector2d>& poi
   return best;
 }
 
-/// The image of the centre under a lens that nobody knows: p (1 + k |p|^2), p from the image's
-/// middle. To first order of k an edge of the half-length h that stands off the middle by p bows by
-/// -k h^2 p . n across it, and the diagonals cross k (a^2 + b^2) p off the centre, a and b half of
-/// the sides. What is known of k beforehand is that of an equidistant lens of 115 degrees from
-/// corner to corner, give or take.
+/// Offset of the image of the center from the intersection of the diagonals under an unknown lens,
+/// and its standard deviation.
+///
+/// The lens model is p (1 + k |p|^2), p relative to the image center. To first order of k an edge
+/// of half-length h at the position p is curved by -k h^2 p . n across it. The diagonals intersect
+/// k (a^2 + b^2) p from the center, with a and b half of the sides. The prior of k has the standard
+/// deviation of an equidistant lens of 115 degrees from corner to corner.
 struct Unbent {
   Eigen::Vector2d shift;
   double sd_px;
@@ -257,7 +262,7 @@ struct Unbent {
 
 Unbent unbent(const std::array<StraightEdge, 4>& edges, const Eigen::Vector2d& center,
               const Eigen::Vector2d& middle) {
-  constexpr double bow_sd = 2, of_shift = 0.1;  // over that of the ends; higher orders
+  constexpr double bow_sd = 2, of_shift = 0.1;  // ratio to that of the ends; higher orders
   const double focal_px = middle.norm(), known_sd = 1 / (3 * focal_px * focal_px);
   double information = 1 / (known_sd * known_sd), moment = 0;
   Eigen::Vector2d by_k = Eigen::Vector2d::Zero();
@@ -276,7 +281,8 @@ Unbent unbent(const std::array<StraightEdge, 4>& edges, const Eigen::Vector2d& c
   return {k * by_k, sd_px / std::numbers::sqrt2};
 }
 
-/// Around what lies so deep inside, (u, v); empty when the lens does not describe it.
+/// Returns the polygon at the depth `inset` inside the sides, (u, v); empty if the lens does not
+/// cover it.
 std::vector<Eigen::Vector2d> face_of(const Sides& sides, double inset, const LightShape& shape) {
   constexpr int pieces = 8;
   Sides inside = sides;
@@ -299,7 +305,8 @@ std::vector<Eigen::Vector2d> face_of(const Sides& sides, double inset, const Lig
   return face;
 }
 
-/// Covariance of the distances of the ends from the edges: from and to of each edge in turn.
+/// Covariance of the distances of the ends from the edges: from and to of edge 0, from and to of
+/// edge 1, and so on.
 using EndsCovariance = Eigen::Matrix<double, 8, 8>;
 
 EndsCovariance make_ends_covariance(const std::array<StraightEdge, 4>& edges) {
@@ -310,13 +317,13 @@ EndsCovariance make_ends_covariance(const std::array<StraightEdge, 4>& edges) {
   return covariance;
 }
 
-/// Moves the sides to what is most probable for a rectangle, and corrects the covariance (Kalman's
-/// update): a tilt error makes opposite sides converge by its product with their distance, in the
-/// plane at height 1, and changes right angles by get_tilt_sd(). Angles that contradict are left:
-/// something hides a part.
+/// Moves the sides to the most probable rectangle, and updates the covariance (Kalman's update). A
+/// tilt error makes opposite sides converge by its product with their distance, in the plane at
+/// height 1, and changes right angles by get_tilt_sd(). Contradictory angles are not corrected,
+/// because an object may hide a part.
 void apply_right_angles(const LightShape& shape, double per_px, Sides& sides,
                         EndsCovariance& covariance) {
-  constexpr double clear = 16;      // chi-squared of three angles: one in a thousand
+  constexpr double clear = 16;      // chi-square of three angles: one in a thousand
   constexpr double per_lean = 1.5;  // tilt error in rad over get_tilt_sd()
   constexpr std::array<std::array<std::size_t, 2>, 3> pairs = {{{0, 2}, {1, 3}, {0, 1}}};
   Eigen::Matrix<double, 3, 8> slope = Eigen::Matrix<double, 3, 8>::Zero();
@@ -347,7 +354,7 @@ void apply_right_angles(const LightShape& shape, double per_px, Sides& sides,
   }
 }
 
-/// Computes the covariance of the image of the centre, in square pixels, from that of the ends.
+/// Computes the covariance of the image of the center, in square pixels, from that of the ends.
 std::optional<Matrix2> center_covariance(const Sides& sides, const EndsCovariance& ends,
                                          double per_px, const LightShape& shape) {
   constexpr double moved_px = 0.05;
@@ -368,8 +375,8 @@ std::optional<Matrix2> center_covariance(const Sides& sides, const EndsCovarianc
   return slope * ends * slope.transpose();
 }
 
-/// Whether the outline reaches into the corners, as no disc's does: (2 u / length)^2 +
-/// (2 v / width)^2 is 1 on an ellipse within the sides, and up to 2 on the sides.
+/// Returns true if the outline extends into the corners, unlike that of a disc: (2 u / length)^2 +
+/// (2 v / width)^2 is 1 on an ellipse inside the sides, and up to 2 on the sides.
 bool has_corners(const std::vector<Eigen::Vector2d>& points, const Sides& sides,
                  const Eigen::Vector2d& center) {
   constexpr double beyond = 1.35, min_fraction = 0.1;
@@ -383,7 +390,7 @@ bool has_corners(const std::vector<Eigen::Vector2d>& points, const Sides& sides,
   return double(far) >= min_fraction * double(points.size());
 }
 
-/// `points` are the outline in the plane.
+/// Makes a light of four edges; `points` are the outline in the plane.
 std::optional<Light> light_of(std::array<StraightEdge, 4>& edges, double per_px,
                               const std::vector<Eigen::Vector2d>& points,
                               const Eigen::Vector2d& middle, const LightShape& shape) {
@@ -440,10 +447,10 @@ std::optional<Light> light_of(std::array<StraightEdge, 4>& edges, double per_px,
   return light.face.empty() ? std::nullopt : std::optional(std::move(light));
 }
 
-/// The edges of a rectangle in the order of its sides; std::nullopt for those that are not found.
+/// Edges of a rectangle in the order of its sides; std::nullopt for edges that are not found.
 using FoundEdges = std::array<std::optional<StraightEdge>, 4>;
 
-/// Returns the blur of the surest edge. @pre There is one.
+/// Returns the blur of the edge with the smallest variance. @pre At least one edge exists.
 double find_surest_blur_px(const FoundEdges& edges) {
   const StraightEdge* surest = nullptr;
   for (const auto& edge : edges) {
@@ -454,14 +461,14 @@ double find_surest_blur_px(const FoundEdges& edges) {
   return surest->blur_px;
 }
 
-/// Finds hidden edges from those that are seen, see rectangle_of().
+/// Finds hidden edges from the visible ones, see rectangle_of().
 class HiddenEdges {
  public:
   HiddenEdges(const ImageView& lines, const LineLevels& levels, double dark, double per_px,
               const LightShape& shape)
       : lines_(lines), levels_(levels), dark_(dark), per_px_(per_px), shape_(shape) {}
 
-  /// Adds the missing edges. Returns false if two neighbouring edges are missing or a missing edge
+  /// Adds the missing edges. Returns false if two neighboring edges are missing or a missing edge
   /// is not found.
   bool add_to(FoundEdges& edges, const Sides& sides, EdgeSearch search,
               const std::vector<Eigen::Vector2d>& sizes_m) const {
@@ -474,7 +481,7 @@ class HiddenEdges {
       min_side = std::min(min_side, (sides[i].to - sides[i].from).norm());
     }
     search.blur_px = find_surest_blur_px(seen);
-    // Reaches to the next stripe, but not to the opposite edge.
+    // The window extends to the next stripe, but not to the opposite edge.
     search.reach_px = std::max(
         search.reach_px, std::min(levels_.period_lines() + ramp_lines, min_side / per_px_ / 2));
     for (std::size_t i = 0; i < 4; ++i) {
@@ -501,7 +508,7 @@ class HiddenEdges {
   }
 
  private:
-  /// Place of an edge's middle from where it was found, inside positive.
+  /// Offset of an edge's middle from its fitted position, inside positive.
   struct Place {
     double offset_px, sd_px;
   };
@@ -518,7 +525,7 @@ class HiddenEdges {
     return 1 / (compute_direction_variance(edge) + square(get_tilt_sd(shape_)));
   }
 
-  /// Returns the standard deviation of the direction of edge i by the others.
+  /// Returns the standard deviation of the direction of edge i, predicted from the other edges.
   double compute_direction_sd(const FoundEdges& seen, std::size_t i) const {
     double sum = 0, variance = 0;
     for (std::size_t k = 1; k < 4; ++k) {
@@ -530,7 +537,8 @@ class HiddenEdges {
     return std::sqrt(variance / square(sum) + square(get_tilt_sd(shape_)));
   }
 
-  /// Turns side i about its middle as the other edges are turned, up to where its neighbours are.
+  /// Rotates side i about its middle by the mean rotation of the other edges, and extends it to its
+  /// neighbors.
   std::optional<Side> predict_side(const Side& side, const FoundEdges& seen, std::size_t i) const {
     double sum = 0, moment = 0;
     for (std::size_t k = 1; k < 4; ++k) {
@@ -550,19 +558,20 @@ class HiddenEdges {
     return from && to ? std::optional(Side{*from, *to}) : std::nullopt;
   }
 
-  /// Predicts edge i from the other three by the ratio of the sides of the only size that agrees
-  /// with the place where it was found; std::nullopt if several or none do.
+  /// Predicts the position of edge i from the other three by the aspect ratio of the only size that
+  /// agrees with its fitted position. Returns std::nullopt if several sizes or none agree.
   std::optional<Place> predict_place(const FoundEdges& edges, std::size_t i,
                                      const std::vector<Eigen::Vector2d>& sizes_m) const {
-    constexpr double size_sd_m = 0.001;      // of sizes that are stated to the millimetre
-    constexpr double bounds = 2, clear = 3;  // standard deviations: an even one ends at sqrt(3)
+    constexpr double size_sd_m = 0.001;  // sizes are given to the millimeter
+    constexpr double bounds = 2,
+                     clear = 3;  // standard deviations: a uniform distribution ends at sqrt(3)
     const StraightEdge &edge = *edges[i], &opposite = *edges[(i + 2) % 4];
     const StraightEdge &left = *edges[(i + 1) % 4], &right = *edges[(i + 3) % 4];
     const double length_px = compute_distance(left.side, right.side) / per_px_;
     const double depth_px = compute_distance(opposite.side, edge.side) / per_px_;
     std::optional<Place> place;
-    // The variance of the opposite edge counts three times: edges are taken as independent, but its
-    // error moves both.
+    // The variance of the opposite edge counts three times. Edges are assumed to be independent,
+    // but its error moves both edges.
     for (const Eigen::Vector2d& size_m : sizes_m) {
       for (const double ratio : {size_m[0] / size_m[1], size_m[1] / size_m[0]}) {
         const double relative_variance =
@@ -643,7 +652,7 @@ std::optional<Light> rectangle_of(const ImageView& lines, const Blob& blob,
   if (!first) return std::nullopt;
   std::optional<Corners> corners = first->corners;
 
-  // No disc, of which stripes hide a part, too, is so slender.
+  // A disc that stripes partly hide is less slender than this.
   constexpr double min_aspect = 3;
   const auto is_rather_round = [&](const Sides& sides) {
     if (aspect_of(sides) > min_aspect) return false;
@@ -664,7 +673,7 @@ std::optional<Light> rectangle_of(const ImageView& lines, const Blob& blob,
     const double inset = std::min((inset_px + bow_px) * per_px, min_side / 3);
     const auto chords = chords_within(shape.turned(face_of(sides, inset, shape)), lines.size());
     if (chords.size() < min_lines) return std::nullopt;
-    // Lines that follow one another, or levels would be taken for those of others.
+    // The chords have to be on consecutive scanlines, because LineLevels assigns levels by index.
     const int rows = chords.back().row - chords.front().row + 1;
     if (rows != static_cast<int>(chords.size())) return std::nullopt;
     const LineLevels levels(lines, chords, background);

@@ -15,36 +15,43 @@
 
 namespace vlp {
 
-/// Change of the logarithm of a rectangle's ratio of sides by an unknown lean of 5 degrees, 35
-/// degrees from the axis. Its angles change by about as much, in rad.
+/// Change of the log aspect ratio of a rectangle that an unknown tilt of 5 degrees causes, 35
+/// degrees off axis. Its angles change by about as much, in rad.
 inline constexpr double kLeanedOff = 0.06;
 
-/// A light that is a rectangle, a panel or a tube, by its four edges, straight in rays behind the
-/// lens; without a lens in the image, where what they bow tells how far from the centre the
-/// diagonals cross; that is taken off, and how surely it is known is in sigma_px. `outline` is that
-/// of outline_of().
+/// Fits a rectangular light, a panel or a tube, by its four edges.
 ///
-/// From the rectangle of the least area around the outline, turned to what lines say of its sides,
-/// each side goes to its edge, see straight_edge_at(). The centre is where the diagonals cross: of
-/// the image of a rectangle, whatever the angle from which it is seen, that is the image of its
-/// centre. The sigma is that of the eight ends of the sides.
+/// @param lines    image whose rows are the scanlines
+/// @param outline  result of outline_of() for the blob
+/// @param sizes_m  sizes of the map's rectangles, used only for hidden edges
+/// @return  the light; its sigma is propagated from the eight ends of the sides, and `low` and
+///        `high` include two standard deviations of the sides
 ///
-/// Behind a lens one edge, or two opposite ones, may be hidden by a dark stripe that they lie
-/// along, see hidden_edge_at(). The direction of a hidden edge follows from the others. The place
-/// of a single one follows from the ratio of the sides, too, if one of `sizes_m`, the sizes of the
-/// map's rectangles, agrees with the stripes. Right angles correct all edges, within what is known
-/// of the tilt. `low` and `high` include two standard deviations of the sides.
+/// Starts from the minimum-area rectangle around the outline, aligned by line fits to its sides.
+/// Then fits each side to its edge, see straight_edge_at(). The center is the intersection of the
+/// diagonals, because perspective preserves it from any viewing angle.
 ///
-/// Returns std::nullopt if four edges do not make a rectangle, to 20 degrees (an unknown lean bends
-/// it); if it is less than 10 px wide, has less than some 18 lines, or is more than 40 times as
-/// long as wide; if an edge that is not hidden is not in the image or not found; and if edges are
-/// hidden and a circle explains more of the outline.
+/// Edges are straight in the plane of LightShape. Without a lens they are fitted in the image.
+/// Their curvature then estimates the offset of the center from the intersection of the diagonals.
+/// The offset is subtracted, and its uncertainty is included in sigma_px.
+///
+/// With a lens, one edge or two opposite ones may be hidden by a dark stripe along them, see
+/// hidden_edge_at(). The direction of a hidden edge follows from the other edges. The position of a
+/// single hidden edge also follows from the aspect ratio if one of `sizes_m` agrees with the
+/// stripes. Right angles correct all edges, within the uncertainty of the tilt.
+///
+/// Returns std::nullopt in these cases:
+/// - Four edges do not form a rectangle to 20 degrees, since an unknown tilt deforms it.
+/// - The rectangle is less than 10 px wide, has less than about 18 scanlines, or has an aspect
+///   ratio above 40.
+/// - An edge that is not hidden is outside the image or not found.
+/// - Edges are hidden and a circle explains more of the outline.
 std::optional<Light> rectangle_of(const ImageView& lines, const Blob& blob,
                                   const std::vector<EdgePoint>& outline,
                                   const Background& background, const LightShape& shape,
                                   const std::vector<Eigen::Vector2d>& sizes_m);
 
-/// The pixels inside a convex polygon, (column, row), on each line of an image of that size.
+/// Returns the pixels inside a convex polygon, (column, row), on each line of an image of `size`.
 std::vector<Run> chords_within(const std::vector<Eigen::Vector2d>& polygon, const ImageSize& size);
 
 }  // namespace vlp

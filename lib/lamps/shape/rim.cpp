@@ -18,16 +18,17 @@
 namespace vlp {
 namespace {
 
-/// The ellipse |unit_from_pixel (p - center)| = 1, (column, row).
+/// Ellipse |unit_from_pixel (p - center)| = 1, (column, row).
 struct Ellipse {
   Eigen::Vector2d center;
   Matrix2 unit_from_pixel;
 
-  /// Columns where a line crosses it, and the height of the line over that of the ellipse, 0 in the
-  /// middle, 1 where the line is tangent. Returns std::nullopt for lines that miss it.
+  /// Columns where a scanline crosses the ellipse, and the relative height of the scanline: 0 in
+  /// the middle, 1 if the scanline is tangent.
   struct Crossing {
     double begin, end, height;
   };
+  /// Returns the crossing with a scanline; std::nullopt if there is none.
   std::optional<Crossing> cross(double line) const {
     const Eigen::Vector2d by_column = unit_from_pixel.col(0);
     const Eigen::Vector2d at_line = unit_from_pixel.col(1) * (line - center.y());
@@ -40,7 +41,7 @@ struct Ellipse {
     return Crossing{middle - half, middle + half, std::sqrt(square)};
   }
 
-  /// Cosine of the angle between the outline's normal at a point and the lines.
+  /// Returns the cosine of the angle between the outline's normal at a point and the scanlines.
   double cosine_at(const Eigen::Vector2d& pixel) const {
     const Eigen::Vector2d normal =
         unit_from_pixel.transpose() * (unit_from_pixel * (pixel - center));
@@ -50,7 +51,8 @@ struct Ellipse {
   double mean_radius_px() const { return 1 / std::sqrt(std::abs(unit_from_pixel.determinant())); }
 };
 
-/// Derivative of the level plane with respect to (column, row), at a pixel, of determinant 1.
+/// Returns the derivative of the level plane with respect to (column, row) at a pixel, scaled to
+/// determinant 1.
 Matrix2 compute_unit_plane_from_pixel(const LightShape& shape, const Eigen::Vector2d& pixel) {
   constexpr double step_px = 1;
   Matrix2 derivative = Matrix2::Identity();
@@ -64,16 +66,16 @@ Matrix2 compute_unit_plane_from_pixel(const LightShape& shape, const Eigen::Vect
   return determinant > 0 ? Matrix2(derivative / std::sqrt(determinant)) : Matrix2::Identity();
 }
 
-/// An ellipse in pixels of a box, and the sum of e over its crossings with lit lines.
+/// Ellipse in pixels of a box, and the sum of e over its crossings with lit scanlines.
 struct Ring {
   Ellipse ellipse;
   double sum;
 };
 
-/// Levels above the dark in the box of a light and a margin around it.
+/// Levels above the dark level in the box of a light with a margin.
 class Face {
  public:
-  /// Computes means over `window` pixels of a line.
+  /// Computes means over `window` pixels of a scanline.
   Face(const ImageView& image, const PixelBox& box, const Background& background, int window)
       : box_(box), window_(window) {
     constexpr double share = 0.02;
@@ -91,7 +93,7 @@ class Face {
   }
 
   const PixelBox& box() const { return box_; }
-  /// Returns the lines of bright stripes, of the box.
+  /// Returns the scanlines of bright stripes, relative to the box.
   const std::vector<int>& lit_lines() const { return lit_; }
   std::vector<int> lit_lines_of_image() const {
     std::vector<int> lines = lit_;
@@ -100,13 +102,13 @@ class Face {
   }
   bool has(int column) const { return column >= window_ && column + window_ <= box_.width; }
 
-  /// Returns the mean levels before and after the border between a column and the one before it.
+  /// Returns the mean levels before and after the border between a column and the previous one.
   std::pair<double, double> around(int line, int column) const {
     const float* line_means = means(line);
     return {std::max(0.F, line_means[column - 1]), std::max(0.F, line_means[column + window_ - 1])};
   }
 
-  /// Returns e, unbounded, of a light that begins at that border, or ends there; 0 at the edge of
+  /// Returns e without limits for a light that begins, or ends, at this border; 0 at the border of
   /// the box.
   double step(int line, int column, bool begins) const {
     if (!has(column)) return 0;
@@ -119,8 +121,8 @@ class Face {
     return std::log(ratio / slope);
   }
 
-  /// Returns the column next to a border where a line passes that fraction of the way between the
-  /// levels on both sides of it.
+  /// Returns the column next to a border where the level of a scanline crosses the given fraction
+  /// between the levels on both sides.
   std::optional<double> passage(int line, int column, double fraction) const {
     const auto [before, after] = around(line, column);
     const auto [dark, bright] = std::minmax(before, after);
@@ -141,8 +143,8 @@ class Face {
   const float* levels(int line) const { return levels_.data() + std::ptrdiff_t(line) * box_.width; }
   const float* means(int line) const { return means_.data() + std::ptrdiff_t(line) * box_.width; }
 
-  /// Computes the mean over a window that ends with each pixel; before the first pixel the line has
-  /// its level.
+  /// Computes the mean over a window that ends with each pixel. Before the first pixel the level of
+  /// the first pixel is used.
   void find_means() {
     means_.reserve(levels_.size());
     for (int row = 0; row < box_.height; ++row) {
@@ -183,8 +185,8 @@ class Face {
   std::vector<int> lit_;
 };
 
-/// Steps e of some of the lit lines at each border, for a light that begins there and for one that
-/// ends.
+/// Steps e of a subset of the lit scanlines at each border, for a light that begins there and for
+/// one that ends there.
 class Steps {
  public:
   explicit Steps(const Face& face) : width_(face.box().width) {
@@ -201,9 +203,10 @@ class Steps {
     }
   }
 
-  /// Returns the sum of e over the crossings of an ellipse with all lit lines.
+  /// Returns the sum of e over the crossings of an ellipse with the lit scanlines, scaled to all of
+  /// them.
   double sum_of(const Ellipse& ellipse) const {
-    constexpr double max_height = 0.94;  // where lines still cross the outline
+    constexpr double max_height = 0.94;  // scanlines are nearly tangent above it
     double sum = 0;
     for (std::size_t i = 0; i < lines_.size(); ++i) {
       const auto crossing = ellipse.cross(lines_[i]);
@@ -227,8 +230,8 @@ class Steps {
   std::vector<double> e_;
 };
 
-/// Returns the ring of the largest sum. Rings are circles behind the lens, with
-/// `unit_plane_from_pixel` there.
+/// Returns the ring with the largest sum. Rings are circles in the level plane, whose derivative is
+/// `unit_plane_from_pixel`.
 Ring find_best_ring(const Face& face, const PixelBox& blob, const Matrix2& unit_plane_from_pixel) {
   constexpr double fine = 20, max_radius = 0.75, max_shift = 0.35;
   const Steps steps(face);
@@ -249,14 +252,14 @@ Ring find_best_ring(const Face& face, const PixelBox& blob, const Matrix2& unit_
   return best;
 }
 
-/// Returns the ellipse of a light's outline near its centre.
+/// Returns the ellipse of a light's outline, linearized at its center.
 Ellipse make_ellipse(const Light& light, const LightShape& shape) {
   const Eigen::Vector2d low = shape.turned(light.low), high = shape.turned(light.high);
   const Eigen::Vector2d center = (low + high) / 2;
   Matrix2 unit_from_pixel;
   const auto at = shape.plane_of(shape.turned(center));
   for (int i = 0; i < 2; ++i) {
-    // Over the whole outline, because the lens bends.
+    // The difference spans the whole outline, because of lens distortion.
     const double reach_px = (high - low)[i] / 2;
     const auto beside = shape.plane_of(shape.turned(center + reach_px * Eigen::Vector2d::Unit(i)));
     const auto before = shape.plane_of(shape.turned(center - reach_px * Eigen::Vector2d::Unit(i)));
@@ -299,7 +302,7 @@ std::vector<EdgePoint> find_steps_near(const Face& face, const Ellipse& ellipse,
                         begins});
     }
   }
-  // All weigh the same: a dim part of the rim is as good as a bright one.
+  // All points have the same weight: a dim part of the rim is as accurate as a bright one.
   if (!levels.empty()) {
     const double level = upper_median(std::move(levels));
     for (EdgePoint& point : points) point.level = level;
@@ -323,11 +326,11 @@ std::optional<Light> fit_near(const Ring& ring, const Face& face, const Backgrou
   return light;
 }
 
-/// Returns the standard deviation per axis of a light's centre by the delete-a-group jackknife
+/// Returns the standard deviation per axis of a light's center by the delete-a-group jackknife
 /// (Efron and Tibshirani 1993, section 11.5): its outline is fitted again without each of its
-/// pieces. A piece that shows another edge than the others moves the centre by more than the
-/// scatter of its points. Outliers of the fit are excluded beforehand. Returns std::nullopt if the
-/// outline without one of them has no centre.
+/// pieces. A piece on another edge than the others moves the center by more than the scatter of its
+/// points. Outliers of the fit are excluded beforehand. Returns std::nullopt if the outline without
+/// one of the pieces has no center.
 std::optional<double> estimate_jackknife_sd_px(const Light& light, const Background& background,
                                                const LightShape& shape) {
   constexpr std::size_t pieces = 8;
@@ -356,8 +359,8 @@ std::optional<double> estimate_jackknife_sd_px(const Light& light, const Backgro
   return std::sqrt(double(pieces - 1) / double(pieces) * squares / 2);
 }
 
-/// Returns the level above the dark that one line of ten reaches in the middle of its runs or half
-/// way to their ends.
+/// Returns the level above the dark level that one line of ten exceeds at the middle or the
+/// quarters of its runs.
 template <typename Level>
 double bright_level(const ImageView& image, const Blob& blob, double dark) {
   std::vector<Level> levels;
@@ -372,7 +375,7 @@ double bright_level(const ImageView& image, const Blob& blob, double dark) {
   return *tenth - dark;
 }
 
-/// Returns the number of points with a common error: those of a stripe, on consecutive lines.
+/// Returns the number of points with a common error: those of a stripe, on consecutive scanlines.
 double points_of_a_stripe(const std::vector<EdgePoint>& outline) {
   constexpr double next = 2.5;
   std::array<double, 2> last{-1e9, -1e9};
@@ -385,16 +388,16 @@ double points_of_a_stripe(const std::vector<EdgePoint>& outline) {
   return double(outline.size()) / std::max(1.0, stripes);
 }
 
-/// Fits a light and the sigma of its centre to the steps next to its outline, which have no bias
-/// where the contrast of the sides differs. Returns std::nullopt unless most pieces of the outline
-/// show one.
+/// Fits a light and the sigma of its center to the steps next to its outline. These have no bias if
+/// the contrast of the sides differs. Returns std::nullopt unless most pieces of the outline show a
+/// step.
 std::optional<Light> fit_to_steps(const ImageView& image, const std::vector<int>& lit_lines,
                                   const Background& background, const LightShape& shape,
                                   Light light) {
   constexpr int rounds = 3;
   constexpr double first_blur_px = 0.9, min_agreeing = 0.6;
-  // Consumer cameras code light^(1 / 2.2), nearly; others barely have the depth to show a rim. The
-  // centre by another gamma gives the error that this causes.
+  // Consumer cameras code approximately light^(1 / 2.2); others barely have the bit depth to record
+  // a rim. The difference to the center with another gamma estimates the error from the tone curve.
   constexpr double gamma = 2, other_gamma = 1.8;
   StepPicture picture{first_blur_px, gamma};
   for (int round = 1; round < rounds; ++round) {
@@ -449,7 +452,7 @@ std::optional<Rim> rim_of(const ImageView& image, const Blob& blob, const Backgr
   const PixelBox wide =
       intersection({box.x - more, box.y - more, box.width + 2 * more, box.height + 2 * more},
                    {0, 0, image.width, image.height});
-  // Windows for the search of the ring and for the rim.
+  // Window sizes for the search of the ring and for the rim.
   const int size = std::max(wide.width, wide.height);
   const int fine = std::clamp(size / 30, 2, 6), coarse = std::max(fine, size / 50);
   const Face blurred(image, wide, background, coarse);
@@ -464,7 +467,7 @@ std::optional<Rim> rim_of(const ImageView& image, const Blob& blob, const Backgr
 
   auto light = fit_near(best, face, background, shape);
   if (!light) return std::nullopt;
-  // Counts the clearest steps, before fit_to_steps() replaces them.
+  // The fraction counts the clearest steps, before fit_to_steps() replaces them.
   const double shown = std::min(1.0, double(light->outline.size()) / double(crossings));
   auto fitted = fit_to_steps(image, face.lit_lines_of_image(), background, shape, *light);
   bool is_clear = fitted.has_value();

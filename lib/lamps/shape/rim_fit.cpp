@@ -17,11 +17,11 @@
 namespace vlp {
 namespace {
 
-/// From this level on a pixel is clipped, and tells only that its light is no less: a little below
-/// the brightest there can be, because of sharpening and compression.
+/// Level above which a pixel is clipped, so that it is only a lower bound of its light. It is
+/// slightly below the maximum because of sharpening and compression.
 constexpr double kClipped = 0.98 * 255;
 
-/// Levels of an image as those of 8 bits: of more bits the brightest of a light is 255.
+/// Levels of an image scaled to 8 bits. For more bits the brightest level of a light is 255.
 class Levels {
  public:
   Levels(const ImageView& image, const Eigen::Vector2d& low, const Eigen::Vector2d& high)
@@ -43,14 +43,14 @@ class Levels {
   double scale_ = 1;
 };
 
-/// A pixel next to the rim: behind it; along it, in lines; its level.
+/// Pixel next to the rim: depth behind it, position along it in scanlines, and level.
 struct StepSample {
   double depth_px, along, level;
 
   bool clipped() const { return level >= kClipped; }
 };
 
-/// Crossing of a line and the outline, and the change of depth per column there.
+/// Crossing of a scanline and the outline, and the change of depth per column there.
 struct Crossing {
   int line;
   double column, per_column;
@@ -61,7 +61,7 @@ struct Piece {
   std::vector<Crossing> crossings;
 };
 
-/// The unknowns; levels and the blur as their logarithms.
+/// Unknowns of the step model; levels and the blur are logarithms.
 enum StepUnknown { kAt, kOut, kOutSlope, kIn, kInSlope, kAlong, kLogBlur, kStepUnknowns };
 using StepVector = Eigen::Matrix<double, kStepUnknowns, 1>;
 
@@ -100,7 +100,7 @@ struct StepModel {
   }
 };
 
-/// Neighbouring lines, so many at most.
+/// Splits the scanlines into pieces of at most `limit` consecutive ones.
 std::vector<std::vector<int>> pieces_of(const std::vector<int>& lines, int most) {
   std::vector<std::vector<int>> pieces;
   for (std::size_t begin = 0; begin < lines.size();) {
@@ -117,7 +117,7 @@ std::vector<std::vector<int>> pieces_of(const std::vector<int>& lines, int most)
   return pieces;
 }
 
-/// The outline of a light as lines cross it.
+/// Outline of a light and its crossings with scanlines.
 class CrossedOutline {
  public:
   CrossedOutline(const Light& light, const LightShape& shape)
@@ -158,7 +158,7 @@ class CrossedOutline {
   }
 
  private:
-  /// The distance from the centre, over the outline's.
+  /// Returns the distance from the center as a fraction of that of the outline.
   double radii_at(double column, double line) const {
     constexpr double far = 10;
     const auto plane = shape_.plane_of(shape_.turned(Eigen::Vector2d(column, line)));
@@ -203,8 +203,8 @@ std::optional<Step> step_of(const Piece& piece, double dark, const StepPicture& 
   constexpr std::size_t least = 30;
   constexpr int rounds = 12;
   constexpr double clear_px = 2, farthest_px = 3;
-  // What is known of the slopes, of the change along a line and of the blur, give or take, in
-  // grey levels of noise.
+  // Prior standard deviations of the slopes, of the change along the rim and of the log blur,
+  // weighted relative to the noise in grey levels.
   constexpr double noise = 1.5, slope_sd = 0.3, along_sd = 0.05, log_blur_sd = 0.4;
   if (piece.samples.size() < least) return std::nullopt;
   std::array<double, 2> sums{}, counts{};
@@ -230,7 +230,7 @@ std::optional<Step> step_of(const Piece& piece, double dark, const StepPicture& 
   const double tolerance = std::max({4.0, 0.2 * std::abs(in - out), 0.1 * in});
   std::optional<MEstimateStep<kStepUnknowns>> last;
   for (int round = 0; round < rounds; ++round) {
-    // A clipped pixel says nothing to a model in which it is clipped (Tobin 1958).
+    // A clipped pixel does not constrain a model in which it is clipped (Tobin 1958).
     std::vector<CurveDistance<kStepUnknowns>> residuals;
     for (const StepSample& sample : piece.samples) {
       residuals.push_back(model.residual(sample));
@@ -262,7 +262,7 @@ RimSteps fit_rim_steps(const ImageView& image, const Light& light,
                        const StepPicture& picture, bool blur_known, const LightShape& shape) {
   constexpr double piece_of_radius = 0.2, min_lines = 6, max_sd_px = 0.5;
   constexpr double min_reach_px = 7, reach_of_blur = 4;
-  constexpr double of_blur = 0.05;  // what sharpening and compression do
+  constexpr double of_blur = 0.05;  // effect of sharpening and compression
   constexpr std::size_t min_crossings = 3;
   const double reach_px = std::max(min_reach_px, reach_of_blur * picture.blur_px);
   const CrossedOutline outline(light, shape);

@@ -27,8 +27,8 @@ std::optional<Circle> through(const Eigen::Vector2d& a, const Eigen::Vector2d& b
   return Circle{a + center, center.norm()};
 }
 
-/// The circle through three of the points that has most points close to it, and few outside:
-/// inside may be the edge of what hides a part of a light, outside is no light.
+/// Returns the circle through three of the points that has most points close to it and few outside.
+/// Points inside may be the edge of an occluder; points outside are not possible for a light.
 std::optional<Circle> best_supported(std::span<const Eigen::Vector2d> points, double tolerance) {
   constexpr int triples = 40;
   std::optional<Circle> best;

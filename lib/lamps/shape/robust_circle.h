@@ -12,22 +12,23 @@
 
 namespace vlp {
 
+/// Result of fit_robust_circle().
 struct RobustCircle {
   Circle circle;
-  /// Covariance of the centre, from the scatter of the points on the circle.
+  /// Covariance of the center, from the scatter of the points on the circle.
   Matrix2 center_covariance;
-  /// Points that belong to it, and their number.
+  /// Inliers, by the index of the point, and their number.
   std::vector<bool> inliers;
   int count;
-  /// RMS distance of these.
+  /// RMS distance of the inliers from the circle.
   double rms;
 };
 
-/// Fits the circle that most of the points support: the best of many through three points each
-/// (RANSAC, Fischler and Bolles 1981, with a fixed choice of triples), then Gauss-Newton with
-/// Tukey's biweight on the distance to the circle. `tolerance` is the smallest distance that counts
-/// as an outlier's, in the unit of the points. Returns std::nullopt for fewer than five points, or
-/// if less than five agree.
+/// Fits the circle that most of the points support. Selects the best of many circles through three
+/// points each (RANSAC, Fischler and Bolles 1981, with a fixed choice of triples). Then applies
+/// Gauss-Newton with Tukey's biweight to the distances from the circle. `tolerance` is the smallest
+/// distance of an outlier, in the unit of the points. Returns std::nullopt for fewer than five
+/// points, or if less than five agree.
 std::optional<RobustCircle> fit_robust_circle(std::span<const Eigen::Vector2d> points,
                                               std::span<const double> weights, double tolerance);
 

@@ -16,7 +16,7 @@
 namespace vlp {
 namespace {
 
-/// The ellipse (x - center)^T conic (x - center) = 1.
+/// Ellipse (x - center)^T conic (x - center) = 1.
 struct Conic {
   Eigen::Vector2d center;
   Matrix2 conic;
@@ -48,12 +48,12 @@ std::optional<RobustEllipse> fit_robust_ellipse(std::span<const Eigen::Vector2d>
   const double oval = std::max(tolerance, max_oval * (high - low).norm() / 2);
   const auto circle = fit_robust_circle(points, weights, oval);
   if (!circle) return std::nullopt;
-  // In units of the circle, so that centre and conic weigh alike.
+  // Computed in units of the circle, so that center and conic have similar scales.
   const double unit = circle->circle.radius;
   Conic ellipse{Eigen::Vector2d::Zero(), Matrix2::Identity()};
   RobustEllipse fit{};
   for (int round = 0; round < rounds; ++round) {
-    // The tolerance narrows as the ellipse gets better.
+    // The tolerance decreases as the ellipse converges.
     const double narrowed = std::max(tolerance, oval * std::pow(0.6, round));
     auto better = m_estimate_step<5>(weights, narrowed / unit, [&](std::size_t i) {
       return ellipse.distance((points[i] - circle->circle.center) / unit);
@@ -94,7 +94,8 @@ std::optional<RobustEllipse> fit_slender_ellipse(std::span<const Eigen::Vector2d
     return axes.vectors * axes.values.cwiseMax(0).cwiseSqrt().asDiagonal() *
            axes.vectors.transpose();
   };
-  // Points all around an ellipse scatter by its semi-axes over the root of 2.
+  // Points distributed around an ellipse have the standard deviation semi-axis / sqrt(2) along each
+  // axis.
   const Matrix2 to_points = std::numbers::sqrt2 * root_of(scatter);
   const double mean_scale = std::sqrt(to_points.determinant());
   if (!(mean_scale > 0)) return std::nullopt;

@@ -11,28 +11,32 @@
 
 namespace vlp {
 
+/// Result of fit_robust_ellipse() and fit_slender_ellipse().
 struct RobustEllipse {
   Eigen::Vector2d center;
-  /// The points of the ellipse are center + rim_from_circle * (cos a, sin a). Symmetric.
+  /// Points of the ellipse: center + rim_from_circle * (cos a, sin a). Symmetric.
   Matrix2 rim_from_circle;
-  /// Covariance of the centre, from the scatter of the points on the ellipse.
+  /// Covariance of the center, from the scatter of the points on the ellipse.
   Matrix2 center_covariance;
-  /// Points that belong to it, and their number.
+  /// Inliers, by the index of the point, and their number.
   std::vector<bool> inliers;
   int count;
 };
 
-/// Fits the ellipse close to a circle that most of the points support: the circle of
-/// fit_robust_circle() with a tolerance of an eighth of its size, then Gauss-Newton with Tukey's
-/// biweight on the distance q from the ellipse (x - c)^T M (x - c) = 1 (to first order, Sampson
-/// 1982): q = (s - 1) s / |M (x - c)|, s^2 = (x - c)^T M (x - c). `tolerance` is the smallest
-/// distance that counts as an outlier's, in the unit of the points. Returns std::nullopt if fewer
-/// than seven points agree, or if the ratio of the axes exceeds three.
+/// Fits the nearly circular ellipse that most of the points support. Starts from the circle of
+/// fit_robust_circle() with a tolerance of an eighth of its size. Then applies Gauss-Newton with
+/// Tukey's biweight to the distance q from the ellipse (x - c)^T M (x - c) = 1, to first order
+/// (Sampson 1982):
+///
+///     q = (s - 1) s / |M (x - c)|,   s^2 = (x - c)^T M (x - c).
+///
+/// `tolerance` is the smallest distance of an outlier, in the unit of the points. Returns
+/// std::nullopt if fewer than seven points agree, or if the ratio of the axes exceeds three.
 std::optional<RobustEllipse> fit_robust_ellipse(std::span<const Eigen::Vector2d> points,
                                                 std::span<const double> weights, double tolerance);
 
-/// Fits an ellipse of any ratio of axes, if most of it is visible: the points are first scaled
-/// along the axes of their scatter, so that they are nearly on a circle.
+/// Fits an ellipse of any axis ratio if most of it is visible. The points are first scaled along
+/// the principal axes of their scatter, so that they are nearly on a circle.
 std::optional<RobustEllipse> fit_slender_ellipse(std::span<const Eigen::Vector2d> points,
                                                  std::span<const double> weights, double tolerance);
 

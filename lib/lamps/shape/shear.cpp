@@ -10,10 +10,10 @@
 namespace vlp {
 namespace {
 
-/// Relative deviation of an oval from that by the motion.
+/// Relative deviation of an oval from that predicted by the motion.
 constexpr double kUnlike = 0.15;
 
-/// Returns the derivative of the oval by the motion (v, w) / 2.
+/// Returns the derivative of the oval with respect to the motion (v, w) / 2.
 Eigen::Matrix<double, 2, 3> oval_from_motion(const OutlineSums& light) {
   const Eigen::Vector2d &slope = light.line_slope(), &at = light.circle().center;
   const Eigen::Matrix2d times_slope{{slope.x(), -slope.y()}, {slope.y(), slope.x()}};
@@ -43,7 +43,8 @@ struct Motion {
 };
 
 Motion motion_of(const std::vector<Shown>& lights) {
-  // A camera that turns by more than a radian or two in 10,000 lines is none that sees lamps.
+  // Prior of the rotation: a camera that observes lamps rotates by less than a radian or two in
+  // 10,000 scanlines.
   constexpr double max_turn = 1e-4;
   Motion motion{Eigen::Vector3d::Zero(), Eigen::Matrix3d::Zero()};
   motion.information(2, 2) = 1 / (max_turn * max_turn);

@@ -12,16 +12,16 @@
 
 namespace vlp {
 
-/// Ovality of an outline: a point in direction a has the distance
-/// 1 + oval_0 cos 2a + oval_1 sin 2a from the centre, in radii.
+/// Ovality of an outline: a point in direction a is at the distance 1 + oval_0 cos 2a + oval_1 sin
+/// 2a from the center, in radii.
 struct Oval {
   Eigen::Vector2d oval;
   Matrix2 covariance;
 };
 
 /// Normal equations for the residuals of an outline with respect to its fitted circle, in the level
-/// plane and in units of the radius. The unknowns are p = (centre x, y, radius, oval): a point in
-/// direction a lies p_0 cos a + p_1 sin a + p_2 + p_3 cos 2a + p_4 sin 2a further out.
+/// plane and in units of the radius. The unknowns are p = (center x, y, radius, oval): a point in
+/// direction a is p_0 cos a + p_1 sin a + p_2 + p_3 cos 2a + p_4 sin 2a further out.
 class OutlineSums {
  public:
   using Vector5 = Eigen::Matrix<double, 5, 1>;
@@ -31,12 +31,15 @@ class OutlineSums {
     Matrix5 covariance;
   };
 
-  /// Creates the sums of no points.
+  /// Creates empty normal equations.
   OutlineSums() = default;
-  /// @param points, weights  of the whole outline
-  /// @param counted     points to sum
-  /// @param line_slope  derivative of the line in which a point near the circle is read by its x, y
-  /// @param together    number of neighbouring points with a common error
+  /// Accumulates the normal equations of the counted points.
+  /// @param points      points of the complete outline, in the level plane
+  /// @param weights     weights of the points
+  /// @param counted     true for the points to add
+  /// @param line_slope  derivative of the scanline at which a point near the circle is read with
+  ///        respect to its x, y
+  /// @param num_correlated  number of neighboring points with a common error
   OutlineSums(std::span<const Eigen::Vector2d> points, std::span<const double> weights,
               const std::vector<bool>& counted, const Circle& circle,
               const Eigen::Vector2d& line_slope, double together = 1);
@@ -59,27 +62,30 @@ class OutlineSums {
   int count_ = 0;
 };
 
-/// Shear of circles by a rolling shutter in a moving camera. In the level plane lights move by
-/// v + w (-y, x) per line. A point at d from the centre is read s . d lines later (line_slope) and
-/// displaced by that times s . d. In complex numbers the oval is s (v + i w (x + i y)) / 2. The
-/// centre of a whole outline is not displaced, that of a part is. Lamps at other heights have
-/// another v, which counts as an error of 15 %.
+/// Shear of circles by a rolling shutter in a moving camera.
+///
+/// In the level plane lights move by v + w (-y, x) per scanline. A point at d from the center is
+/// read s . d scanlines later (s: line_slope) and displaced by s . d times this motion. In complex
+/// numbers the oval is s (v + i w (x + i y)) / 2. The center of a complete outline is not
+/// displaced; the center of a partial outline is. Lamps at other heights have another v, which is
+/// modeled as an error of 15 %.
 class Shear {
  public:
-  /// Estimates the motion from lights that show enough of their outline, as far as they agree.
-  /// Returns std::nullopt if they are too few, or if the motion is not significant.
+  /// Estimates the motion from lights with a sufficiently visible outline. Rejects lights that
+  /// contradict the majority. Returns std::nullopt if less than half of the lights agree, or if the
+  /// motion is not significant.
   static std::optional<Shear> common(std::span<const OutlineSums> lights);
 
-  /// Returns the oval of a light.
+  /// Returns the oval of a light's outline that the motion causes, with its covariance.
   Oval oval_of(const OutlineSums& light) const;
-  /// Returns the motion of a light in the level plane per line.
+  /// Returns the motion of a light in the level plane per scanline.
   Eigen::Vector2d motion_at(const OutlineSums& light) const;
 
  private:
   Shear(const Eigen::Vector3d& motion, const Eigen::Matrix3d& covariance)
       : motion_(motion), covariance_(covariance) {}
 
-  /// (v, w) / 2
+  /// Motion (v, w) / 2.
   Eigen::Vector3d motion_;
   Eigen::Matrix3d covariance_;
 };

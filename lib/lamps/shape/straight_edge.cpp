@@ -17,27 +17,28 @@
 namespace vlp {
 namespace {
 
-/// A pixel near the side.
+/// Pixel near the side.
 struct Sample {
   int line;
   LineLevel lit;
-  /// Over the brightest line's level.
+  /// Level as a fraction of that of the brightest scanline.
   double value;
-  /// Along the side, from 0 to 1.
+  /// Position along the side, from 0 to 1.
   double t;
-  /// From the side, in pixels, inside positive; and what it loses when the side moves in by a pixel
-  /// of the plane.
+  /// Distance from the side, in pixels, inside positive, and its decrease if the side moves inwards
+  /// by a pixel of the plane.
   double depth_px, per_move;
 };
 
-/// The unknowns, in this order; without a lens the bow is the last.
+/// Unknowns, in this order; the curvature kBow is used only without a lens.
 enum Unknown { kFrom, kTo, kBlur, kLevelFrom, kLevelTo, kLevelBend, kOutside, kBow };
 
 template <int N>
 struct Model {
   Eigen::Matrix<double, N, 1> x;
 
-  /// The residual, its slope with the unknowns, and with the line's level.
+  /// Returns the residual and its derivative with respect to the unknowns. `with_level` receives
+  /// the derivative with respect to the scanline's level.
   CurveDistance<N> residual(const Sample& sample, double* with_level = nullptr) const {
     const double t = sample.t, middle = 4 * t * (1 - t);
     double move = (1 - t) * x[kFrom] + t * x[kTo];
@@ -100,10 +101,10 @@ class Samples {
     }
   }
 
-  /// Empty when the side is too short or not wholly in the image.
+  /// Samples; empty if the side is too short or not fully inside the image.
   std::vector<Sample> samples;
 
-  /// The pixel, (column, row), on the side.
+  /// Returns the pixel, (column, row), on the side.
   Eigen::Vector2d at(double t) const {
     const double place = t * kPieces;
     const auto i = static_cast<std::size_t>(std::clamp(std::floor(place), 0.0, kPieces - 1.0));
@@ -113,7 +114,7 @@ class Samples {
  private:
   static constexpr int kPieces = 16;
 
-  /// Whether a line is not quite dark.
+  /// Returns true if a scanline is not dark.
   bool shows(int line) const {
     constexpr double least = 0.1;
     const auto lit = levels_.at(line);
@@ -145,7 +146,8 @@ class Samples {
     return (lines_.level_at(column, row) - dark_) / levels_.brightest();
   }
 
-  /// The pixels across the side at one column or row.
+  /// Adds the pixels across the side at one column or row. Returns false if they are outside the
+  /// image or the plane.
   bool add_station(int station, int along, double reach_px) {
     constexpr double apart_px = 2;
     const int across = 1 - along;
@@ -162,9 +164,9 @@ class Samples {
     plane_from_pixel << (*right - *here) / apart_px, (*below - *here) / apart_px;
     const Eigen::Vector2d inwards = side_.inwards();
     const Eigen::Vector2d gradient = plane_from_pixel.transpose() * inwards;
-    const double px = gradient.norm();  // of the plane, across the side
+    const double px = gradient.norm();  // size of a pixel in the plane, across the side
     const double length = (side_.to - side_.from).norm();
-    // So far along the row or column that the window reaches as far from the side.
+    // The window along the row or column is extended so that it covers `reach_px` from the side.
     const double slant = std::max(0.5, std::abs(gradient[across]) / px);
     const int reach = static_cast<int>(std::lround(reach_px / slant));
     for (int i = -reach; i <= reach; ++i) {
@@ -198,20 +200,21 @@ class Samples {
   std::array<Eigen::Vector2d, kPieces + 1> trace_;
 };
 
-/// Size of the residuals that the weights of samples and priors refer to.
+/// Unit residual to which the weights of samples and priors refer.
 constexpr double kNoise = 0.01;
 
-/// Length, in pixels, of a side, and what is known beforehand of all sides of a light.
+/// Length of a side, in pixels, and prior knowledge about all sides of a light.
 struct Priors {
   double length_px;
-  /// Sigma of the blur; 0 if it is not priors.
+  /// Standard deviation of the blur; 0 if unknown.
   double blur_px;
   double focal_px;
 };
 
-/// Number of priors: the level changes by a tenth in 100 px and bends by half of that, give or
-/// take, because the pixels of short sides do not determine it; the blur; and the bow, at most that
-/// of a lens of 115 degrees from corner to corner.
+/// Number of priors. The level changes by 10 % in 100 px and its curvature is half of that, one
+/// standard deviation each, because the pixels of short sides do not determine it. The third one is
+/// the blur. Without a lens the fourth one is the curvature of the edge, with the value of a lens
+/// of 115 degrees from corner to corner as standard deviation.
 template <int N>
 constexpr std::size_t kNumPriors = N > kBow ? 4 : 3;
 
@@ -236,9 +239,9 @@ CurveDistance<N> evaluate_prior(const Model<N>& model, std::size_t which, const 
   return result;
 }
 
-/// Computes the covariance of the two ends: from the squared residual of each pixel, because bright
-/// ones are noisier than dark ones (White 1980), from the levels of lines, whose errors are common
-/// to their pixels, and from the priors.
+/// Computes the covariance of the two ends from three sources. The squared residual of each pixel
+/// is used, because bright pixels are noisier than dark ones (White 1980). Errors of the levels of
+/// scanlines are common to their pixels. The priors contribute as well.
 template <int N>
 std::optional<Matrix2> covariance_of_ends(const Model<N>& model, const std::vector<Sample>& samples,
                                           const std::vector<double>& weights,
@@ -344,7 +347,7 @@ std::optional<StraightEdge> fit(const Samples& all, const Side& side, double per
   return edge;
 }
 
-/// Probability of the places of an edge of known blur, by the pixels near the side.
+/// Likelihood of the position of an edge of known blur, from the pixels near the side.
 class HiddenEdge {
  public:
   HiddenEdge(std::vector<Sample> samples, double blur_px)
@@ -353,10 +356,10 @@ class HiddenEdge {
                      [](const Sample& a, const Sample& b) { return a.line < b.line; });
   }
 
-  /// Returns -2 log of the probability, up to a constant, with the ends at these distances. The
-  /// level of each line is the most probable one within its standard deviation.
+  /// Returns -2 log likelihood, up to a constant, for the given distances of the ends. The level of
+  /// each scanline is the most probable one within its standard deviation.
   double cost(const Eigen::Vector2d& ends_px) const {
-    constexpr double noise = 2 * kNoise, line_sd = 0.02;  // an even level, no light outside
+    constexpr double noise = 2 * kNoise, line_sd = 0.02;  // uniform level, no light outside
     double sum = 0;
     for (auto sample = samples_.begin(); sample != samples_.end();) {
       const int line = sample->line;
@@ -374,7 +377,7 @@ class HiddenEdge {
     return sum;
   }
 
-  /// Returns the share of the pixels on lit lines that an edge with such ends explains.
+  /// Returns the fraction of the pixels on lit scanlines that an edge with these ends explains.
   double compute_explained_fraction(const Eigen::Vector2d& ends_px) const {
     constexpr double min_lit = 0.3, explained = 0.15;
     int lit = 0, like = 0;
@@ -397,7 +400,7 @@ class HiddenEdge {
     return std::erfc(-depth / std::numbers::sqrt2) / 2;
   }
 
-  std::vector<Sample> samples_;  // by line
+  std::vector<Sample> samples_;  // ordered by line
   double blur_px_;
 };
 

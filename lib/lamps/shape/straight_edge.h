@@ -14,8 +14,8 @@
 
 namespace vlp {
 
-/// One side of a rectangle in the plane of LightShape, from one corner to the next; the light is on
-/// its left.
+/// Side of a rectangle in the plane of LightShape, from one corner to the next; the light is on its
+/// left.
 struct Side {
   Eigen::Vector2d from, to;
 
@@ -26,65 +26,73 @@ struct Side {
   }
 };
 
+/// Edge of a light that was fitted along a side.
 struct StraightEdge {
-  /// With its ends where the edge was found.
+  /// Side moved to the fitted edge.
   Side side;
-  /// Covariance of the distances of both ends from the edge, in pixels (per_px of the plane).
+  /// Covariance of the distances of both ends from the edge, in square pixels; `per_px` converts
+  /// pixels to the plane.
   Matrix2 covariance_px;
-  /// Sigma of the blur across it.
+  /// Standard deviation of the blur across the edge.
   double blur_px;
-  /// Distance of its middle from the line through its ends; 0 with a lens.
+  /// Distance of the middle of the edge from the line through its ends; 0 with a lens.
   double bow_px;
-  /// The share of the pixels next to it that it explains.
+  /// Fraction of the pixels next to the edge that the model explains.
   double share;
-  /// On the edge, where it is lit.
+  /// Points on the edge, on lit scanlines.
   std::vector<EdgePoint> points;
 };
 
-/// Pixels to use, and the blur that is expected.
+/// Pixels to use, and the expected blur.
 struct EdgeSearch {
-  /// Distance from the side, to both sides.
+  /// Half-width of the search window across the side.
   double reach_px;
-  /// Maximum number of places along the side.
+  /// Maximum number of sampling positions along the side.
   std::size_t stations;
-  /// Sigma of the blur of the light's other edges; 0 if it is not known.
+  /// Standard deviation of the blur of the light's other edges; 0 if unknown.
   double blur_px = 0;
 };
 
-/// Prior of a hidden edge, by the other edges: distance of its middle from the side, inside
-/// positive, and half the difference of the distances of its ends, which is 0 but for its sd.
+/// Prior of a hidden edge from the other edges: distance of its middle from the side, inside
+/// positive, with standard deviation. The slant is half the difference of the distances of its
+/// ends; its mean is 0.
 struct HiddenEdgePrior {
   double offset_px, offset_sd_px, slant_sd_px;
 };
 
-/// The edge near a side, of a light whose lines are lit to levels s(line). With d, the distance
-/// from the edge in pixels, inside positive, and F, the normal distribution, pixels show
+/// Fits the edge near a side of a light whose scanlines are lit to levels s(line). With d, the
+/// distance from the edge in pixels, inside positive, and F, the normal distribution, the model of
+/// a pixel is
 ///
-///     dark + s(line) (h + (L(t) - h) F(d / blur)),    t from 0 to 1 along the side,
+///     dark + s(line) (h + (L(t) - h) F(d / blur)),    t from 0 to 1 along the side.
 ///
-/// with the level L(t), a parabola, inside and h outside, both shares of s: the edge is where half
-/// of the local step is passed, and a dark line says nothing of it. The place of both ends, blur,
-/// L (of which short sides tell little: it is taken to change by a tenth in 100 px, give or take)
-/// and h are those with the least residuals of all pixels near the side (Gauss-Newton,
-/// Tukey's biweight), d in rays behind the lens; without a lens a bow is one more unknown,
-/// known beforehand to what a lens of 115 degrees from corner to corner bends a side so long.
-/// Pixels on lines with an uncertain level have less weight. The blur is that of the search within
-/// 15 %, if it has one. The covariance is by the scatter of the pixels and by the standard
-/// deviations of the levels of lines, see LineLevels. Returns std::nullopt if that leaves an end
-/// uncertain by more than half a pixel, or if most pixels do not look like an edge.
+/// L(t), a parabola, is the level inside and h the level outside, both as fractions of s. The edge
+/// is at half of the local step; a dark scanline does not constrain it. Gauss-Newton with Tukey's
+/// biweight minimizes the residuals of all pixels near the side over the position of both ends,
+/// blur, L and h.
+///
+/// d is measured in the plane of LightShape with a lens. Without a lens the curvature of the edge
+/// is one more unknown. Its prior is the curvature that a lens of 115 degrees from corner to corner
+/// causes for this side. Short sides barely determine L: its prior is a change by 10 % in 100 px.
+/// If `search` has a blur, the prior of the blur is this value within 15 %. Pixels on scanlines
+/// with an uncertain level have less weight.
+///
+/// The covariance includes the scatter of the pixels and the standard deviations of the scanline
+/// levels, see LineLevels. Returns std::nullopt if an end has a standard deviation above half a
+/// pixel, or if less than 80 % of the pixels match the edge model.
 std::optional<StraightEdge> straight_edge_at(const ImageView& lines, const Side& side,
                                              const LineLevels& levels, double dark, double per_px,
                                              const EdgeSearch& search, const LightShape& shape);
 
-/// Estimates an edge that a dark stripe hides in part or whole: the mean and the covariance of its
-/// ends, by the probability of all pixels near the side.
+/// Estimates an edge that a dark stripe hides partly or completely: the mean and the covariance of
+/// its ends, from the likelihood of all pixels near the side.
 ///
-/// An edge in a dark stripe lies between the last lit line and the next line that would be lit, if
-/// the light reached so far. The pixels are those of straight_edge_at() with L = 1 and h = 0;
-/// the level of each line is any within its standard deviation. The probability, times the prior,
-/// is summed on a grid of offsets and slants, four times ever finer. Returns std::nullopt if the
-/// side is not in the image, or if the mean contradicts a fifth of the pixels on lit lines. The
-/// edge may lie outside the image; it has no `points`.
+/// An edge in a dark stripe lies between the last lit scanline and the next scanline that would be
+/// lit if the light extended to it. The pixels are those of straight_edge_at() with L = 1 and h =
+/// 0; the level of each scanline may vary within its standard deviation. The probability, times the
+/// prior, is summed on a grid of offsets and slants that is refined four times. Returns
+/// std::nullopt if the side is not in the image, or if the mean contradicts a fifth of the pixels
+/// on lit scanlines. The edge may lie outside the image; it has no `points`.
 ///
 /// @pre search.blur_px > 0
 std::optional<StraightEdge> hidden_edge_at(const ImageView& lines, const Side& side,

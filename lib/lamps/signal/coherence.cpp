@@ -17,7 +17,7 @@ namespace {
 constexpr std::size_t kPieces = 5;
 using PieceLevels = Eigen::Array<double, kPieces, 1>;
 
-/// The levels of each line's parts, above the dark.
+/// Returns the levels of each scanline's parts above the dark level.
 template <typename Level>
 std::vector<PieceLevels> piece_levels(const ImageView& lines, const std::vector<Run>& chords,
                                       double dark) {
@@ -50,7 +50,7 @@ double coherence_of(const ImageView& lines, const std::vector<Run>& chords,
   const auto quarter = static_cast<std::size_t>(std::max(1L, std::lround(period_lines / 4)));
   if (levels.size() + 1 < min_values + 2 * quarter) return 0;
   double brightest = 0;
-  std::vector<PieceLevels> sums{PieceLevels::Zero()};  // of all lines before
+  std::vector<PieceLevels> sums{PieceLevels::Zero()};  // cumulative
   sums.reserve(levels.size() + 1);
   for (const PieceLevels& line : levels) {
     sums.emplace_back(sums.back() + line);

@@ -14,22 +14,28 @@ namespace vlp {
 /// common to all parts.
 inline constexpr double kMinCoherence = 0.85;
 
-/// Computes how similar the stripes of that period are in the parts of a light. A shutter exposes
-/// all pixels of a line at one time, so that a lamp's stripes are on the same lines in all parts of
-/// it, whatever its shape. In letters and patterns the parts differ. Each line is divided into five
-/// parts. With the means a_k and b_k of part k over the quarter of a
-/// period before and after a line, and c, half of what noise reaches and 5 % of the brightest line,
+/// Computes the similarity of the stripes in the parts of a light. A shutter exposes all pixels of
+/// a scanline at the same time. A lamp's stripes are therefore on the same scanlines in all its
+/// parts, whatever its shape. In letters and patterns the parts differ.
+///
+/// @param lines       image whose rows are the scanlines, see lines_of()
+/// @param chords      pixels of the light on each scanline, see chords_of()
+/// @param background  dark level and noise of the image
+/// @param period_lines  period of the stripes
+/// @return  coherence, at most 1; 0 if the light has too few scanlines
+///
+/// Each scanline is divided into five parts. a_k and b_k are the means of part k over a quarter of
+/// a period before and after a scanline. The constant c is half of the noise threshold plus 5 % of
+/// the brightest scanline. With
 ///
 ///     d_k(line) = log((b_k + c) / (a_k + c)),
 ///
-/// and the coherence of part k is the correlation of d_k with the sum of the others. That of the
-/// light is the second smallest, because an object may hide a part. Independent parts with three
-/// independent lines, as a period and a half shows, reach
-/// kMinCoherence with a chance of (1 - 0.85) / 2 each, and four of five together with 1.5e-4.
-/// Bars that lean reach it within 7 degrees when a light shows two of them.
+/// the coherence of part k is the correlation of d_k with the sum of the other parts. The coherence
+/// of the light is the second smallest of these, because an object may hide a part.
 ///
-/// `chords` are the light's pixels on each of its `lines`, see lines_of() and chords_of(). Returns
-/// 0 if it has too few lines.
+/// Independent parts with three independent scanlines, as in one and a half periods, each reach
+/// kMinCoherence with a probability of (1 - 0.85) / 2, and four of five together with 1.5e-4.
+/// Tilted bars reach it within 7 degrees if a light shows two of them.
 double coherence_of(const ImageView& lines, const std::vector<Run>& chords,
                     const Background& background, double period_lines);
 

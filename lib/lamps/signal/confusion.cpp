@@ -9,7 +9,7 @@
 namespace vlp {
 namespace {
 
-/// With the lamps of `lights` and these.
+/// Returns an empty confusion matrix for `lamps` and the lamps of `lights`.
 Confusion empty_confusion(std::span<const LabelledLight> lights, std::set<int> lamps = {}) {
   for (const LabelledLight& light : lights) lamps.insert(light.lamp);
   Confusion confusion{{lamps.begin(), lamps.end()}, {}};

@@ -11,30 +11,31 @@
 
 namespace vlp {
 
-/// Confusion matrix of a classifier for lights whose lamps are known.
+/// Confusion matrix of a classifier for lights of known lamps.
 struct Confusion {
-  /// Ids, sorted.
+  /// Ids of the lamps, sorted.
   std::vector<int> lamps;
-  /// Lights by their lamp (row) and by the answer (column); the last column is "unknown".
+  /// Number of lights by lamp (row) and by result (column); the last column is "unknown".
   Eigen::MatrixXi counts;
 
   int right() const;
-  /// Number of lights that are identified as another lamp.
+  /// Returns the number of lights that are identified as another lamp.
   int wrong() const;
   int unknown() const;
 };
 
 /// Computes the confusion matrix for lights that the classifier was not trained on. Their lamps may
-/// be others than its own.
+/// differ from those of the classifier.
 Confusion confusion_of(const LampClassifier& classifier, std::span<const LabelledLight> lights);
 
-/// Number of parts for cross-validation.
+/// Number of folds of the cross-validation.
 inline constexpr int kFolds = 5;
 
 using TrainClassifier = std::function<LampClassifier(std::span<const LabelledLight>)>;
 
-/// Cross-validates: each fifth of the images (every fifth one, so that the result is deterministic)
-/// is judged by a classifier that `train` makes of the others. `lights` as for train_classifier().
+/// Computes the confusion matrix by cross-validation. `train` makes a classifier of all images but
+/// every fifth one; this classifier is applied to the lights of the held-out images. The folds are
+/// deterministic. `lights` as for train_classifier().
 Confusion cross_validated(std::span<const LabelledLight> lights, const TrainClassifier& train);
 
 }  // namespace vlp

@@ -36,11 +36,11 @@ void standardize(std::span<const LabelledLight> lights, LampClassifier& classifi
   for (const LabelledLight& light : lights) {
     classifier.scale += (features_of(light.stripes) - classifier.mean).cwiseAbs2() / n;
   }
-  constexpr double least = 1e-6;  // a feature that is the same everywhere
+  constexpr double least = 1e-6;  // for a constant feature
   classifier.scale = classifier.scale.cwiseSqrt().cwiseMax(least);
 }
 
-/// Centers and covariance from the lights that are `used`.
+/// Fits centers and covariance to the lights that are `used`.
 void fit(std::span<const LabelledLight> lights, const std::vector<bool>& used,
          LampClassifier& classifier) {
   std::map<int, LampClassifier::Class> lamps;
@@ -63,7 +63,7 @@ void fit(std::span<const LabelledLight> lights, const std::vector<bool>& used,
   }
   const double freedom = std::max(1.0, count - static_cast<double>(lamps.size()));
   classifier.covariance /= freedom;
-  constexpr double shrinkage = 10;  // in lights
+  constexpr double shrinkage = 10;  // equivalent number of lights
   const Eigen::Vector4d diagonal = classifier.covariance.diagonal();
   classifier.covariance *= freedom / (freedom + shrinkage);
   const LampFeatures least(kLampDrift / 3, kDutyMargin / 2, 0.01, kDutyMargin / 2);
@@ -86,7 +86,7 @@ LampClassifier train_classifier(std::span<const LabelledLight> lights) {
     for (std::size_t i = 0; i < lights.size(); ++i) {
       const LampFeatures off =
           standardized(classifier, features_of(lights[i].stripes)) - centers.at(lights[i].lamp);
-      constexpr double trimmed = 9;  // sooner than in use: outliers widen the covariance
+      constexpr double trimmed = 9;  // stricter than in use: outliers widen the covariance
       used[i] = distance_squared(classifier.covariance, off) < trimmed;
     }
   }
@@ -218,7 +218,7 @@ void write_lamp_classifier(const std::filesystem::path& file, const LampClassifi
     out << YAML::EndMap;
   }
   out << YAML::EndSeq;
-  // Last: a file cut short lacks it.
+  // Written last, so that a truncated file lacks it.
   out << YAML::Key << "covariance" << YAML::Value << YAML::BeginSeq;
   for (int row = 0; row < 4; ++row) {
     const LampFeatures values = classifier.covariance.row(row).transpose();

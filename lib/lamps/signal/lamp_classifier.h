@@ -12,67 +12,78 @@
 
 namespace vlp {
 
-/// A light with the id of its lamp.
+/// Light with the id of its lamp.
 struct LabelledLight {
   int lamp;
   Stripes stripes;
-  /// Number of its image.
+  /// Index of the light's image.
   std::size_t image;
 };
 
-/// Identifies lamps by a linear classifier over the features (Chen and Guan, section 2.1): linear
-/// discriminant analysis. With z = (features - mean) / scale and one covariance C within
-/// all lamps, the score of lamp k is linear in z,
+/// Linear classifier that identifies lamps by their features (Chen and Guan, section 2.1): linear
+/// discriminant analysis. With z = (features - mean) / scale and a common covariance C within all
+/// lamps, the score of lamp k is linear in z,
 ///
 ///     score_k = w_k . z - w_k . c_k / 2,   w_k = C^-1 c_k,   probability_k ~ exp(score_k),
 ///
-/// for lamps that are seen equally often.
+/// for lamps with equal prior probabilities.
 struct LampClassifier {
-  /// Mean and standard deviation of the features of all training lights, to standardize features.
+  /// Mean and standard deviation of the features of all training lights, which standardize
+  /// features.
   LampFeatures mean, scale;
-  /// C, for standardized features.
+  /// Covariance C of standardized features.
   Eigen::Matrix4d covariance;
   struct Class {
     int lamp;
     /// Number of training lights.
     int examples;
-    /// c_k, their mean, standardized.
+    /// Mean c_k of the standardized features of the training lights.
     LampFeatures center;
   };
-  /// Sorted by id.
+  /// Lamps, sorted by id.
   std::vector<Class> lamps;
-  /// Row time of the camera that took the training images, if known: periods in lines depend on it.
+  /// Row time of the camera that took the training images, if known. Periods in scanlines depend on
+  /// it.
   std::optional<double> row_time_s;
 };
 
 /// Minimum number of training lights of a lamp.
 inline constexpr int kMinExamples = 6;
 
-/// Trains a classifier on lights of two lamps or more, with kMinExamples or more of each. Lights
-/// that are far from the others of their lamp, such as partly hidden ones, are left out. C is
-/// shrunk towards its diagonal by the weight of ten lights, and lamps may drift by kLampDrift.
+/// Trains a classifier on the lights of at least two lamps, with at least kMinExamples of each.
+/// Excludes lights that are far from the others of their lamp, such as partly hidden ones. Shrinks
+/// C towards its diagonal with the weight of ten lights, and allows for a drift of the lamps by
+/// kLampDrift.
 LampClassifier train_classifier(std::span<const LabelledLight> lights);
 
-/// Returns the lamp with these stripes; std::nullopt if another may be it (probability below 99 %),
-/// if (z - c_k)^T C^-1 (z - c_k) exceeds 36 (3e-7 of normal lights) or, where the stripes are not
-/// trustworthy(), 9, or if they are not readable(). @pre The stripes have a period.
+/// Returns the id of the lamp with these stripes. @pre The stripes have a period.
+///
+/// Returns std::nullopt in these cases:
+/// - Another lamp is possible: the probability is below 99 %.
+/// - (z - c_k)^T C^-1 (z - c_k) exceeds 36 (3e-7 of normal lights), or 9 if the stripes are not
+///   is_reliable().
+/// - The stripes are not is_readable().
 std::optional<int> lamp_of(const LampClassifier& classifier, const Stripes& stripes);
 
-/// Two lamps and their distance: root of (c_j - c_k)^T C^-1 (c_j - c_k).
+/// Two lamps and their Mahalanobis distance, the square root of (c_j - c_k)^T C^-1 (c_j - c_k).
 struct LampDistance {
   int first, second;
   double distance;
 };
 
-/// Returns the pairs that lamp_of() cannot separate: at distance 6 one light in forty is unknown.
+/// Returns the pairs of lamps that lamp_of() cannot separate, with a distance below 6. At distance
+/// 6 one light in forty is unknown.
 std::vector<LampDistance> inseparable(const LampClassifier& classifier);
 
-/// Reads `vlp-classifier/1`; keys are the names of the fields above, and `features`, which have to
-/// be kLampFeatures. Throws InputError: unknown or missing keys, a lamp twice, a covariance that is
-/// none.
+/// Reads a file of format `vlp-classifier/1`. Its keys are the names of the fields above, and
+/// `features`, which has to be kLampFeatures.
+///
+/// @throws InputError if a key is unknown or missing, a lamp occurs twice, or the covariance is not
+///        positive definite
 LampClassifier read_lamp_classifier(const std::filesystem::path& file);
 
-/// Writes what read_lamp_classifier() reads, whole or not at all. Throws InputError.
+/// Writes a file for read_lamp_classifier() atomically. @throws InputError if the file cannot be
+/// written
 void write_lamp_classifier(const std::filesystem::path& file, const LampClassifier& classifier);
 
 }  // namespace vlp

@@ -18,7 +18,8 @@ double exposure_lines(const StripeConditions& conditions) {
   return conditions.exposure_s.value_or(0) / conditions.row_time_s;
 }
 
-/// Relative; of a lamp without a diameter nothing is known.
+/// Returns the relative standard deviation of a lamp's period; 0 if the size of the lamp is
+/// unknown.
 double period_sd_of(const Lamp& lamp, const StripeConditions& conditions) {
   const auto lines = lines_on(lamp, conditions);
   if (!lines) return 0;
@@ -95,7 +96,7 @@ std::vector<LampsAlike> lamps_alike(const LampMap& lamps, const StripeConditions
       const double gap = std::abs(std::log(*a.frequency_hz / *b.frequency_hz));
       const double sd = std::max(period_sd_of(a, conditions), period_sd_of(b, conditions));
       const double needed = kLampDrift + 4 * sd;
-      // Lamps that show no period at all are lamps_unreadable().
+      // lamps_unreadable() reports lamps without a measurable period.
       if (gap >= needed || !std::isfinite(needed)) continue;
       pairs.push_back({a.id, b.id, std::expm1(gap), std::expm1(needed)});
     }

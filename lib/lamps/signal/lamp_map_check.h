@@ -14,33 +14,34 @@ namespace vlp {
 /// Conditions that determine how accurately a stripe period can be measured.
 struct StripeConditions {
   double row_time_s;
-  /// Focal length in pixels, along the direction across the lines.
+  /// Focal length in pixels, across the scanlines.
   std::optional<double> focal_px;
-  /// Height of the camera above the world's origin.
+  /// Height of the camera above the world origin.
   double camera_height_m;
-  /// Exposure; if unknown, it is assumed to be short, the worst case for a period.
+  /// Exposure time; if unknown, a short exposure is assumed, the worst case for a period.
   std::optional<double> exposure_s;
 };
 
-/// Computes the number of lines of the image on the lamp, of which kUsedHeight are used: size focal
-/// / height above the camera, with the shorter axis of the lamp, which crosses the lines at worst.
-/// Returns std::nullopt without a size or a focal length, or if the lamp is not above the camera.
+/// Returns the number of scanlines on the lamp: size * focal length / height above the camera. The
+/// size is the shorter axis of the lamp, which is across the scanlines in the worst case. Only the
+/// fraction kUsedHeight of the scanlines is used. Returns std::nullopt without a size or a focal
+/// length, or if the lamp is not above the camera.
 std::optional<double> lines_on(const Lamp& lamp, const StripeConditions& conditions);
 
-/// Relative standard deviation of the period that stripes_of() measures on so many lines. A period
-/// comes from the least-squares line through the numbered begins and through the numbered ends of
-/// stripes, M = lines / period of each:
+/// Predicts the relative standard deviation of the period that stripes_of() measures on `lines`
+/// scanlines. A period is the slope of least-squares lines through the numbered begins and through
+/// the numbered ends of stripes, with M = kUsedHeight lines / period of each:
 ///
 ///     sd(period) / period = (e / period) sqrt(6 / (M (M^2 - 1))).
 ///
-/// e is how well one begin or end is placed. In sharp stripes it lies anywhere between two lines,
-/// e = 1 / sqrt(12); an exposure of x lines makes a ramp of it, on which noise of 2 % of a line's
-/// brightness counts:
+/// e is the standard deviation of the position of one begin or end. In sharp stripes the position
+/// is uniform between two scanlines, e = 1 / sqrt(12). An exposure of x scanlines turns the edge
+/// into a ramp, on which noise of 2 % of the brightness of a scanline has an effect:
 ///
-///     e^2 = max(0, 1 - x / 1.2)^2 / 12 + (0.02 x)^2,
+///     e^2 = max(0, 1 - x / 1.2)^2 / 12 + (0.02 x)^2.
 ///
-/// which bounds what is measured on square waves (where whole numbers of lines make a period, it is
-/// better). Infinity below kMinPeriods.
+/// This is an upper bound of the error measured on square waves; periods of an integer number of
+/// scanlines have smaller errors. Returns infinity below kMinPeriods.
 double period_sd(double period_lines, double lines, double exposure_lines);
 
 /// Returns whether two lamps cannot be distinguished: their frequencies differ by less than
@@ -54,32 +55,33 @@ bool share_frequency(const Lamp& a, const Lamp& b);
 /// @return          the message with the names of the rooms; empty if no room is needed
 std::string explain_missing_room(const LampMapFile& lamps, const std::string& argument);
 
-/// Two lamps that cannot be told apart with certainty.
+/// Two lamps that cannot be distinguished reliably.
 struct LampsAlike {
   int first, second;
-  /// Their frequencies' ratio less one, and the one that would be enough.
+  /// Ratio of their frequencies minus 1, and the minimum of it that would be sufficient.
   double gap, needed;
 };
 
-/// Pairs of lamps that lamp_by_frequency() may call unknown: frequencies nearer than kLampDrift
-/// plus four standard deviations of a period (95 % of lights are told apart), and duties that are
-/// not known or nearer than twice kDutyMargin. Lamps without a frequency are left out; without a
-/// diameter only the drift counts.
+/// Returns the pairs of lamps that lamp_by_frequency() may fail to identify. Their frequencies
+/// differ by less than kLampDrift plus four standard deviations of a period, at which 95 % of the
+/// lights are identified. Their duties are unknown or differ by less than twice kDutyMargin. Lamps
+/// without a frequency are skipped; for lamps without a size only the drift counts.
 std::vector<LampsAlike> lamps_alike(const LampMap& lamps, const StripeConditions& conditions);
 
-/// A lamp that shows too few stripes to be identified from there, whose stripes an exposure of
-/// about a whole period wipes out, or that is too fast for the shutter's lines.
+/// Lamp that cannot be identified under the given conditions: it shows too few stripes, an exposure
+/// of about a whole period removes them, or its period is too short for the shutter.
 struct LampUnreadable {
   int lamp;
   double period_lines;
-  /// Periods on the lamp.
+  /// Number of periods on the lamp.
   double periods;
-  /// |sinc(frequency exposure)|, what is left of the stripes (lib/THEORY.md, "Identity").
+  /// Stripe contrast that remains after the exposure, |sinc(frequency exposure)| (lib/THEORY.md,
+  /// "Identity").
   double contrast;
 };
 
-/// Lamps with a period below kShortestPeriod_lines, less than kMinPeriods, or a contrast below
-/// kMinContrast.
+/// Returns the lamps with a period below kShortestPeriod_lines, less than kMinPeriods periods, or a
+/// contrast below kMinContrast.
 std::vector<LampUnreadable> lamps_unreadable(const LampMap& lamps,
                                              const StripeConditions& conditions);
 

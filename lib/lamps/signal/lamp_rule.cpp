@@ -11,7 +11,7 @@ namespace {
 
 struct Candidate {
   const Lamp* lamp;
-  /// From the light, in log frequency and in duty.
+  /// Deviation from the light, in log frequency and in duty.
   double off, duty_off;
 };
 
@@ -29,8 +29,8 @@ bool beats(const Candidate& a, const Candidate& b) {
 
 std::optional<int> lamp_by_frequency(const LampMap& lamps, double row_time_s,
                                      const Stripes& stripes) {
-  // Lamps keep their frequency to a few per cent. Few stripes, and unclear ones, where something
-  // hides a part, have to fit better.
+  // Lamps keep their frequency to a few per cent. Few or unclear stripes, for example of partly
+  // hidden lamps, require a smaller deviation.
   const double max_off = trustworthy(stripes) ? 0.06 : kMaxUnclearDrift;
   if (!readable(stripes) || !(stripes.period_lines > 0)) return std::nullopt;
   const double frequency_hz = 1 / (stripes.period_lines * row_time_s);

@@ -9,22 +9,22 @@
 
 namespace vlp {
 
-/// Maximum relative deviation of a lamp's frequency from that of the map, before it may be taken
-/// for another lamp.
+/// Maximum relative deviation of a lamp's frequency from the map at which no confusion with another
+/// lamp is possible.
 inline constexpr double kLampDrift = 0.015;
 
 /// Maximum relative deviation of a light with few or unclear stripes from a lamp's frequency;
 /// lights with clear stripes may deviate more.
 inline constexpr double kMaxUnclearDrift = 0.025;
 
-/// Minimum difference between the duty errors of two lamps that decides between them: saturation
+/// Minimum difference between the duty errors of two lamps for a decision between them. Saturation
 /// and blur change the measured duty by up to about half of it.
 inline constexpr double kDutyMargin = 0.15;
 
-/// Identifies the lamp of the map with these stripes: a lamp of frequency f has a period of
-/// 1 / (f row_time) lines. The deviation of every other lamp's frequency has to be larger by
-/// kLampDrift and twice as large. Lamps with nearly one frequency are separated by the duties of
-/// the map. Returns std::nullopt if the stripes agree with no lamp, or with two.
+/// Identifies the lamp of the map with these stripes. A lamp of frequency f has a period of 1 / (f
+/// row_time) scanlines. The deviation of every other lamp's frequency has to be larger by
+/// kLampDrift and twice as large. Lamps with nearly the same frequency are separated by the duties
+/// of the map. Returns std::nullopt if the stripes agree with no lamp or with several lamps.
 std::optional<int> lamp_by_frequency(const LampMap& lamps, double row_time_s,
                                      const Stripes& stripes);
 

@@ -15,36 +15,36 @@
 namespace vlp {
 namespace {
 
-/// Bins of the shortest period: enough for its third harmonic.
+/// Number of bins of the shortest period, sufficient for its third harmonic.
 constexpr double kBinsPerPeriod = 8;
-/// Fraction of the variance that the period of a modulated light may leave.
+/// Maximum fraction of the variance that the period of a modulated light leaves unexplained.
 constexpr double kMaxUnexplained = 0.45;
-/// Log-likelihood ratio that decides between two periods: odds of 55.
+/// Minimum log-likelihood ratio that decides between two periods: odds of 55.
 constexpr double kMinLogRatio = 4;
 /// Modulation depth of the fundamental below which a light is steady.
 constexpr double kMinLightDepth = 0.3;
 /// Minimum phase coherence: that of a light whose phase changes by a quarter of a period across it.
 constexpr double kMinPhaseCoherence = 0.9;
-/// Cells of the smallest light.
+/// Minimum number of cells of a light.
 constexpr int kMinCells = 4;
-/// Largest phase difference of two regions of one lamp, in rad.
+/// Maximum phase difference of two regions of one lamp, in rad.
 constexpr double kMaxPhase_rad = 1.2;
 
-/// A region and what its profile is.
+/// Region with its profile and the fits to it.
 struct RegionCandidate {
   ModulatedRegion region;
   LineProfile profile;
   PeriodFit fit;
   std::optional<std::size_t> lamp;
-  /// Fits of the lamps' periods, by lamp.
+  /// Fits of the lamps' periods, by index of the lamp period.
   std::vector<PeriodFit> lamp_fits;
   double phase_coherence = 0;
   bool is_modulated = false;
-  bool is_other_period = false;  ///< a period that no lamp has is better
+  bool is_other_period = false;  ///< a period of no lamp fits better
 };
 
-/// Log-likelihood ratio of two fits. Three harmonics leave 6 independent values of a period, or as
-/// many as it has lines; the unknowns are the coefficients and the period.
+/// Returns the log-likelihood ratio of two fits. Three harmonics leave 6 independent values of a
+/// period, or as many as it has scanlines; the unknowns are the coefficients and the period.
 double log_ratio(const PeriodFit& better, const PeriodFit& worse) {
   constexpr double values_per_period = 6, unknowns = 7, min_unexplained = 1e-3;
   const double periods =
@@ -55,8 +55,9 @@ double log_ratio(const PeriodFit& better, const PeriodFit& worse) {
                   std::max(better.unexplained, min_unexplained));
 }
 
-/// Brightness of a region along the read-out, in the region and `margin` lines on both sides. A
-/// cell column counts by the amplitude that it has in the region.
+/// Computes the brightness of a region along the readout direction, in the region and
+/// `margin_lines` scanlines on both sides. A cell column is weighted by its amplitude in the
+/// region.
 LineProfile profile_of(const CellLevels& cells, const ModulationMap& map,
                        const ModulatedRegion& region, double margin_lines) {
   const int first_cell = (region.box.x - cells.box.x) / kCellWidth_px;
@@ -84,7 +85,7 @@ LineProfile profile_of(const CellLevels& cells, const ModulationMap& map,
   return profile;
 }
 
-/// Fits a lamp's period, give or take its drift.
+/// Fits a lamp's period within its drift.
 PeriodFit fit_lamp(const LineProfile& profile, double period_lines) {
   constexpr double finest = kLampDrift / 16;
   PeriodFit best = fit_period(profile, period_lines);
@@ -108,8 +109,8 @@ std::size_t best_lamp(const RegionCandidate& candidate) {
   return std::size_t(best - candidate.lamp_fits.begin());
 }
 
-/// Returns whether two fits have one phase at a line between two regions, where that counts least
-/// that their periods are not quite the same.
+/// Returns true if two fits have the same phase at a scanline between two regions, where the effect
+/// of a small difference of their periods is smallest.
 bool are_in_phase(const RegionCandidate& a, const PeriodFit& fit_of_a, const RegionCandidate& b,
                   const PeriodFit& fit_of_b) {
   const auto middle = [](const PixelBox& box) { return box.y + box.height / 2.0; };
@@ -121,11 +122,13 @@ bool are_in_phase(const RegionCandidate& a, const PeriodFit& fit_of_a, const Reg
   return std::abs(std::remainder(difference, 2 * std::numbers::pi)) < kMaxPhase_rad;
 }
 
-/// Candidates that have a lamp beyond doubt, by lamp; nullptr where none has.
+/// Candidates that are assigned to a lamp without doubt, by index of the lamp period; nullptr if
+/// none is.
 using Claims = std::vector<const RegionCandidate*>;
 
-/// Takes the best lamp of a candidate if every rival is worse by far. A lamp that another candidate
-/// has is no rival, unless this one may be a part or a mirror image of it by its phase.
+/// Assigns the best lamp to a candidate if every competing lamp is clearly worse. A lamp that is
+/// assigned to another candidate does not compete, unless the phase indicates that this candidate
+/// is a part or a mirror image of it.
 void decide(const Claims& claims, RegionCandidate& candidate) {
   if (candidate.lamp_fits.empty() || !candidate.is_modulated || candidate.is_other_period) return;
   const std::size_t best = best_lamp(candidate);
@@ -141,7 +144,7 @@ void decide(const Claims& claims, RegionCandidate& candidate) {
 }
 
 /// Returns |sum z| / sum |z| over the cells of a region, where z is the complex amplitude of a cell
-/// at that period: 1 if all parts of the region are modulated in phase.
+/// at the given period: 1 if all parts of the region are modulated in phase.
 double compute_phase_coherence(const CellLevels& cells, const ModulationMap& map,
                                const ModulatedRegion& region, double period_lines) {
   const double period = period_lines / cells.lines_per_bin;
@@ -166,8 +169,8 @@ double compute_phase_coherence(const CellLevels& cells, const ModulationMap& map
   return amplitudes > 0 ? std::abs(sum) / amplitudes : 0;
 }
 
-/// Returns the number of periods that a region shows. The window of two periods widens it by half
-/// a period on both sides.
+/// Returns the number of periods in a region. The window of two periods widens the region by half a
+/// period on both sides.
 double count_periods(const RegionCandidate& candidate) {
   return std::max(0.0, candidate.region.box.height / candidate.fit.period_lines - 1);
 }
@@ -191,7 +194,7 @@ RegionCandidate examine(const CellLevels& cells, const ModulationMap& map, Modul
   }
   candidate.phase_coherence =
       compute_phase_coherence(cells, map, candidate.region, candidate.fit.period_lines);
-  // Few periods mean something only where they are a lamp's.
+  // Few periods are significant only if they match a lamp.
   const bool has_lamp_period = !lamp_periods_lines.empty() && !candidate.is_other_period;
   const double min_periods = has_lamp_period ? kMinPeriods : kEnoughPeriods;
   candidate.is_modulated =
@@ -200,14 +203,14 @@ RegionCandidate examine(const CellLevels& cells, const ModulationMap& map, Modul
   return candidate;
 }
 
-/// Distance between two boxes, along the axis in which it is larger.
+/// Returns the distance between two boxes along the axis in which it is larger.
 int gap_between(const PixelBox& a, const PixelBox& b) {
   const int across = std::max(a.x, b.x) - std::min(a.right(), b.right());
   const int along = std::max(a.y, b.y) - std::min(a.bottom(), b.bottom());
   return std::max(across, along);
 }
 
-/// Whether two candidates are parts of one light.
+/// Returns true if two candidates are parts of one light.
 bool belong_together(const RegionCandidate& a, const RegionCandidate& b) {
   if (a.lamp != b.lamp) return false;
   const double ratio = a.fit.period_lines / b.fit.period_lines;
@@ -219,7 +222,7 @@ bool belong_together(const RegionCandidate& a, const RegionCandidate& b) {
   return are_in_phase(a, a.fit, b, b.fit);
 }
 
-/// Area of cells above a level, and the mean of their places.
+/// Area of cells above a level, and the sums for their centroid.
 struct LitArea {
   double cells = 0, energy = 0;
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
@@ -245,9 +248,8 @@ void add_area(const ModulationMap& map, const ModulatedRegion& region, double pe
   }
 }
 
-/// Measures the stripes of a candidate behind its envelope. The period and the duty are those of
-/// the passages through the middle of the levels where these keep time with the fitted period, and
-/// the fitted period else.
+/// Measures the stripes of a candidate after division by its envelope. The period is that of
+/// stripes_of() if it agrees with the fitted period, and the fitted period otherwise.
 Stripes measure_stripes(const RegionCandidate& candidate) {
   const PeriodFit& fit = candidate.fit;
   Stripes stripes = stripes_of(divide_by_envelope(candidate.profile, fit.period_lines));
@@ -262,7 +264,7 @@ Stripes measure_stripes(const RegionCandidate& candidate) {
 
 ModulatedLight make_light(const ModulationMap& map,
                           const std::vector<const RegionCandidate*>& parts) {
-  // The whole area, half of the brightest level, and between them.
+  // The whole area, and the areas above a quarter and a half of the brightest level.
   constexpr std::array<double, 3> fractions{0, 0.25, 0.5};
   const RegionCandidate& brightest = **std::max_element(
       parts.begin(), parts.end(), [](auto* a, auto* b) { return a->region.peak < b->region.peak; });
@@ -282,7 +284,7 @@ ModulatedLight make_light(const ModulationMap& map,
   light.peak = std::numbers::pi / 2 / std::sin(std::numbers::pi * duty) * brightest.region.peak;
   std::array<LitArea, fractions.size()> areas;
   for (const RegionCandidate* part : parts) {
-    // What is darker is light that the lamp throws on its surroundings.
+    // Darker parts are light that the lamp casts on its surroundings.
     if (part->region.peak < double(kBorderFraction) * brightest.region.peak) continue;
     light.box = around(light.box, part->region.box);
     add_area(map, part->region, brightest.region.peak, fractions, areas);
@@ -299,7 +301,7 @@ ModulatedLight make_light(const ModulationMap& map,
   return light;
 }
 
-/// Makes one light of candidates that belong together.
+/// Joins candidates that belong together to lights.
 std::vector<ModulatedLight> join_parts(const ModulationMap& map,
                                        std::vector<RegionCandidate>& candidates) {
   std::erase_if(candidates, [](const RegionCandidate& c) { return !c.is_modulated; });
@@ -318,7 +320,7 @@ std::vector<ModulatedLight> join_parts(const ModulationMap& map,
     }
     lights.push_back(make_light(map, parts));
   }
-  // Near a lamp, what has no period of its own is light that the lamp throws on its surroundings.
+  // Near a lamp, lights without a lamp are light that the lamp casts on its surroundings.
   std::erase_if(lights, [&](const ModulatedLight& light) {
     return !light.lamp &&
            std::any_of(lights.begin(), lights.end(), [&](const ModulatedLight& other) {
@@ -330,8 +332,8 @@ std::vector<ModulatedLight> join_parts(const ModulationMap& map,
   return lights;
 }
 
-/// Periods to demodulate at: those of the lamps, or, where they are not known, a bank of filters
-/// that overlap.
+/// Returns the periods for demodulation: those of the lamps, or a bank of overlapping filters if
+/// these are unknown.
 std::vector<double> periods_to_search(std::span<const double> lamp_periods_lines, int lines) {
   constexpr double bank_ratio = 1.15, min_bank_lines = 4;
   std::vector<double> periods;
@@ -345,7 +347,7 @@ std::vector<double> periods_to_search(std::span<const double> lamp_periods_lines
   return periods;
 }
 
-/// A searched part of the image.
+/// Searched part of the image.
 struct BoxSearch {
   ModulationMap map;
   std::vector<RegionCandidate> candidates;
@@ -354,7 +356,7 @@ struct BoxSearch {
 std::optional<BoxSearch> search_box(const ImageView& lines, const PixelBox& box,
                                     const Background& background,
                                     std::span<const double> lamp_periods_lines) {
-  // Noise is coarser than one grey level only where the image has it.
+  // Noise of at least one grey level is assumed.
   constexpr double min_noise = 1;
   const auto periods = periods_to_search(lamp_periods_lines, box.height);
   if (periods.empty()) return std::nullopt;

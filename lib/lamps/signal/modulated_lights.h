@@ -16,60 +16,61 @@
 
 namespace vlp {
 
-/// A light that was found by its modulation, whatever its shape.
+/// Light that was found by its modulation, whatever its shape.
 struct ModulatedLight {
-  PixelBox box;  ///< around its cells
-  /// Centre of the area that it lights, (column, line), and the radius of the disc of that area, in
-  /// pixels.
+  PixelBox box;  ///< bounding box of its cells
+  /// Centroid of the lit area, (column, line), and the radius of the disc of equal area, in pixels.
   Eigen::Vector2d center;
   double radius_px;
-  /// Largest distance per axis of the centre of a brighter part of the area from `center`, in
-  /// pixels: of that above a quarter, and above a half, of the largest amplitude.
+  /// Largest distance per axis between `center` and the centroid of the brighter part of the area,
+  /// in pixels. Brighter parts are those above a quarter and above a half of the largest amplitude.
   double asymmetry_px;
-  /// Standard deviation per axis of the lamp's centre from `center`, in pixels. A source deep in a
-  /// reflector is seen anywhere in the lamp: the lamp's centre may lie on the border of the lit
+  /// Standard deviation per axis of the lamp's center from `center`, in pixels. A source deep in a
+  /// reflector may appear anywhere in the lamp: the lamp's center may lie on the border of the lit
   /// area.
   double center_sd_px;
   PeriodFit fit;
-  /// Index of the lamp period that it has; std::nullopt where it has none or may have two.
+  /// Index of its lamp period; std::nullopt if it has none or several are possible.
   std::optional<std::size_t> lamp;
-  Stripes stripes;  ///< of its brightest part, behind its envelope
-  /// |sum z| / sum |z| over the cells of its brightest part, see find_modulated_lights().
+  Stripes stripes;  ///< stripes of its brightest part, divided by the envelope
+  /// Phase coherence |sum z| / sum |z| over the cells of its brightest part, see
+  /// find_modulated_lights().
   double phase_coherence;
-  /// Level of its brightest lines above the dark, in grey levels. The fundamental of a square wave
-  /// between 0 and that level has the amplitude (2 / pi) sin(pi duty) times it.
+  /// Level of its brightest scanlines above the dark level, in grey levels. The fundamental of a
+  /// square wave between 0 and this level has the amplitude (2 / pi) sin(pi duty) times the level.
   double peak;
-  /// Sum of the amplitude over its cells.
+  /// Sum of the amplitudes of its cells.
   double energy;
 };
 
-/// Finds lights in parts of an image by their modulation and decides which of the lamps' periods
-/// they have.
+/// Detects lights in parts of an image by their modulation and assigns them to the periods of the
+/// lamps.
+///
+/// @param lines  image whose rows are the scanlines
+/// @param boxes  parts of the image to search
+/// @param background  dark level and noise of the image
+/// @param lamp_periods_lines  periods of the lamps of the map; empty if the row time is unknown:
+///        the lights then have the period that fits best
 ///
 /// Each region of the modulation map (see find_modulated_regions()) has a line profile, in which a
-/// column counts by its amplitude. The profile is fitted with each lamp's period, give or take its
-/// drift, and with any other period. With the fractions u of the variance that the fits leave, the
-/// log-likelihood ratio of two periods is
+/// column is weighted by its amplitude. The profile is fitted with each lamp's period within its
+/// drift, and with any other period. With the fractions u of the variance that the fits do not
+/// explain, the log-likelihood ratio of two periods is
 ///
-///     L = n / 2 log(u_2 / u_1),   n = periods min(6, lines of a period) - 7,
+///     L = n / 2 log(u_2 / u_1),   n = periods min(6, lines of a period) - 7.
 ///
-/// where n is the number of independent values that three harmonics leave of the periods that both
-/// cover. The
-/// best lamp is taken if it leaves less than 45 %, if L against every other lamp exceeds 4, and if
-/// no period that is no lamp's is better by 4. A lamp that another region of the image has beyond
-/// doubt does not count as a rival, unless the phase is that lamp's, too. Regions with one lamp and
-/// one phase that are near each other are one light.
+/// n is the number of degrees of freedom of three harmonics over the periods that both fits cover.
 ///
-/// A shutter exposes all pixels of a line at one time, so that all parts of a lamp are modulated in
-/// phase, whatever its shape; the parts of letters and patterns are not. With the complex amplitude
-/// z of each cell at the period, the phase coherence |sum z| / sum |z| of a light exceeds 0.9. A
-/// phase change of a quarter of a period across the light reduces it to that.
+/// A region is assigned to the best lamp under three conditions. The fit leaves less than 45 % of
+/// the variance; L against every other lamp exceeds 4; and no period outside the map is better
+/// by 4. A lamp that is assigned to another region without doubt is no competitor, unless the phase
+/// also agrees with that lamp. Neighboring regions with the same lamp and phase are joined to one
+/// light.
 ///
-/// With no lamp periods (the row time is not known) the lights have the period that fits best.
-///
-/// @param lines  image whose rows are the lines that the shutter reads
-/// @param boxes  parts of the image to search
-/// @param lamp_periods_lines  periods of the lamps of the map, in lines; may be empty
+/// A shutter exposes all pixels of a scanline at the same time. All parts of a lamp are therefore
+/// modulated in phase, whatever its shape; the parts of letters and patterns are not. With the
+/// complex amplitude z of each cell at the period, the phase coherence |sum z| / sum |z| of a light
+/// exceeds 0.9. A phase change of a quarter of a period across the light reduces it to 0.9.
 std::vector<ModulatedLight> find_modulated_lights(const ImageView& lines,
                                                   std::span<const PixelBox> boxes,
                                                   const Background& background,

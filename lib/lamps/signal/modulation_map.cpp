@@ -11,16 +11,17 @@
 namespace vlp {
 namespace {
 
-/// Bins from one step of the map to the next.
+/// Number of bins from one step of the map to the next.
 constexpr int kBinsPerStep = 2;
 /// Probability that noise makes one cell significant at one period: an image has up to 1e5 cells.
 constexpr double kFalseAlarmRate = 1e-9;
 /// Modulation depth below which a cell is steady: a steady edge reaches 0.2 to 0.3 next to it.
 constexpr float kMinCellDepth = 0.25F;
-/// Amplitude of the saddle over that of the lower maximum from which on two maxima are one.
+/// Minimum ratio of the amplitude of the saddle to that of the lower maximum at which two maxima
+/// are merged.
 constexpr float kSaddleFraction = 0.6F;
 
-/// Values by bin and cell.
+/// Grid of values by bin and cell.
 class CellGrid {
  public:
   CellGrid(int rows, int columns)
@@ -47,7 +48,7 @@ void sum_line(const Level* pixels, int width, float* sums, int cells) {
   sums[whole] += float(sum) * float(kCellWidth_px) / float(width - whole * kCellWidth_px);
 }
 
-/// A place between two rows of cumulative sums.
+/// Position between two rows of cumulative sums.
 struct SumPlace {
   int row;
   float fraction;
@@ -59,14 +60,14 @@ SumPlace sum_place_at(double t, int rows) {
   return {row, static_cast<float>(t - row)};
 }
 
-/// Means over `length` bins around each bin, from cumulative sums; outside all is 0.
+/// Moving mean over `length` bins around each bin, from cumulative sums; values outside are 0.
 class MovingMean {
  public:
   MovingMean(int bins, int cells, double length)
       : bins_(bins), cells_(cells), length_(length), sums_(bins + 1, cells) {}
 
   void restart() { std::fill_n(sums_.row(0), cells_, 0.F); }
-  /// The row that takes the sum after `bin`, and that before it.
+  /// Return the row of the cumulative sum after `bin`, and that before it.
   float* after(int bin) { return sums_.row(bin + 1); }
   const float* before(int bin) const { return sums_.row(bin); }
 
@@ -88,7 +89,7 @@ class MovingMean {
   CellGrid sums_;
 };
 
-/// Two moving means of one length after one another, of values times a factor for each bin.
+/// Moving mean applied twice with the same length, to values times a factor for each bin.
 class TwiceMean {
  public:
   TwiceMean(int bins, int cells, double length)
@@ -122,12 +123,12 @@ class TwiceMean {
   std::vector<float> mean_;
 };
 
-/// Connected cells of find_modulated_regions() while they grow.
+/// Watershed of find_modulated_regions().
 class Watershed {
  public:
   explicit Watershed(const ModulationMap& map) : map_(map), labels_(map.amplitude.size(), kNone) {}
 
-  /// Adds the cell with the largest amplitude that is left.
+  /// Adds the next cell; cells have to be added in descending order of amplitude.
   void add(int cell) {
     const float amplitude = map_.amplitude[std::size_t(cell)];
     const auto [basin, beside_border] = join_neighbours(cell, amplitude);
@@ -143,7 +144,7 @@ class Watershed {
     }
   }
 
-  /// The basin of a cell; negative where it has none.
+  /// Returns the basin of a cell; negative if it has none.
   int basin_of(std::size_t cell) { return labels_[cell] < 0 ? labels_[cell] : root(labels_[cell]); }
   int peak_cell(int basin) const { return peaks_[std::size_t(basin)]; }
   std::size_t size() const { return parents_.size(); }
@@ -157,8 +158,8 @@ class Watershed {
     return label;
   }
 
-  /// The basin that a cell belongs to by its neighbours, merged with others where the saddle is
-  /// high, and whether one of them is a border.
+  /// Returns the basin of a cell's neighbors, merged with others if the saddle is high, and whether
+  /// one of the neighbors is a border.
   std::pair<int, bool> join_neighbours(int cell, float amplitude) {
     const int x = cell % map_.cells, y = cell / map_.cells;
     int basin = kNone;

@@ -14,10 +14,10 @@ namespace vlp {
 namespace {
 
 constexpr int kHarmonics = 3;
-/// Envelope below which a line has too little light, over the envelope's maximum.
+/// Minimum envelope of a scanline with sufficient light, as a fraction of the envelope's maximum.
 constexpr double kMinEnvelope = 0.08;
 
-/// Mean over `length` bins around each bin, of those that there are.
+/// Returns the mean over `length` bins around each bin, over the available bins.
 std::vector<double> moving_mean(const std::vector<double>& values, double length) {
   const auto count = values.size();
   const auto end = double(count);
@@ -37,7 +37,7 @@ std::vector<double> moving_mean(const std::vector<double>& values, double length
 
 using HarmonicCoefficients = std::array<double, 2 * kHarmonics>;
 
-/// cos and sin of the harmonics of an angle.
+/// Returns cos and sin of the harmonics of an angle.
 HarmonicCoefficients harmonics_at(double angle_rad) {
   HarmonicCoefficients basis;
   const double c = std::cos(angle_rad), s = std::sin(angle_rad);
@@ -64,7 +64,7 @@ struct Envelope {
       : levels(moving_mean(moving_mean(profile.levels, period_bins), period_bins)),
         largest(*std::max_element(levels.begin(), levels.end())) {}
 
-  /// Weight of a bin, from 0 where it has too little light to 1.
+  /// Returns the weight of a bin, up to 1; 0 if it has too little light.
   double weight(std::size_t bin) const {
     const double fraction = levels[bin] / largest;
     return fraction < kMinEnvelope ? 0 : fraction;
@@ -118,7 +118,7 @@ std::vector<double> divide_by_envelope(const LineProfile& profile, double period
 
 PeriodFit find_period(const LineProfile& profile, double min_period_lines) {
   constexpr double min_periods = 1.3;
-  // A fit of N periods loses half of the signal where the period is off by 0.6 / N.
+  // A fit over N periods loses half of the signal if the period has a relative error of 0.6 / N.
   constexpr double step_fraction = 0.15;
   const double lines = double(profile.levels.size()) * profile.lines_per_bin;
   PeriodFit best;

@@ -6,46 +6,46 @@
 
 namespace vlp {
 
-/// Brightness of a light along the read-out.
+/// Brightness of a light along the readout direction.
 struct LineProfile {
-  double first_line;  ///< middle of the first bin, as a line of the image
+  double first_line;  ///< middle of the first bin, as a scanline of the image
   int lines_per_bin;
-  std::vector<double> levels;  ///< above the dark level, of any scale
+  std::vector<double> levels;  ///< levels above the dark level, in any unit
 };
 
 /// Fit of a periodic signal to a profile.
 struct PeriodFit {
   double period_lines;
-  /// Fraction of the variance of the normalized profile that the signal leaves, 0 to 1.
+  /// Fraction of the variance of the normalized profile that the fit does not explain, 0 to 1.
   double unexplained = 1;
-  /// Amplitude of the fundamental over the mean: 4 / pi for a square wave of duty 0.5.
+  /// Ratio of the amplitude of the fundamental to the mean: 4 / pi for a square wave of duty 0.5.
   double depth = 0;
   /// Phase p of the fundamental, cos(2 pi line / period - p), in rad.
   double phase_rad = 0;
-  /// Periods that the lit lines cover.
+  /// Number of periods that the lit scanlines cover.
   double periods = 0;
 };
 
-/// Fits a signal of one period behind a smooth envelope to a profile.
+/// Fits a periodic signal with a smooth envelope to a profile.
 ///
-/// The envelope E is the moving mean of the profile over exactly one period, twice; at the ends of
-/// the profile over the available lines. It contains everything slower than the period and nothing
-/// of the period and its harmonics, so that
+/// The envelope E is the moving mean of the profile over exactly one period, applied twice; at the
+/// ends of the profile it is the mean of the available scanlines. It contains all components slower
+/// than the period, but not the period and its harmonics. Therefore
 ///
 ///     y(l) / E(l) - 1 = sum_h c_h cos(2 pi h l / P) + s_h sin(2 pi h l / P),   h = 1, 2, 3,
 ///
-/// whatever the shape of the light. The coefficients are those of weighted least squares with the
-/// weights E(l); lines count where E exceeds 8 % of its maximum. A period that is longer than the
-/// lit lines fits most signals: it cannot be excluded. Returns a fit that leaves all of the
-/// variance if the lines do not determine the coefficients.
+/// whatever the shape of the light. The coefficients follow from least squares with the weights
+/// E(l), over scanlines where E exceeds 8 % of its maximum. A period longer than the lit scanlines
+/// fits most signals and cannot be excluded. Returns a fit with `unexplained` 1 if the scanlines do
+/// not determine the coefficients.
 PeriodFit fit_period(const LineProfile& profile, double period_lines);
 
-/// Divides a profile by its envelope for that period, see fit_period(), where it has light: the
-/// brightest lines are about 1 / duty, one value for each line.
+/// Divides a profile by its envelope for this period, see fit_period(). Returns one value for each
+/// scanline with sufficient light; the brightest are about 1 / duty.
 std::vector<double> divide_by_envelope(const LineProfile& profile, double period_lines);
 
-/// Fits all periods from `min_period_lines` on, up to the one that the profile shows 1.3 times, and
-/// returns the best. Periods of less than a hundredth of the profile are left out.
+/// Fits all periods from `min_period_lines` up to that of which the profile shows 1.3 periods, and
+/// returns the best fit. Skips periods of less than a hundredth of the profile.
 PeriodFit find_period(const LineProfile& profile, double min_period_lines);
 
 }  // namespace vlp

@@ -23,7 +23,8 @@ PeriodGroup make_group(std::span<const MeasuredPeriod> lights, std::vector<std::
   PeriodGroup group{upper_median(log_periods), 0, std::move(members), lamp, {}};
   if (!duties.empty()) group.duty = upper_median(std::move(duties));
   for (double& value : log_periods) value = std::abs(value - group.log_period);
-  // A median scatters 1.25 times as much as a mean. Three lights or less do not show their scatter.
+  // The standard deviation of a median is 1.25 times that of a mean. Three lights or less do not
+  // determine their scatter.
   constexpr double single = 0.003, least = 1e-5, sd_of_mad = 1.4826, sd_of_median = 1.2533;
   const std::size_t count = group.lights.size();
   const double scatter = count > 3 ? sd_of_mad * upper_median(std::move(log_periods)) : single;
@@ -31,7 +32,8 @@ PeriodGroup make_group(std::span<const MeasuredPeriod> lights, std::vector<std::
   return group;
 }
 
-/// Removes the densest group from `sorted`, lights in the order of their periods, and returns it.
+/// Removes the densest group from `sorted`, indices of lights in the order of their periods, and
+/// returns it.
 std::vector<std::size_t> take_densest(std::span<const MeasuredPeriod> lights,
                                       std::vector<std::size_t>& sorted) {
   constexpr double half_width = 0.015;

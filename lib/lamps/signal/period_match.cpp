@@ -14,9 +14,9 @@ namespace vlp {
 namespace {
 
 constexpr double kScatter = 0.003, kFarthest = kMaxResidualSds * kScatter;
-constexpr double kShortest_s = 1e-8, kLongest_s = 1e-3;  // what a calibration may hold
-/// Standard deviation of a measured duty about that of the map: blur and a long exposure draw it
-/// towards 0.5, saturation raises it.
+constexpr double kShortest_s = 1e-8, kLongest_s = 1e-3;  // valid range of a calibration
+/// Standard deviation of a measured duty about that of the map. Blur and a long exposure bias it
+/// towards 0.5; saturation increases it.
 constexpr double kDutySd = 0.1;
 
 double variance_of(const PeriodGroup& group) { return group.sd * group.sd + kScatter * kScatter; }

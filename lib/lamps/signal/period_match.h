@@ -14,20 +14,21 @@ namespace vlp {
 /// Assignment of period groups to the lamps of a map under one row time.
 struct PeriodMatch {
   double log_row_time;
-  /// See row_time.h.
+  /// Cost of the assignment, see estimate_row_time().
   double cost;
   /// Residual of each group in log period; std::nullopt if no lamp is assigned.
   std::vector<std::optional<double>> residuals;
-  /// Lamps that each group may be: its label, or all lamps with its frequency.
+  /// Possible lamps of each group: its label, or all lamps with its frequency.
   std::vector<std::vector<int>> lamps;
 };
 
-/// Matches period groups with the lamps of a map that have a frequency.
+/// Matcher of period groups to the lamps of a map that have a frequency.
 class PeriodMatching {
  public:
   PeriodMatching(std::vector<PeriodGroup> groups, const LampMap& lamps);
 
-  /// Returns a refined match for every row time that puts a lamp's frequency to a group's period.
+  /// Returns a refined match for every row time that maps the frequency of a lamp to the period of
+  /// a group.
   std::vector<PeriodMatch> matches() const;
 
  private:
@@ -37,7 +38,7 @@ class PeriodMatching {
   PeriodMatch matched(double log_row_time) const;
   LampsByLogFrequency::const_iterator nearest_frequency(const PeriodGroup& group,
                                                         double log_row_time) const;
-  /// Cost of the group's duty if the group is one of these lamps.
+  /// Returns the cost of the group's duty if the group is one of these lamps.
   double duty_cost(const PeriodGroup& group, const std::vector<int>& lamps) const;
 
   std::vector<PeriodGroup> groups_;

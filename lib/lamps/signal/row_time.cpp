@@ -13,7 +13,7 @@ namespace vlp {
 namespace {
 
 RowTime row_time_of(const PeriodMatch& match, const std::vector<PeriodGroup>& groups) {
-  constexpr double measuring = 5e-4;  // how far measured periods may be off together
+  constexpr double measuring = 5e-4;  // common relative error of measured periods
   double squares = 0, information = 0;
   int lamps = 0, lights = 0;
   for (std::size_t i = 0; i < groups.size(); ++i) {
@@ -24,7 +24,8 @@ RowTime row_time_of(const PeriodMatch& match, const std::vector<PeriodGroup>& gr
     lights += static_cast<int>(groups[i].lights.size());
   }
   double variance = 1 / information;
-  // Not weighted: five lamps cannot show which of them is the one to trust.
+  // The scatter is not weighted, because five lamps do not reveal which of them is the most
+  // reliable.
   if (lamps > 1) variance = std::max(variance, squares / (lamps - 1) / lamps);
   variance += measuring * measuring;
   const double row_time_s = std::exp(match.log_row_time);

@@ -14,72 +14,75 @@ namespace vlp {
 
 struct RowTime {
   double row_time_s;
-  /// Standard deviation, from the scatter of the lamps about their frequencies, of the lights
-  /// about their lamps, and half a thousandth, by which all measured periods may be off together.
-  /// With one lamp only, the error of its frequency comes on top.
+  /// Standard deviation. Includes the scatter of the lamps about their frequencies and of the
+  /// lights about their lamps. Also includes 0.05 %, a common relative error of all measured
+  /// periods. With one lamp only, the error of its frequency is not included.
   double sd_s;
-  /// Lamps that it rests on, and lights of them.
+  /// Number of lamps that determine the row time, and number of their lights.
   int lamps, lights;
 };
 
 /// Row time that explains the measured periods, with the assignment of groups to lamps.
 struct RowTimeCandidate {
   RowTime row_time;
-  /// See estimate_row_time().
+  /// Cost, see estimate_row_time().
   double cost;
-  /// Lamps that each group may be, by the index of the group: those with the frequency that it
-  /// then has; empty if no lamp has it.
+  /// Possible lamps of each group, by the index of the group: those with the resulting frequency;
+  /// empty if no lamp has it.
   std::vector<std::vector<int>> lamps;
 };
 
 struct RowTimeCandidates {
   std::vector<PeriodGroup> groups;
-  /// In the order of their cost.
+  /// Candidates, in the order of their cost.
   std::vector<RowTimeCandidate> candidates;
-  /// Reason why there are no candidates, and what to add.
+  /// Reason for the lack of candidates, with a remedy.
   std::string problem;
 };
 
-/// The row time, or why there is none and what to add.
+/// Row time, or the reason for its lack with a remedy.
 struct RowTimeResult {
   std::optional<RowTime> found;
   std::string problem;
 };
 
-/// A candidate is the answer if every other one costs this much more: it is then exp(-4) times as
-/// likely, about 2 %.
+/// Minimum cost difference of all other candidates to the chosen one. Another candidate is then
+/// exp(-4) times as likely, about 2 %.
 inline constexpr double kClearCost = 4;
 
-/// Residuals beyond this many standard deviations count as this many: a lamp that is off its
-/// frequency or its place, or another light, misleads little.
+/// Maximum of a residual, in standard deviations; larger residuals are clamped. This limits the
+/// effect of a lamp with a wrong frequency or position, or of another light.
 inline constexpr double kMaxResidualSds = 20;
 
-/// Finds the row times that explain the lights of lamps whose frequencies the map knows. A lamp of
-/// frequency f has a period of 1 / (f row_time) lines (lib/THEORY.md, "Identity"), so that for
+/// Estimates the row times that explain the lights of lamps with frequencies in the map. A lamp of
+/// frequency f has a period of 1 / (f row_time) scanlines (lib/THEORY.md, "Identity"), so that for
 /// lamp k of light i
 ///
 ///     log row_time = -log period_i - log f_k.
 ///
-/// Lights of one lamp, or of one period, are made one group by their median. Which lamp an
-/// unlabelled group is of is not known. Each row time that puts some lamp's frequency to some
-/// period is refined by iterated least squares, and has the cost
+/// Lights of one lamp, or of one period, form one group with their median period. The lamp of an
+/// unlabeled group is unknown. Each row time that maps the frequency of some lamp to some period is
+/// refined by iterated least squares, and has the cost
 ///
-///     sum over groups of min over lamps of log(1 + r^2 / s^2) + log(1 + d^2 / 0.1^2),
+///     sum over groups of min over lamps of log(1 + r^2 / s^2) + log(1 + d^2 / 0.1^2).
 ///
-/// r the residual above, s^2 = sd^2 + 0.003^2, where a lamp serves for one group, and a residual
-/// beyond kMaxResidualSds 0.003 counts as that; d the measured duty less the lamp's, where all
-/// lamps with a frequency state their duty.
+/// - r is the residual of the equation above; residuals beyond kMaxResidualSds 0.003 are clamped.
+/// - s^2 = sd^2 + 0.003^2, with the standard deviation sd of the group's log period.
+/// - d is the difference between the measured duty and that of the lamp, used if the map has the
+///   duties of all lamps with a frequency.
+///
+/// Each frequency is assigned to at most one unlabeled group.
 ///
 /// @return  the row times that differ by 2 % or more and cost less than the best one plus
-///          kClearCost; a problem if there is none
+///        kClearCost; a problem if there is none
 RowTimeCandidates estimate_row_time(std::span<const MeasuredPeriod> lights, const LampMap& lamps);
 
-/// Chooses the candidate with the least cost.
+/// Selects the candidate with the smallest cost.
 ///
-/// @param position_costs  cost of the lamps' places for each candidate, added to its own; empty if
-///                        not known
-/// @return  a problem if another candidate costs less than kClearCost more, as when all ratios of
-///          frequencies are equal, or if less than half of the groups have a lamp
+/// @param position_costs  cost of the lamps' positions for each candidate, added to its own cost;
+///        empty if unknown
+/// @return  a problem if another candidate costs less than kClearCost more, for example if all
+///        ratios of frequencies are equal, or if less than half of the groups have a lamp
 RowTimeResult choose_row_time(const RowTimeCandidates& found,
                               std::span<const double> position_costs = {});
 

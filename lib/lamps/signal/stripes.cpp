@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kClear = 0.7;
 
-/// Values of four frequencies, which processors multiply at once.
+/// Values of four frequencies, for vector instructions.
 using Lanes = Eigen::Array4d;
 
 /// Returns the fraction of the variance that a sine of each frequency (per line) and a constant
@@ -41,7 +41,7 @@ Lanes explained(const std::vector<double>& signal, double mean, double variance,
     c = next;
   }
   const auto n = static_cast<double>(signal.size());
-  // Normal equations of cosine and sine, with the constant taken off.
+  // Normal equations of cosine and sine after elimination of the constant.
   const Lanes cc = (n + sum_cc) / 2 - sum_c * sum_c / n;
   const Lanes ss = (n - sum_cc) / 2 - sum_s * sum_s / n;
   const Lanes cs = sum_cs / 2 - sum_c * sum_s / n;
@@ -50,7 +50,8 @@ Lanes explained(const std::vector<double>& signal, double mean, double variance,
   return (determinant > 1e-6 * n * n).select(share, 0);
 }
 
-/// Returns the begins or ends of stripes: the signal passes the middle between dark and bright.
+/// Returns the positions of the begins or ends of stripes, where the signal crosses the middle
+/// between dark and bright.
 std::vector<double> passages(const std::vector<double>& signal, double middle, bool rising) {
   std::vector<double> places;
   for (std::size_t i = 1; i < signal.size(); ++i) {
@@ -63,8 +64,8 @@ std::vector<double> passages(const std::vector<double>& signal, double middle, b
 }
 
 /// Fits the period to the begins and ends of stripes by least squares: one offset for the begins,
-/// one for the ends. Exact for square waves, where a few periods bias a sine. Returns std::nullopt
-/// if they are too few or do not agree with `guess`.
+/// one for the ends. Exact for square waves, where few periods bias a sine fit. Returns
+/// std::nullopt if there are too few or if they do not agree with `guess`.
 std::optional<double> period_of(const std::vector<double>& signal, double middle, double guess) {
   double moment = 0, square = 0, misfit = 0;
   int count = 0;
@@ -103,7 +104,8 @@ std::optional<double> period_of(const std::vector<double>& signal, double middle
   return period;
 }
 
-/// Share of the disc's area on lines brighter than `middle`: of chords, in the middle of the disc.
+/// Returns the fraction of the disc's area on scanlines brighter than `middle`, for chords in the
+/// middle of the disc.
 double lit_area(const std::vector<double>& signal, double middle) {
   const auto n = static_cast<double>(signal.size());
   double lit = 0, all = 0;
@@ -141,7 +143,7 @@ Stripes stripes_of(const std::vector<double>& signal) {
   constexpr double rounding = 1e-18;
   if (!(high > low) || !(variance > rounding * high * high)) return stripes;
 
-  // Steps are fine enough for a parabola through the best three.
+  // The step is sufficiently small for a parabola through the best three values.
   const double step = 0.2 / n, lowest = 0.9 / n, highest = 1 / kShortestPeriod_lines;
   const Lanes steps(0, step, 2 * step, 3 * step);
   double best = lowest;
@@ -160,7 +162,7 @@ Stripes stripes_of(const std::vector<double>& signal) {
   stripes.regular = in_time.has_value();
   stripes.period_lines = in_time.value_or(1 / best);
   stripes.periods = n / stripes.period_lines;
-  // Over whole periods alone.
+  // The duty is measured over whole periods.
   const double used = std::max(1.0, std::floor(stripes.periods)) * stripes.period_lines;
   double lit = 0;
   for (std::size_t i = 0; i < signal.size(); ++i) {
@@ -176,8 +178,8 @@ Stripes stripes_of(const std::vector<double>& signal) {
 
 namespace {
 
-/// The level of a line between two columns: of five parts the second brightest, because something
-/// may hide some, and a speck may brighten one.
+/// Returns the level of a scanline between two columns: the second brightest of five parts. An
+/// object may hide some of them, and a speck may brighten one.
 template <typename Level>
 double level_of(const Level* pixels, int begin, int end) {
   constexpr int parts = 5;

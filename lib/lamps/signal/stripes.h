@@ -11,58 +11,61 @@
 
 namespace vlp {
 
-/// Minimum period of stripes; the limit of a shutter is two lines.
+/// Minimum period of stripes, in scanlines; the theoretical limit is two scanlines.
 inline constexpr double kShortestPeriod_lines = 2.2;
 
 /// Minimum contrast of a modulated light, and minimum number of periods of an identified one.
 inline constexpr double kMinContrast = 0.2, kMinPeriods = 1.3;
 
-/// Number of periods below which patterns without stripes may look like a lamp by chance.
+/// Number of periods below which patterns without stripes may match a lamp by chance.
 inline constexpr double kEnoughPeriods = 2.5;
 
-/// Fraction of a disc's height whose lines are used: those at the rim are short and dim.
+/// Fraction of a disc's height that is used: scanlines at the rim are short and dim.
 inline constexpr double kUsedHeight = 0.9;
 
-/// Returns the pixels of a light on each line, without those at its rim. The light is an ellipse in
-/// the box from `low` to `high` (column, row) of an image of that size.
+/// Returns the pixels of a light on each scanline, without those at its rim. The light is an
+/// ellipse in the box from `low` to `high` (column, row) of an image of `size`.
 std::vector<Run> chords_of(const Eigen::Vector2d& low, const Eigen::Vector2d& high,
                            const ImageSize& size);
 
-/// Computes the level of each chord of a light above the dark, where nothing hides it.
+/// Computes the level of each chord of a light above `dark`. Suppresses partial occlusion and
+/// specks: the level is that of the second brightest of five parts.
 std::vector<double> line_signal(const ImageView& image, const std::vector<Run>& chords,
                                 double dark);
 
+/// Stripes of a light and their statistics.
 struct Stripes {
-  /// (bright - dark) / bright of the lines: 0 for steady light, 1 for full stripes.
+  /// Contrast (bright - dark) / bright of the scanlines: 0 for steady light, 1 for full modulation.
   double contrast;
-  /// Lines from one stripe to the next, and the lit fraction of a period.
+  /// Period in scanlines, and the lit fraction of a period.
   double period_lines;
   double duty;
-  /// Fraction of the signal's variance that a sine of that period explains.
+  /// Fraction of the signal's variance that a sine of this period explains.
   double clarity;
   /// Number of periods in the signal.
   double periods;
-  /// Whether all stripes begin and end in time with the period.
+  /// True if the begins and ends of all stripes agree with the period.
   bool regular;
-  /// Half of the number of begins and ends of stripes, over the number of lines. The signal passes
-  /// the middle between dark and bright there.
+  /// Number of stripes per scanline: half of the number of begins and ends divided by the number of
+  /// scanlines. The signal crosses the middle between dark and bright there.
   double count_per_line;
-  /// Fraction of the disc's area on lines brighter than that middle.
+  /// Fraction of the disc's area on scanlines brighter than this middle level.
   double lit_area;
 };
 
-/// Returns whether the stripes are clear and numerous enough: clarity above 0.7 and kEnoughPeriods.
-/// Those of a partly hidden lamp are not.
+/// Returns true if the stripes are clear and numerous: clarity above 0.7 and more than
+/// kEnoughPeriods periods. Stripes of a partly hidden lamp are not.
 bool trustworthy(const Stripes& stripes);
 
-/// Returns whether the period is meaningful: the stripes are regular, or their clarity exceeds 0.7.
-/// An object that hides a part of a lamp makes stripes of its own, by chance like another lamp's.
+/// Returns true if the period is meaningful: the stripes are regular, or their clarity exceeds 0.7.
+/// An object that hides a part of a lamp creates stripes that match another lamp by chance.
 bool readable(const Stripes& stripes);
 
-/// Measures the stripes of a signal. The period is that of the sine with a constant that fits best
-/// (least squares, Lomb 1976), between kShortestPeriod_lines and the length of the signal. The
-/// signal is that of line_signal(): of a disc, from `kUsedHeight` of its radius above the middle to
-/// as much below. Without 8 lines or more contrast and clarity are 0.
+/// Measures the stripes of a signal, the result of line_signal(). For a disc it covers
+/// `kUsedHeight` of the radius above and below the middle. The period is first that of the
+/// best-fitting sine with a constant (least squares, Lomb 1976), between kShortestPeriod_lines and
+/// the length of the signal. If the begins and ends of the stripes agree with it, they determine
+/// the period. Contrast and clarity are 0 for signals of less than 8 scanlines.
 Stripes stripes_of(const std::vector<double>& signal);
 
 }  // namespace vlp

@@ -16,7 +16,7 @@
 namespace vlp {
 namespace {
 
-/// Tells of what came, line by line, where there is no terminal.
+/// Log of the arrived images, line by line, for use without a terminal.
 class Log {
  public:
   explicit Log(bool quiet) : quiet_(quiet) {}
@@ -33,10 +33,10 @@ class Log {
 
  private:
   bool quiet_;
-  std::size_t done_ = 0;  // steps that were said to be done
+  std::size_t done_ = 0;  // number of steps reported as done
 };
 
-/// Whether an image came; of a source's frames only one that is used counts.
+/// Returns true if an image arrived. Of the frames of a source, only used ones are considered.
 bool came(const Unit& unit, const std::vector<WatchedRun::Arrival>& arrivals, bool of_source) {
   return std::any_of(arrivals.begin(), arrivals.end(), [&](const WatchedRun::Arrival& arrival) {
     const auto& images = unit.step(arrival.step).images;
@@ -45,7 +45,8 @@ bool came(const Unit& unit, const std::vector<WatchedRun::Arrival>& arrivals, bo
   });
 }
 
-/// A unit begins with its first image, which may come long after its serial was scanned.
+/// Checks whether the golden unit is due. Called at the first image of a unit, which may arrive
+/// long after its serial number was scanned.
 void ask_for_golden(Unit& unit, const Terminal& terminal) {
   std::string why = golden_problem(unit.config());
   if (!why.empty() && why != unit.distrusted() && !terminal.interactive()) {

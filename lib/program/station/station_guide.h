@@ -8,8 +8,9 @@
 
 namespace vlp {
 
-/// Takes a unit's images as they come and guides the operator, until the unit is done, or hopeless,
-/// or the operator wants the verdict. Throws std::runtime_error when the operator leaves.
+/// Processes the images of a unit as they arrive and guides the operator. Returns when the unit is
+/// complete or cannot pass any more, the frames end, no image arrives for options.idle_s, or the
+/// operator requests the verdict. Throws std::runtime_error if the operator leaves.
 void guide_unit(const StationRunOptions& options, Unit& unit, WatchedRun& watched,
                 StepSources& sources, Spool& spool, Terminal& terminal);
 

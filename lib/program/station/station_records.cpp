@@ -33,12 +33,12 @@ namespace {
 
 constexpr const char* kAny = "any";
 
-/// Prints a line to stdout. Names that records hold can neither add a line nor control the
-/// terminal.
+/// Prints a line to stdout. Escapes control characters, so that names in records can neither add a
+/// line nor control the terminal.
 void say_line(const std::string& text) { fmt::print("{}\n", printable_line(text)); }
 
-/// Opens the runs of a station, or of records alone. Reports the state of the spool, unless the
-/// records are away: then it is for commands that go on without them (warn_if_away()).
+/// Opens the runs of a station, or of records alone. Reports the state of the spool. If the records
+/// are unavailable, commands that continue without them report it (warn_if_away()).
 std::unique_ptr<KnownRuns> known_runs(const StationRecordsOptions& options) {
   if (options.station.empty() == options.records.empty()) {
     throw std::invalid_argument("which records? Give --station or --records");
@@ -60,7 +60,7 @@ std::unique_ptr<KnownRuns> known_runs(const StationRecordsOptions& options) {
   }
 }
 
-/// Reports that a command used the runs that wait, because the records are away.
+/// Reports that a command used the runs in the spool because the records are unavailable.
 void warn_if_away(KnownRuns& known) {
   if (known.spool() != nullptr && known.are_away()) {
     spdlog::warn("{}", printable(known.spool()->notice()));
@@ -75,14 +75,14 @@ RunFilter replace_any(RunFilter filter) {
   return filter;
 }
 
-/// Returns the runs that the options ask for: those of --station, unless --of-station is given.
+/// Returns the filter of the options: runs of --station, unless --of-station is given.
 RunFilter requested_runs(const StationRecordsOptions& options, const KnownRuns& known) {
   RunFilter filter = options.filter;
   if (filter.station.empty() && known.station()) filter.station = known.station()->station;
   return replace_any(std::move(filter));
 }
 
-/// Returns the run that is named, or the last that the filter lets through.
+/// Returns the named run, or the last that the filter accepts.
 RunRecord run_of(KnownRuns& known, const StationRecordsOptions& options) {
   RunRecord run =
       options.run.empty() ? known.last(requested_runs(options, known)) : known.find(options.run);
@@ -90,7 +90,7 @@ RunRecord run_of(KnownRuns& known, const StationRecordsOptions& options) {
   return run;
 }
 
-/// Returns requested_runs(), of units unless --kind is given.
+/// Returns requested_runs() restricted to units, unless --kind is given.
 RunFilter comparable(const StationRecordsOptions& options, const KnownRuns& known) {
   RunFilter filter = requested_runs(options, known);
   if (options.filter.kind.empty()) filter.kind = "unit";
@@ -101,14 +101,14 @@ const StationConfig* station_of(const KnownRuns& known) {
   return known.station() ? &*known.station() : nullptr;
 }
 
-/// Records that several stations share, when nothing says of which.
+/// Checks that all points are from one station, if neither options nor filter name a station.
 void check_one_station(const std::vector<TrendPoint>& points,
                        const StationRecordsOptions& options) {
   if (options.station.empty() && options.filter.station.empty()) check_one_station(points);
 }
 
-/// Checks that --output is none of the files that the command reads: the records, station.yaml and
-/// the files that it names.
+/// Checks that --output is not an input of the command: the records, station.yaml, or a file named
+/// in it.
 void check_output_of(const StationRecordsOptions& options, const KnownRuns& known) {
   if (options.output.empty()) return;
   std::vector<std::string> inputs{options.station, options.records};
@@ -119,14 +119,14 @@ void check_output_of(const StationRecordsOptions& options, const KnownRuns& know
   check_output(options.output, inputs);
 }
 
-/// The folder into which files of a run go.
+/// Returns the folder for the files of a run.
 std::filesystem::path results_of(const StationRecordsOptions& options) {
   if (!options.output.empty()) return options.output;
   if (!options.station.empty()) return read_station(options.station).results;
   throw std::invalid_argument("where to? Give --station, whose results it goes to, or --output");
 }
 
-/// What a study gives, or why these values are none, as Undetermined.
+/// Returns the result of a study. Converts std::invalid_argument to Undetermined.
 template <typename Study>
 auto determined(const Study& study) {
   try {
@@ -136,7 +136,7 @@ auto determined(const Study& study) {
   }
 }
 
-/// UNIT=VALUE, by unit.
+/// Parses reference values UNIT=VALUE. Returns them by unit.
 std::map<std::string, double> references_of(const std::vector<std::string>& texts) {
   std::map<std::string, double> references;
   for (const std::string& text : texts) {
@@ -158,7 +158,7 @@ std::string words_of(const TestedEstimate& estimate) {
                      estimate.standard_error, estimate.t, estimate.p, estimate.low, estimate.high);
 }
 
-/// Bias and linearity of a station against reference units.
+/// Prints bias and linearity of a station against reference units.
 void show_bias(const MetricKind& kind, const StationRecordsOptions& options) {
   const auto references = references_of(options.references);
   const auto known = known_runs(options);
@@ -246,7 +246,7 @@ void list_runs(const StationRecordsOptions& options) {
     fmt::print("{} of them with a hook that has not ended well: 'vlp-station hook' runs it again\n",
                without);
   }
-  known->records();  // these are not all there are when the records are away
+  known->records();  // throws if the records are unavailable, because the list is incomplete
 }
 
 void show_run(const StationRecordsOptions& options) {

@@ -9,57 +9,61 @@
 
 namespace vlp {
 
-/// Where records are, and which.
+/// Options of the commands on records.
 struct StationRecordsOptions {
-  /// station.yaml, or a database: one of the two.
+  /// File station.yaml, or a database; exactly one is not empty.
   std::string station, records;
   RunFilter filter;
   std::string run, figure, output;
-  /// Of void: who, and why.
+  /// void: name of the operator, and the reason.
   std::string operator_name, reason;
-  /// Of verify-records: the last digest of an earlier one; may be empty.
+  /// verify-records: last digest of an earlier check; may be empty.
   std::string noted;
-  /// Of import: results of reprocessing.
+  /// import: results of reprocessing.
   std::string archive;
-  /// Of clean: delete, instead of telling what would be.
+  /// clean: deletes expired folders; otherwise only lists them.
   bool remove = false;
-  /// Of a control chart.
+  /// trend: rules of the control chart.
   std::vector<std::string> rules{"western-electric"};
-  /// Of a study: its units; those with two runs or more when there is none.
+  /// study: ids of the units; empty: all units with at least two runs.
   std::vector<std::string> units;
-  /// Or its reference units, as UNIT=VALUE.
+  /// study: reference units as UNIT=VALUE, for bias and linearity.
   std::vector<std::string> references;
 };
 
-/// vlp-station list: a line for each run.
+/// Prints a line for each run (vlp-station list).
 void list_runs(const StationRecordsOptions& options);
-/// vlp-station show: all of one run, the last of a camera unless it is named.
+/// Prints all data of a run: the named one, or the last that the filter accepts (vlp-station show).
 void show_run(const StationRecordsOptions& options);
-/// vlp-station restore: the files of a run, written from its record where they are missing.
+/// Writes the missing files of a run from its record (vlp-station restore). Replaces the report and
+/// keeps the old one as replaced-report.html.
 void restore_run(const StationRecordsOptions& options);
-/// vlp-station certificate: a page for who gets the unit, beside the files of its run.
+/// Writes a certificate for the recipient of the unit next to the files of its run (vlp-station
+/// certificate).
 void write_certificate(const StationRecordsOptions& options);
-/// vlp-station clean: what of the station's runs is kept no longer, deleted when that is asked for,
-/// which the runs' events tell. Records stay.
+/// Lists the folders of runs whose retention time has expired, or deletes them and adds an event to
+/// each run (vlp-station clean). Records are kept.
 void clean_up(const StationRecordsOptions& options);
-/// vlp-station void: a run counts no more, in no yield, trend or study, which its events tell.
+/// Voids a run (vlp-station void): yield, trends and studies ignore it. Adds an event to the run.
 void void_run(const StationRecordsOptions& options);
-/// vlp-station verify-records: whether all records are as they were kept, by their trail. Throws
-/// GateNotMet when they are not.
+/// Verifies by the audit trail that all records are unchanged (vlp-station verify-records). Throws
+/// GateNotMet if one was changed.
 void verify_records(const StationRecordsOptions& options);
-/// vlp-station export: CSV, a line for each run, or JSON with all there is.
+/// Exports runs as CSV, a line per run, or as JSON with all data (vlp-station export).
 void export_runs(const StationRecordsOptions& options);
-/// vlp-station import: the sessions of an archive, as reprocessing left them, as runs of a station
-/// that has the results' name. Those that are there already stay.
+/// Imports the reprocessed sessions of an archive as runs of a station with the name of the results
+/// (vlp-station import). Existing runs are kept unchanged.
 void import_archive(const StationRecordsOptions& options);
-/// vlp-station trend: a figure over the runs, with a control chart's limits and rules, also as a
-/// picture; of units of the station that passed, unless the filter says otherwise. Throws
-/// GateNotMet for an alarm.
+/// Prints a metric over the runs, with limits and alarms of a control chart, and optionally draws a
+/// plot (vlp-station trend). Default of the filter: units of the station that passed. Throws
+/// GateNotMet if there is an alarm.
 void show_trend(const StationRecordsOptions& options);
-/// vlp-station capability: how the figures that have gates scatter, compared with them.
+/// Prints the capability indices Cpk and Ppk of the metrics that have gates (vlp-station
+/// capability).
 void show_capability(const StationRecordsOptions& options);
-/// vlp-station study: what measuring adds to a figure, of units that were measured several times on
-/// each of the stations; of reference units, bias and linearity.
+/// Prints a gauge study of a metric (vlp-station study): contribution of the measurement to its
+/// variation, from units measured several times on each station, or bias and linearity, from
+/// reference units.
 void show_study(const StationRecordsOptions& options);
 
 }  // namespace vlp

@@ -31,7 +31,7 @@ namespace fs = std::filesystem;
 
 const ProgramVersion kProgram{"vlp-station", VLP_VERSION};
 
-/// A verdict is a verdict without it.
+/// Updates the state of the golden unit. Reports errors only: the verdict is valid without it.
 void note(const StationConfig& config, const RunRecord& record) {
   try {
     note_for_golden(config, record);
@@ -40,7 +40,7 @@ void note(const StationConfig& config, const RunRecord& record) {
   }
 }
 
-/// Returns Spool::notice(); its details go to the log.
+/// Returns Spool::notice() and logs its details.
 std::string spool_notice(Spool& spool) {
   std::string notice = spool.notice();
   if (const std::string state = spool.state(); state != notice) {
@@ -49,19 +49,19 @@ std::string spool_notice(Spool& spool) {
   return notice;
 }
 
-/// Keeps the run, says the verdict, writes its files; then the records, which may be away, and the
-/// hook.
+/// Stores the run in the spool, prints the verdict, writes the files, delivers to the records,
+/// which may be unavailable, and calls the hook.
 void conclude(RunRecord measured, const std::vector<ReportPicture>& pictures, Spool& spool,
               const StationConfig& config, Terminal& terminal,
               const std::function<void()>& mark_kept, const std::function<void()>& put_away) {
-  RunRecord record = printable_run(std::move(measured));  // as the records will have it
+  RunRecord record = printable_run(std::move(measured));  // in the form of the records
   auto lines = verdict_screen(record);
   std::optional<HookLock> lock;
   if (config.hook) {
     lock.emplace(spool.folder(), record.run);
     record.events.push_back(hook_wanted(*config.hook, record.operator_name));
   }
-  // Killed in between, the golden unit is due rather too early than too late.
+  // After a kill in between, the golden unit is due too early, not too late.
   const bool golden_passed = record.kind == "golden" && record.passed();
   if (!golden_passed) note(config, record);
   try {
@@ -97,7 +97,7 @@ void conclude(RunRecord measured, const std::vector<ReportPicture>& pictures, Sp
       fmt::format("{}; the verdict {} is recorded: {}", undone, record.verdict, mend));
 }
 
-/// What can be known before the first image.
+/// Checks the conditions that are known before the first image.
 void prepare(Spool& spool, const StationConfig& config, const std::string& camera) {
   check_results(config.results, camera);
   spool.prepare();
@@ -114,7 +114,7 @@ void prepare(Unit& unit, Spool& spool, const StationConfig& config) {
   unit.distrust(golden_problem(config));
 }
 
-/// Throws GateNotMet or Undetermined, by the verdict.
+/// Throws GateNotMet if the run failed, Undetermined if it is invalid.
 void throw_unless_passed(const RunRecord& record, const std::string& failed) {
   if (record.passed()) return;
   if (!record.invalid()) throw GateNotMet(failed + ": " + record.first_cause());
@@ -135,8 +135,8 @@ void add_folders(Unit& unit, const fs::path& folder) {
   if (!any) throw InputError(folder, "has none of the folders boards, rotation, dispersion, check");
 }
 
-/// The record of a unit that ends now. A golden unit that failed meanwhile spoils it; one that only
-/// became due does not.
+/// Makes the record of a unit that ends now. The run is invalid if the golden unit failed in the
+/// meantime, but not if it only became due.
 RunRecord record_now(Unit& unit, const std::string& run, const StationRunOptions& options,
                      Spool& spool) {
   if (unit.distrusted().empty()) {
@@ -149,8 +149,7 @@ RunRecord record_now(Unit& unit, const std::string& run, const StationRunOptions
   RunRecord record = make_unit_record(unit, run, kProgram);
   record.operator_name = options.operator_name;
   record.shift = options.shift;
-  if (record.invalid())
-    return record;  // the images of a unit that was not judged may be used again
+  if (record.invalid()) return record;  // images of an invalid run may be used again
   const auto earlier = spool.repeated_run_of(record);
   if (earlier && !earlier->empty()) {
     reject_repetition(record, *earlier, options.station);

@@ -8,32 +8,34 @@
 
 namespace vlp {
 
-/// Where a unit, a shift or the golden unit is measured, by whom, and from which images.
+/// Options for measuring a unit, a shift of units, or the golden unit.
 struct StationRunOptions {
-  /// Without a camera it is a shift: unit after unit.
+  /// File station.yaml, and id of the unit's camera. An empty id: a shift of several units.
   std::string station, camera_id;
-  /// Who measures, and in which shift; asked for at the beginning of a shift where it is not said.
+  /// Name of the operator, and of the work shift; requested at the beginning of a shift if empty.
   std::string operator_name, shift;
-  /// A folder whose steps are full; empty: the folder of the station is watched.
+  /// Folder with the images of all steps; empty: the folder of the station is watched.
   std::string batch;
-  /// A camera or video for a step, "boards=/dev/video0"; without a step for those that have none.
+  /// Camera or video for a step, "boards=/dev/video0"; without "STEP=": for all steps without one.
   std::vector<std::string> sources;
-  /// Give the verdict when no image came for so long, of a source none that could be used.
+  /// Time without a new image after which the verdict is given, s. Unused frames of a source are
+  /// ignored.
   std::optional<double> idle_s;
   int threads = 1;
 };
 
-/// vlp-station run with a camera: a unit to its verdict. Throws GateNotMet when it fails,
-/// Undetermined when the run is invalid.
+/// Measures a unit up to its verdict (vlp-station run with a camera). Throws GateNotMet if the unit
+/// fails, Undetermined if the run is invalid.
 void run_unit(const StationRunOptions& options);
 
-/// vlp-station verify: the golden unit, from the folder `batch` or from where its images arrive.
-/// Throws GateNotMet when the station has moved, Undetermined when that is not known.
+/// Measures the golden unit, from the folder `batch` or the folder where its images arrive
+/// (vlp-station verify). Throws GateNotMet if the station has moved, Undetermined if the run is
+/// invalid.
 void run_verify(const StationRunOptions& options);
 
-/// vlp-station hook: the hook again for the station's runs whose hook failed or was not run to its
-/// end, of the records, when they answer, and of those that wait. Throws std::runtime_error when it
-/// fails again.
+/// Runs the hook again for the runs of the station whose hook failed or did not finish (vlp-station
+/// hook). Uses the records, if available, and the runs in the spool. Throws std::runtime_error if
+/// the hook fails again.
 void run_hooks(const StationRunOptions& options);
 
 }  // namespace vlp

@@ -29,14 +29,15 @@ namespace {
 
 constexpr const char* kQuit = "q";
 
-/// A word as records keep it.
+/// Reads a line in the form in which records store it; std::nullopt at the end of the input.
 std::optional<std::string> asked(const std::string& label, Terminal& terminal) {
   constexpr std::size_t longest = 64;
   const auto line = terminal.line({{label}});
   return line ? std::optional(printable(first_characters(*line, longest))) : std::nullopt;
 }
 
-/// Asks who measures, and in which shift, where it is empty. Whether somebody said who.
+/// Reads the names of operator and shift if they are empty. Returns false if the input ended or the
+/// operator quit.
 bool begin_shift(std::string& operator_name, std::string& shift, Terminal& terminal) {
   while (operator_name.empty()) {
     const auto name = asked("Operator ", terminal);
@@ -49,8 +50,8 @@ bool begin_shift(std::string& operator_name, std::string& shift, Terminal& termi
   return name.has_value() && shift != kQuit;
 }
 
-/// The next unit's id, or the golden unit's, as a scanner types it, one that the station takes;
-/// nothing for `q` and at the end of the input.
+/// Reads the id of the next unit, or of the golden unit, until it is one that the station accepts.
+/// Returns std::nullopt for `q` and at the end of the input.
 std::optional<std::string> next_serial(const StationConfig& config, Terminal& terminal) {
   const std::string golden = golden_problem(config);
   std::string problem;
@@ -66,12 +67,12 @@ std::optional<std::string> next_serial(const StationConfig& config, Terminal& te
     const bool is_golden = config.golden && *line == config.golden->camera_id;
     problem = is_golden ? "" : serial_problem(config, *line);
     if (problem.empty()) return line;
-    // Where there is no screen.
+    // Without a screen, the prompt does not print the problem.
     if (!terminal.interactive()) spdlog::error("{}", problem);
   }
 }
 
-/// The options of a unit's own process.
+/// Returns the command line of the process for a unit.
 std::vector<std::string> command_of(const StationRunOptions& options, bool golden) {
   std::vector<std::string> command{
       "vlp-station", golden ? "verify" : "run", "--station=" + options.station,
@@ -86,14 +87,15 @@ std::vector<std::string> command_of(const StationRunOptions& options, bool golde
   return command;
 }
 
-/// How this program ends with these arguments; an error is told.
+/// Runs this program with these arguments in a new process and returns its exit code. Reports an
+/// error and returns kBadInput if the process crashes.
 int exit_code_of(const std::vector<std::string>& command) {
   std::vector<char*> arguments;
   arguments.reserve(command.size() + 1);
   for (const std::string& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
   arguments.push_back(nullptr);
   pid_t process = 0;
-  std::signal(SIGCHLD, SIG_DFL);  // who inherited that it is ignored never hears how it ended
+  std::signal(SIGCHLD, SIG_DFL);  // if inherited as ignored, waitpid() returns no status
   if (const int error =
           ::posix_spawn(&process, "/proc/self/exe", nullptr, nullptr, arguments.data(), environ)) {
     throw std::runtime_error("the unit's process cannot be started: " +
@@ -122,13 +124,13 @@ int exit_code_of(const std::vector<std::string>& command) {
 void run_shift(StationRunOptions options) {
   StationConfig config = read_station(options.station);
   Terminal terminal;
-  std::map<int, int> ends;  // by exit code
+  std::map<int, int> ends;  // number of units by exit code
   int units = 0;
   const bool begun = begin_shift(options.operator_name, options.shift, terminal);
   while (begun) {
     try {
-      config = read_station(options.station);  // as each unit does
-    } catch (const InputError&) {              // the unit tells why
+      config = read_station(options.station);  // as the process of each unit does
+    } catch (const InputError&) {              // the process of the unit reports the error
     }
     const auto serial = next_serial(config, terminal);
     if (!serial) break;

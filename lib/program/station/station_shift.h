@@ -6,10 +6,12 @@
 
 namespace vlp {
 
-/// vlp-station run without a camera: units whose ids are scanned or typed, a line each, until `q`
-/// or the end of the input; the golden unit's id verifies the station. Each is run by this program
-/// in a process of its own, with the same terminal: what libraries keep of a unit (mrcal 2.2 about
-/// 3 MB) goes with it, and nothing that becomes of one unit ends the shift.
+/// Measures units whose ids are scanned or typed, a line each, until `q` or the end of the input
+/// (vlp-station run without a camera). The id of the golden unit verifies the station.
+///
+/// Each unit runs in a separate process of this program on the same terminal. Memory that libraries
+/// leak per unit (mrcal 2.2: about 3 MB) is released with the process, and a crash does not end the
+/// shift.
 void run_shift(StationRunOptions options);
 
 }  // namespace vlp

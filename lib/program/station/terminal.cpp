@@ -25,12 +25,13 @@ namespace {
 
 std::atomic<bool> stop_asked = false;
 
-/// Settings of the terminal before a Terminal and while it reads keys, for handlers of signals.
+/// Settings of the terminal before construction of a Terminal and while it reads keys, for signal
+/// handlers.
 termios modes_before{}, modes_of_keys{};
 std::atomic<bool> resumed = false;
 
-/// Puts the terminal's settings back and lets the signal end or stop the process as it does by
-/// default. A process that goes on afterwards reads keys again.
+/// Restores the settings of the terminal and raises the signal with its default action. A process
+/// that continues afterwards reads keys again.
 void put_back_and_raise(int signal) {
   const int error_before = errno;
   ::tcsetattr(STDIN_FILENO, TCSANOW, &modes_before);
@@ -39,7 +40,7 @@ void put_back_and_raise(int signal) {
   sigemptyset(&signals);
   sigaddset(&signals, signal);
   ::raise(signal);
-  ::pthread_sigmask(SIG_UNBLOCK, &signals, &blocked);  // it takes effect here
+  ::pthread_sigmask(SIG_UNBLOCK, &signals, &blocked);  // the signal takes effect here
   ::pthread_sigmask(SIG_SETMASK, &blocked, nullptr);
   std::signal(signal, put_back_and_raise);
   ::tcsetattr(STDIN_FILENO, TCSANOW, &modes_of_keys);
@@ -111,8 +112,8 @@ bool Terminal::resized() const {
   return interactive_ && drawn_ > 0 && (size() != size_ || resumed);
 }
 
-/// Puts the text in the place of what was drawn. After a change of size, or a stop, the place is
-/// unknown: all is cleared.
+/// Replaces the drawn text. Clears the screen after a change of size or a stop, because the
+/// position of the drawn text is unknown then.
 void Terminal::show(const std::string& text, std::size_t lines) {
   const Size now = size();
   const bool moved = drawn_ > 0 && (resumed.exchange(false) || now != size_);
@@ -133,7 +134,7 @@ void Terminal::draw(const std::vector<ScreenLine>& lines) {
   const std::size_t shown = std::min(lines.size(), rows - 1);
   std::string text;
   for (std::size_t i = 0; i < shown; ++i) {
-    // The last line, with the keys, stays.
+    // The last line lists the keys and is always drawn.
     const auto& [line, tone] = i + 1 == shown ? lines.back() : lines[i];
     text += toned(first_characters(printable_line(line), columns), tone) + "\x1b[K\n";
   }
@@ -147,7 +148,7 @@ void Terminal::print(const std::vector<ScreenLine>& lines) {
   }
   if (!interactive_) {
     fmt::print("{}", text);
-    std::fflush(stdout);  // what comes next may take its time
+    std::fflush(stdout);  // the next output may be delayed
     return;
   }
   show(text, lines.size());
@@ -204,7 +205,7 @@ std::optional<std::string> Terminal::line(std::vector<ScreenLine> prompt) {
       typed += key;
     }
   }
-  if (interactive_) print(prompt);  // to stay
+  if (interactive_) print(prompt);  // keeps the line on the screen
   typed = first_characters(typed, longest);
   const auto first = typed.find_first_not_of(' ');
   return first == std::string::npos ? ""

@@ -12,34 +12,37 @@
 
 namespace vlp {
 
-/// What the operator sees: at a terminal one screen that is redrawn in place, in colour unless
-/// NO_COLOR is set; elsewhere nothing but the end.
+/// Display for the operator: on a terminal one screen that is redrawn in place, in color unless
+/// NO_COLOR is set. Without a terminal, only print() writes.
 class Terminal {
  public:
-  /// Keys are read one by one while it lives, when stdin is a terminal, too.
+  /// Switches a terminal on stdin to reading single keys until destruction.
   Terminal();
   ~Terminal();
   Terminal(const Terminal&) = delete;
   Terminal& operator=(const Terminal&) = delete;
 
   bool interactive() const { return interactive_; }
-  /// Redraws in place; only at a terminal, and only when something changed. What has no room at
-  /// the terminal's size is left out.
+  /// Redraws the screen in place if the lines have changed; only on a terminal. Crops lines to the
+  /// size of the terminal, but keeps the last one.
   void draw(const std::vector<ScreenLine>& lines);
-  /// Prints in place of what was drawn, to stay.
+  /// Replaces the drawn screen by lines that stay.
   void print(const std::vector<ScreenLine>& lines);
-  /// Returns true if the terminal has another size than when it was drawn, or if the process was
-  /// stopped (Ctrl-Z) since then.
+  /// Returns true if the size of the terminal has changed since the last draw(), or if the process
+  /// was stopped (Ctrl-Z) since then.
   bool resized() const;
-  /// The key that was pressed, if one was, waiting so long at most. Several that come together are
-  /// a scanner's, and none; but one key many times is an impatient operator's.
+  /// Returns the key pressed within `wait_ms`; std::nullopt if there is none. Several different
+  /// keys in quick succession come from a scanner and are ignored; repetitions of one key count as
+  /// one.
   std::optional<char> key(int wait_ms) const;
-  /// Takes what was typed before now, at a terminal, up to a scanner's pause.
+  /// Discards the keys typed so far on a terminal, up to a pause longer than a scanner's.
   void forget_keys() const;
-  /// The line that is typed, or comes from a scanner or a file: asked for by `prompt`, whose last
-  /// line it follows; by that line alone, on stderr, when stdout is no terminal but stdin is. 200
-  /// bytes at most, in whole characters of UTF-8. Nothing at the end of the input, and when SIGINT
-  /// or SIGTERM came.
+  /// Reads a line from the keyboard, a scanner or a file, without surrounding blanks. Longer lines
+  /// are cut to 200 bytes, in whole UTF-8 characters.
+  ///
+  /// @param prompt  lines to draw; the input follows the last one. Only the last one is printed, to
+  ///                stderr, if stdin is a terminal and stdout is not.
+  /// @return        std::nullopt at the end of the input and after SIGINT or SIGTERM
   std::optional<std::string> line(std::vector<ScreenLine> prompt);
 
  private:
@@ -59,7 +62,8 @@ class Terminal {
   std::unique_ptr<Saved> saved_;
 };
 
-/// Whether SIGINT or SIGTERM came while a Terminal was there: work is on the disk, end it.
+/// Returns true if SIGINT or SIGTERM arrived while a Terminal existed. The program should end; its
+/// work is on disk.
 bool interrupted();
 
 }  // namespace vlp

@@ -118,7 +118,7 @@ void add_detect_options(CLI::App& app, CaptureOptions& options) {
 }
 
 std::optional<KnownMotion> MotionOptions::motion() const {
-  constexpr double fastest_deg_per_s = 180;  // that robots turn
+  constexpr double fastest_deg_per_s = 180;  // maximum yaw rate of robots
   if (!max_speed_m_per_s) return std::nullopt;
   return KnownMotion::up_to(*max_speed_m_per_s,
                             rad_from_deg(max_yaw_rate_deg_per_s.value_or(fastest_deg_per_s)));

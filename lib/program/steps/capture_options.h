@@ -14,23 +14,23 @@
 
 namespace vlp {
 
-/// Returns the defaults of a program: all cores.
+/// Returns the default options of a program, with one thread per core.
 FrontendOptions default_frontend();
 
-/// Captures of lamps as the command line names them. Names of files are for messages, too.
+/// Captures of lamps as given on the command line. File names are also used in messages.
 struct CaptureOptions {
-  /// A folder of images, a video, or a detections.csv.
+  /// Folder of images, video, or detections.csv.
   std::string images;
   std::string lamps, calibration, output;
   /// File for lights.csv; empty: none.
   std::string lights;
   FrontendOptions frontend = default_frontend();
-  /// As in LampImages.
+  /// Table of the captures, and yaw of the camera on the robot (LampImages).
   std::optional<CapturesTable> captures;
   double yaw_in_robot_rad = 0;
 };
 
-/// What --help says of the options that every program has which takes captures of lamps.
+/// Texts in --help for the options of all programs that take captures of lamps.
 struct CaptureTexts {
   const char* images;
   const char* calibration;
@@ -43,16 +43,16 @@ void add_capture_options(CLI::App& app, CaptureOptions& options, const CaptureTe
 /// Adds --readout rows|columns.
 void add_readout_option(CLI::App& app, std::optional<Readout>& readout);
 
-/// The lens model that --lens has for the one that the views call for.
+/// Value of --lens for the model selected by cross-validation.
 inline constexpr const char* kChosenLens = "auto";
 
-/// Adds --lens MODEL|auto, of those programs that find a lens.
+/// Adds --lens MODEL|auto, for programs that estimate a lens.
 void add_lens_option(CLI::App& app, std::string& lens);
 
-/// Adds --every, of those programs that take videos.
+/// Adds --every, for programs that take videos.
 void add_every_option(CLI::App& app, int& every);
 
-/// Throws std::invalid_argument when `every` is asked of files among which there is no video.
+/// Throws std::invalid_argument if `every` is not 1 and none of the files is a video.
 void check_every(int every, const std::vector<std::string>& files);
 
 /// Adds --room.
@@ -71,22 +71,22 @@ void add_board_limit_options(CLI::App& app, FrontendOptions& options);
 /// Adds --room, --classifier, --annotate, --readout, --exposure-s, --max-mpx and --threads.
 void add_detect_options(CLI::App& app, CaptureOptions& options);
 
-/// How cameras move while their images are read.
+/// Options of the motion of a camera during readout.
 struct MotionOptions {
   std::optional<double> max_speed_m_per_s, max_yaw_rate_deg_per_s;
 
-  /// Nothing: they stand.
+  /// Returns the prior of the motion; std::nullopt if the camera stands.
   std::optional<KnownMotion> motion() const;
 };
 
-/// Adds --max-speed-m-per-s, with this help, and --max-yaw-rate-deg-per-s.
+/// Adds --max-speed-m-per-s, with the text `help`, and --max-yaw-rate-deg-per-s.
 void add_motion_options(CLI::App& app, MotionOptions& options, const char* help);
 
-/// Adds --yaw-rate-sd-deg-per-s, of captures.csv.
+/// Adds --yaw-rate-sd-deg-per-s, the standard deviation of yaw rates in captures.csv.
 void add_yaw_rate_sd_option(CLI::App& app, std::optional<double>& yaw_rate_sd_deg_per_s);
 
-/// What the result depends on: captures, lamp map, calibration, classifier; an empty name is an
-/// input that was not given.
+/// Returns the inputs of the result: captures, lamp map, calibration, classifier; an empty name is
+/// an input that was not given.
 std::vector<std::string> inputs_of(const CaptureOptions& options);
 
 /// Returns the images with lamp map and calibration for observe_lamps().
@@ -99,9 +99,9 @@ void check_image_outputs(const CaptureOptions& options);
 /// Prints each light if --verbose is given.
 void print_lights(const Observations& seen);
 
-/// Detects the lamps in a folder of images or a video, with progress, and prints the remarks, a
-/// contradiction between the lamps and the stated row time included. Throws as observe_lamps(), and
-/// if no lamp is identified.
+/// Detects the lamps in a folder of images or a video, with a progress display, and prints the
+/// remarks, including a contradiction between the lamps and the given row time. Throws as
+/// observe_lamps() does, and if no lamp is identified.
 Observations observe_captures(const CaptureOptions& options, ImageUse use, const LampMap& lamps,
                               const std::optional<Calibration>& calibration);
 
@@ -110,8 +110,8 @@ Observations observe_captures(const CaptureOptions& options, ImageUse use, const
 /// options for images are given with a table.
 LampCaptures read_captures_of(const CaptureOptions& options, ImageUse use);
 
-/// Reads the captures of a detections.csv. Throws std::invalid_argument for a video, and for
-/// options that are for images.
+/// Reads the captures of a detections.csv. Throws std::invalid_argument for a video, and if options
+/// for images are given.
 std::vector<Frame> read_detections_of(const CaptureOptions& options);
 
 }  // namespace vlp

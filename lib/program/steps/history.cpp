@@ -17,7 +17,7 @@ bool changes_the_result(const CLI::Option& option) {
   return std::find(others.begin(), others.end(), option.get_name()) == others.end();
 }
 
-/// Its value is the name of a file that is written.
+/// Returns true if the value of the option is the name of an output file.
 bool names_output(const CLI::Option& option) { return option.get_name() == "--refine-map"; }
 
 std::string options_of(const CLI::App& app, const std::vector<std::string>& inputs) {

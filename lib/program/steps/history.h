@@ -15,15 +15,19 @@ class App;
 
 namespace vlp {
 
-/// The options that do not change what is recorded: --output, other outputs, a cache, what is
-/// shown.
+/// Returns the options that do not affect the recorded result: --output, other outputs, a cache,
+/// and options of the display.
 std::span<const std::string_view> options_without_history();
 
-/// How a part came to be, but for the part's name (rig/stage.h): program and version, the options
-/// that were given, in the order of --help, and a digest of each input, a file or a folder of
-/// images; an empty name is an input that was not given. The same on every machine: of files and
-/// folders only the last name is kept, and options_without_history() are left out. Call it
-/// after parsing. Throws InputError.
+/// Makes the history entry of a part of a calibration, without the name of the part (rig/stage.h).
+/// Holds program and version, the given options in the order of --help, and a digest of each input.
+///
+/// The entry is the same on every machine: paths are reduced to their last component, and
+/// options_without_history() are omitted.
+///
+/// @param inputs  files and folders of images; an empty name is an input that was not given
+/// @throws InputError if an input cannot be read
+/// @pre `app` has parsed the command line
 HistoryEntry history_entry(const CLI::App& app, const std::vector<std::string>& inputs);
 
 }  // namespace vlp

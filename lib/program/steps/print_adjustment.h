@@ -7,9 +7,10 @@
 
 namespace vlp {
 
-/// What captures that were solved together say, on stdout: tilt, lever arm, lens, known places,
-/// lamps. `before` is the calibration that the search started from; `lens_stated` whether a
-/// covariance of its lens is known.
+/// Prints the result of a joint adjustment to stdout: tilt, lever arm, lens, known places, lamps.
+///
+/// @param before       initial calibration of the adjustment
+/// @param lens_stated  true if the covariance of its lens is known
 void print_adjustment(const AdjustmentResult& found, const Calibration& before, bool lens_stated);
 
 }  // namespace vlp

@@ -9,9 +9,10 @@
 
 namespace vlp {
 
-/// Prints the circles of the fixes before and after, and the errors of camera and world, on stdout.
+/// Prints the circles of the fixes before and after the correction, and the errors of camera and
+/// world, to stdout.
 ///
-/// @param focal_px  of the camera
+/// @param focal_px  focal lengths of the camera
 /// @param captures  number of captures at known places
 void print_dispersion(const DispersionFit& fit, const Eigen::Vector2d& focal_px,
                       std::size_t captures);

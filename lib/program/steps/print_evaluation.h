@@ -9,7 +9,7 @@
 
 namespace vlp {
 
-/// To stdout, for people: millimetres and degrees.
+/// Prints an evaluation and its gates to stdout, human-readable, in millimeters and degrees.
 void print_evaluation(const Evaluation& evaluation, const std::vector<CheckedMetric>& gates);
 
 }  // namespace vlp

@@ -6,7 +6,8 @@
 
 namespace vlp {
 
-/// How many frames have a fix, why others have none, and how good the fixes are, on stdout.
+/// Prints the number of frames with a fix, the reasons why others have none, and the quality of the
+/// fixes to stdout.
 void print_fixes(const FixSummary& summary);
 
 }  // namespace vlp

@@ -6,7 +6,7 @@
 
 namespace vlp {
 
-/// What was solved and how far it can be trusted, on stdout.
+/// Prints the solved lens and its uncertainty to stdout.
 void print_summary(const IntrinsicsSolution& solution, const CalibrationReport& report,
                    const ViewCoverage& coverage, const HeldOut& held_out);
 

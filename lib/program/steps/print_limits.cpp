@@ -13,7 +13,7 @@
 namespace vlp {
 namespace {
 
-/// What makes a source smaller.
+/// Returns the remedy that reduces an error source.
 std::string_view remedy_of(std::string_view key) {
   if (key == "motion") return "odometry, or a faster read-out";
   if (key == "lean") return "an inclination sensor, or a camera that is held level";

@@ -7,11 +7,12 @@
 
 namespace vlp {
 
-/// The error budget of a floor, on stdout: for each source the median and the worst place.
-/// `is_free` is a camera that may move or lean, which not every place with two lamps determines.
+/// Prints the error budget of a floor to stdout: the median over the floor and the worst place of
+/// each source. `is_free`: the camera may move or tilt, which two lamps do not determine
+/// everywhere.
 void print_limits(const FloorSummary& summary, const FloorLimits& limits, bool is_free);
 
-/// What to improve first, and how.
+/// Prints the largest error source and its remedy to stdout.
 void print_advice(const FloorSummary& summary);
 
 }  // namespace vlp

@@ -13,14 +13,14 @@
 namespace vlp {
 namespace {
 
-/// ", sd X Y UNIT" of a covariance, times a factor.
+/// Returns ", sd X Y UNIT" for a covariance, with standard deviations multiplied by a factor.
 std::string sd_of(const std::optional<Matrix2>& covariance, double factor, const char* unit) {
   if (!covariance) return ", sd not known";
   const Eigen::Vector2d sd = factor * covariance->diagonal().cwiseSqrt();
   return fmt::format(", sd {:.4f} {:.4f} {}", sd.x(), sd.y(), unit);
 }
 
-/// A height in metres, without a sign where it rounds to zero.
+/// Formats a height in meters, without a sign if it rounds to zero.
 std::string metres(double z_m) {
   const std::string text = fmt::format("{:.3f}", z_m);
   return text == "-0.000" ? "0.000" : text;

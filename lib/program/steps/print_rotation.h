@@ -7,10 +7,11 @@
 
 namespace vlp {
 
-/// Centre, zenith and tilt on stdout, with what they are worth.
+/// Prints center, zenith and tilt with their standard deviations to stdout.
 void print_center(const RotationCenter& center, const Camera& camera);
 
-/// What a turn on the spot shows, on stdout, and a warning of a lever arm that it does not show.
+/// Prints the result of a rotation in place to stdout, and a note if the lever arm is not
+/// observable.
 void print_summary(const RotationFit& fit, const SpotCaptures& spot, const CircleCenters& circles,
                    const Camera& camera);
 

@@ -11,11 +11,11 @@
 
 namespace vlp {
 
-/// Tells of each step of a session as it ends: a line on stdout, and what it has to say on stderr;
-/// meanwhile how far it is.
+/// Log of the steps of a session: a line on stdout and the remarks on stderr when a step ends, and
+/// a progress display while it runs.
 class SessionLog {
  public:
-  /// For one run; the log has to live as long.
+  /// Returns the callbacks for one run. The log must outlive the run.
   SessionObserver observer();
 
  private:
@@ -27,8 +27,7 @@ class SessionLog {
   std::unique_ptr<Progress> progress_;
 };
 
-/// The figures of a session that people ask for first, its gates that are not met, and the verdict,
-/// on stdout.
+/// Prints the main metrics of a session, its failed gates and the verdict to stdout.
 void print_session(const SessionResult& result, const std::string& results);
 
 }  // namespace vlp

@@ -8,10 +8,10 @@
 
 namespace vlp {
 
-/// What a classifier was trained on, and how it answers, on stdout.
+/// Prints the training data of a classifier and its cross-validated answers to stdout.
 void print_training(const TrainStepResult& result);
 
-/// The row time that was found, and what it rests on, on stdout.
+/// Prints the estimated row time and its data to stdout.
 void print_row_time(const RowTime& row_time, Readout readout);
 
 }  // namespace vlp

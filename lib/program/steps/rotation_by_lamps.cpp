@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Empty where there is none.
+/// Returns the file captures.csv of the captures; empty if there is none.
 fs::path captures_file(const CaptureOptions& images, const LevelOptions& options) {
   if (!options.captures.empty()) return options.captures;
   const fs::path beside = fs::path(images.images) / "captures.csv";
@@ -57,13 +57,13 @@ void rotate_by_lamps(const CLI::App& app, CaptureOptions images, const LevelOpti
   std::vector<std::string> inputs = inputs_of(images);
   inputs.push_back(captures.string());
   check_outputs({{"--output", images.output}, {"--refine-map", refined_map}}, inputs);
-  images.captures.emplace();  // level is what is found
+  images.captures.emplace();  // inclinations are ignored: the level direction is estimated
   LampCaptures input = read_captures_of(images, ImageUse::fixes);
   check_lamps(input.frames, input.lamps, input.lamps_file);
   input.motions =
       motions_of(input.frames, captures.empty() ? CapturesTable() : read_captures(captures),
                  options.motion.motion(), rad_from_deg(options.yaw_rate_sd_deg_per_s.value_or(0)));
-  // A table that tells of no motion is no part of the result.
+  // A table without motion does not affect the result and is not recorded.
   if (input.motions.empty()) inputs.pop_back();
   const LevellingResult result =
       solve_levelling(input, !refined_map.empty(), history_entry(app, inputs));

@@ -9,18 +9,18 @@
 
 namespace vlp {
 
-/// What --method lamps takes besides captures.
+/// Options of --method lamps besides the captures.
 struct LevelOptions {
-  /// Empty when the lamp map stays.
+  /// File for the refined lamp map; empty: the map is not refined.
   std::string refined_map;
-  /// captures.csv; empty: that of the folder, if it is there.
+  /// File captures.csv; empty: the one in the folder, if it exists.
   std::string captures;
   MotionOptions motion;
   std::optional<double> yaw_rate_sd_deg_per_s;
 };
 
-/// vlp-rotation --method lamps: levels the camera from captures taken anywhere
-/// (calibration/levelling.h).
+/// Estimates the tilt of the camera from captures taken anywhere (calibration/levelling), for
+/// vlp-rotation --method lamps.
 void rotate_by_lamps(const CLI::App& app, CaptureOptions images, const LevelOptions& options);
 
 }  // namespace vlp

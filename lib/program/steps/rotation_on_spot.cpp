@@ -24,7 +24,7 @@ void rotate_on_spot(const CLI::App& app, CaptureOptions images, const std::strin
                     const std::string& plot) {
   const std::vector<std::string> inputs = inputs_of(images);
   check_outputs({{"--output", images.output}, {"--plot", plot}}, inputs);
-  images.captures.emplace();  // the axis that is found is level
+  images.captures.emplace();  // inclinations are ignored: the axis defines the level direction
   const LampCaptures input = read_captures_of(images, ImageUse::turn);
   const RotationResult found =
       solve_rotation(input, kMethods.at(method), history_entry(app, inputs));

@@ -8,8 +8,9 @@
 
 namespace vlp {
 
-/// vlp-rotation --method axis|joint|circle: captures of a turn on the spot
-/// (calibration/rotation/spot_captures.h). `plot` is empty when there is to be no picture.
+/// Estimates the rotation center from captures of a rotation in place
+/// (calibration/rotation/spot_captures.h), for vlp-rotation --method axis|joint|circle. `plot` is
+/// the file of the plot; empty: none.
 void rotate_on_spot(const CLI::App& app, CaptureOptions images, const std::string& method,
                     const std::string& plot);
 

@@ -6,10 +6,11 @@
 
 namespace vlp {
 
-/// Says on stderr what a step has to say: images that were skipped, warnings, notes, details.
+/// Prints the remarks of a step to stderr: skipped images, warnings, notes, details.
 void tell(const StepResult& result);
 
-/// Throws Undetermined, or std::invalid_argument where a file is to blame, when the step failed.
+/// Throws if the step failed: Undetermined for StepFailure::undetermined, std::invalid_argument for
+/// all other failures.
 void require(const StepResult& result);
 
 }  // namespace vlp

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
-"""Types of the module vlp, for editors and for mypy; what each does is told by help(vlp)."""
+"""Types of the module vlp, for editors and for mypy; help(vlp) describes each of them."""
 
 import os
 from typing import Sequence, TypedDict
@@ -96,7 +96,7 @@ class Fix:
     def time_s(self) -> float | None: ...
 
 class Fixes(TypedDict):
-    """What locate_frames() gives; of stubs alone, as the tables below."""
+    """Result of locate_frames(). It exists in stubs only, as the tables below."""
 
     frame: _Integers
     status: _Integers

@@ -24,7 +24,7 @@ double sum_of(const std::vector<double>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0);
 }
 
-/// A line a column: the variances in mm^2.
+/// Returns one line per column: the variances in mm^2.
 std::string columns_of(const BudgetPlot& plot) {
   auto fixes = plot.variances_m2;
   std::stable_sort(fixes.begin(), fixes.end(),

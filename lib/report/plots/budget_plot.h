@@ -9,20 +9,21 @@
 
 namespace vlp {
 
-/// What the uncertainty of fixes comes from.
+/// Contributions to the uncertainty of fixes.
 struct BudgetPlot {
   std::string title;
-  /// From the bottom; one to five.
+  /// Names of the contributions, from the bottom; one to five.
   std::vector<std::string> parts;
-  /// Horizontal variances of each fix in m^2, one a part; in any order, one or more.
+  /// Horizontal variances of each fix, m^2, one per contribution. At least one fix, in any order.
   std::vector<std::vector<double>> variances_m2;
 
-  /// Of the sum over all fixes, what is of each part.
+  /// Returns the fraction of each contribution in the sum over all fixes.
   std::vector<double> shares() const;
 };
 
-/// A column a fix, its parts stacked, the smallest first; of more than 200 fixes 200, the largest
-/// among them. Parts that no fix has anything of are left out of the key.
+/// Plots one column per fix with its contributions stacked, the smallest total first. If there are
+/// more than 200 fixes, 200 are plotted, the largest among them. Contributions that are zero for
+/// all fixes are omitted from the key.
 Drawing drawing_of(const BudgetPlot& plot);
 
 }  // namespace vlp

@@ -15,16 +15,17 @@
 
 namespace vlp {
 
-/// Corners and residuals of a solution for boards of that lattice, and the uncertainty of its
-/// projection, with the sharpness if it was measured. Precondition: ok().
+/// Collects corners and residuals of a solution, and the uncertainty of its projection. Includes
+/// the sharpness if it was measured. `lattice` is that of the solution's boards.
+/// @pre solution.ok()
 IntrinsicsPlot plot_of(const std::string& title, const IntrinsicsSolution& solution,
                        const BoardLattice& lattice, const std::optional<LensSharpness>& sharpness);
 
-/// The lamps of a turn on the spot with their circles, and the rotation centre.
+/// Collects the lamps of a rotation in place with their circles, and the rotation center.
 RotationPlot plot_of(const std::string& title, const SpotCaptures& spot,
                      const CircleCenters& circles, const RotationFit& fit, const Camera& camera);
 
-/// The fixes at a known station, before and after.
+/// Collects the fixes at a known reference point, before and after the correction.
 DispersionPlot plot_of(const std::string& title, const DispersionFit& fit);
 
 }  // namespace vlp

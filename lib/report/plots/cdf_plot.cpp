@@ -16,7 +16,7 @@ constexpr std::size_t kMostSteps = 500;
 constexpr std::array<const char*, 4> kColors = {plot_colors::blue, plot_colors::vermillion,
                                                 plot_colors::green, plot_colors::purple};
 
-/// Error in mm and share in per cent.
+/// Returns rows of error in mm and cumulative fraction in percent.
 std::string steps_of(std::vector<double> errors_m) {
   std::sort(errors_m.begin(), errors_m.end());
   const std::size_t count = errors_m.size(), steps = std::min(count, kMostSteps);
@@ -28,7 +28,7 @@ std::string steps_of(std::vector<double> errors_m) {
   return rows;
 }
 
-/// Its steps and its two marks.
+/// Returns the data blocks of a curve: its steps and its two marks.
 std::string blocks_of(const CdfPlot::Curve& curve, const std::string& number) {
   return data_block("curve" + number, steps_of(curve.errors_m)) +
          data_block("marks" + number,

@@ -9,22 +9,23 @@
 
 namespace vlp {
 
-/// What share of errors is no larger than so much.
+/// Cumulative distribution of errors.
 struct CdfPlot {
   std::string title;
   struct Curve {
     std::string label;
-    /// In any order, one or more.
+    /// Errors in any order, at least one.
     std::vector<double> errors_m;
-    /// Median and 90th percentile, which are marked on the curve.
+    /// Median and 90th percentile, marked on the curve.
     double p50_m, p90_m;
   };
-  /// One or more.
+  /// Curves, at least one.
   std::vector<Curve> curves;
 };
 
-/// In millimetres. Of more than 500 errors a curve goes through 500, the largest among them; errors
-/// of more than four times the largest p90 are off the picture, which then says so.
+/// Plots the distributions in millimeters. A curve of more than 500 errors passes through 500 of
+/// them, the largest included. Errors above four times the largest p90 are clipped, which the axis
+/// label mentions.
 Drawing drawing_of(const CdfPlot& plot);
 
 }  // namespace vlp

@@ -13,7 +13,8 @@ std::string points(const std::string& name, const std::vector<Eigen::Vector2d>& 
   return data_block(name, rows);
 }
 
-/// With the corners of the box around, because gnuplot's ranges leave circles out.
+/// Returns a circle and the corners of its bounding box, because gnuplot's autoscaling ignores
+/// circles.
 std::string circle(const std::string& name, const Circle& circle_m) {
   const Eigen::Vector2d half(circle_m.radius, circle_m.radius);
   const std::vector<Eigen::Vector2d> corners{circle_m.center - half, circle_m.center + half};
@@ -22,7 +23,7 @@ std::string circle(const std::string& name, const Circle& circle_m) {
          points(name + "_box", corners);
 }
 
-/// Points with their circle and its centre, for the plot command.
+/// Returns the plot clauses of points with their circle and its center.
 std::string layer(const std::string& name, const std::string& color, const std::string& marker,
                   const std::string& dashes) {
   const std::string style = " linecolor rgb '" + color + "' ";
@@ -45,7 +46,7 @@ Drawing drawing_of(const DispersionPlot& plot) {
       "set xlabel 'fix minus station, x (mm)'\n"
       "set ylabel 'y (mm)'\n"
       "set size ratio -1\n"
-      // The station always, and never an empty range.
+      // Contains the reference point always, and is never empty.
       "set xrange [* < -0.01 : 0.01 < *]\n"
       "set yrange [* < -0.01 : 0.01 < *]\n"
       "set offsets graph 0.05, graph 0.05, graph 0.05, graph 0.05\n"

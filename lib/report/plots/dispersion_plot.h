@@ -11,20 +11,20 @@
 
 namespace vlp {
 
-/// Fixes about a known station, in the world: Chen and Guan, figure 6.
+/// Fixes about a known reference point, in the world: Chen and Guan, figure 6.
 struct DispersionPlot {
   std::string title;
-  /// Some fixes minus station, in metres, and the circle around them.
+  /// Errors (fix minus reference point), m, and the smallest circle around them.
   struct Fixes {
     std::vector<Eigen::Vector2d> errors_m;
     Circle circle;
   };
   Fixes before, after;
-  /// Left out: as they are before.
+  /// Rejected fixes: their errors before the correction.
   std::vector<Eigen::Vector2d> outliers_m;
 };
 
-/// Makes the plot, in millimetres, for draw().
+/// Makes the plot, in millimeters, for draw().
 Drawing drawing_of(const DispersionPlot& plot);
 
 }  // namespace vlp

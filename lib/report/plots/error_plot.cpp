@@ -25,7 +25,7 @@ std::vector<double> errors_of(const ErrorPlot& plot) {
   return errors_m;
 }
 
-/// Makes the table of the fixes that are furthest off, the worst first.
+/// Makes the table of the largest errors, in descending order.
 std::vector<std::vector<std::string>> make_table(const ErrorPlot& plot) {
   constexpr std::size_t max_rows = 10;
   constexpr int place_digits = 3, error_digits = 2;
@@ -52,7 +52,7 @@ std::vector<std::vector<std::string>> make_table(const ErrorPlot& plot) {
   return table;
 }
 
-/// Nine tenths of the errors are no larger; 0 for none.
+/// Returns the 90th percentile of the errors; 0 if there are none.
 double p90_of(std::vector<double> errors_m) {
   if (errors_m.empty()) return 0;
   const auto nth = errors_m.begin() + static_cast<std::ptrdiff_t>((errors_m.size() - 1) * 9 / 10);
@@ -60,7 +60,7 @@ double p90_of(std::vector<double> errors_m) {
   return *nth;
 }
 
-/// The plan, how much longer the arrows are, and the paper that holds them all.
+/// Width of the plan, magnification of the arrows, and the area that contains them all.
 struct Scale {
   double width_m, p90_m, times;
   Eigen::AlignedBox2d paper;
@@ -77,7 +77,7 @@ struct Scale {
   double longest_m() const { return kLongestShare * width_m / times; }
 };
 
-/// The data blocks; `scale.paper` grows by the arrows.
+/// Data blocks of the plot. The constructor extends `scale.paper` by the arrows.
 struct Blocks {
   std::string arrows, cut, places, missing, lamps;
 
@@ -106,7 +106,7 @@ struct Blocks {
   }
 };
 
-/// A bar at the lower left, in the room below the plan.
+/// Returns a scale bar at the lower left, in the space below the plan.
 std::string bar(const Scale& scale, const Eigen::Vector2d& from_m) {
   if (!(scale.p90_m > 0)) return "";
   const double length_m = round_below(1.5 * scale.p90_m);

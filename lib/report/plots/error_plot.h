@@ -11,31 +11,35 @@
 
 namespace vlp {
 
-/// Errors of fixes on the floor plan, enlarged: the figures 8 and 9 of Chen and Guan.
+/// Errors of fixes on the floor plan, enlarged: figures 8 and 9 of Chen and Guan.
 struct ErrorPlot {
   std::string title;
-  /// Of the captures with a fix, in the world.
+  /// Capture with a fix: true position and fix, in the world.
   struct Fix {
     Eigen::Vector2d truth_m, fix_m;
-    /// Name of the capture, for the table.
+    /// Image name of the capture, for the table.
     std::string image = {};
   };
   std::vector<Fix> fixes;
-  /// Where the captures without a fix were.
+  /// True positions of the captures without a fix.
   std::vector<Eigen::Vector2d> missing_m;
-  /// May be empty.
+  /// Lamps on the plan; may be empty.
   LampMap lamps;
 };
 
-/// How many times as long to draw errors of which nine tenths are no larger, on a floor so wide: a
-/// round number (1, 2 or 5 times a power of ten, 1 or more) that makes them a tenth to a 25th of
-/// the width; 1 for no errors.
+/// Returns the factor by which errors are enlarged on a floor of the width `width_m`, given their
+/// 90th percentile.
+///
+/// The factor is a round number (1, 2 or 5 times a power of ten, at least 1) that makes the 90th
+/// percentile 1/25 to 1/10 of the width. 1 if there are no errors.
 double error_magnification(double p90_m, double width_m);
 
-/// From each true place an arrow towards its fix. Of more than 500 fixes some are drawn, evenly
-/// in their order, and the 20 that are furthest off; arrows longer than a quarter of the floor are
-/// cut short, dashed and counted. Of more than 200 captures without a fix some are drawn. The table
-/// has the ten fixes that are furthest off.
+/// Plots an arrow from each true position towards its fix.
+///
+/// If there are more than 500 fixes, a regular subset in their order and the 20 largest errors are
+/// plotted. Arrows longer than a quarter of the floor are cut short, dashed and counted. If there
+/// are more than 200 captures without a fix, a subset is plotted. The table lists the ten largest
+/// errors.
 Drawing drawing_of(const ErrorPlot& plot);
 
 }  // namespace vlp

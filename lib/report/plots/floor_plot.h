@@ -13,25 +13,27 @@
 
 namespace vlp {
 
-/// A figure over the floor, to be drawn as a coloured map with the lamps on it.
+/// Quantity over the floor, for a color map with the lamps on it.
 struct FloorPlot {
   struct Place {
     Eigen::Vector2d xy_m;
-    /// Nothing where there is no figure: left blank.
+    /// Value; std::nullopt is left blank.
     std::optional<double> value;
   };
   std::string title;
-  /// Of the values, with their unit.
+  /// Label of the values, with their unit.
   std::string label;
-  /// Distance between neighbouring places.
+  /// Distance between neighboring positions.
   double step_m;
   std::vector<Place> places;
 };
 
-/// The horizontal standard deviation of all sources together, in mm; blank where there is no fix.
+/// Collects the horizontal standard deviation from all sources, in mm; blank where no fix is
+/// possible.
 FloorPlot plot_of(const FloorLimits& limits, const std::string& title, double step_m);
 
-/// Draws it, .png or .svg by the ending. Throws InputError, see draw().
+/// Writes the plot as .png or .svg, by the extension of `picture`.
+/// @throws InputError as draw()
 void draw_floor_plot(const std::filesystem::path& picture, const FloorPlot& plot,
                      const LampMap& lamps);
 

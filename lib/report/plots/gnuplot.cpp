@@ -24,7 +24,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A descriptor that is closed at the end of its scope.
+/// File descriptor that is closed at the end of its scope.
 class Descriptor {
  public:
   explicit Descriptor(int number) : number_(number) {}
@@ -47,8 +47,7 @@ class Descriptor {
                                 std::strerror(errno));
 }
 
-/// Puts the script into memory that gnuplot reads as its stdin, so that no temporary file is
-/// needed.
+/// Writes the script into memory that gnuplot reads as its stdin, which avoids a temporary file.
 void write_script(const Descriptor& script, std::string_view text, const fs::path& picture) {
   while (!text.empty()) {
     const ssize_t count = ::write(script.number(), text.data(), text.size());
@@ -59,8 +58,8 @@ void write_script(const Descriptor& script, std::string_view text, const fs::pat
   ::lseek(script.number(), 0, SEEK_SET);
 }
 
-/// Starts gnuplot with these descriptors as stdin and stdout. -d: without ~/.gnuplot, which may run
-/// commands and change the picture. Returns std::nullopt if it cannot be started.
+/// Starts gnuplot with these descriptors as stdin and stdout. Returns std::nullopt if it cannot be
+/// started. The option -d skips ~/.gnuplot, which may run commands and change the plot.
 std::optional<pid_t> start_gnuplot(int script, int output) {
   std::string words[] = {"env", "LC_ALL=C.UTF-8", "gnuplot", "-d", "-"};
   std::array<char*, std::size(words) + 1> arguments{};
@@ -95,7 +94,7 @@ bool has_succeeded(pid_t process) {
   return WIFEXITED(status) && WEXITSTATUS(status) == 0;
 }
 
-/// `picture` is for the messages.
+/// Renders a drawing with a gnuplot terminal. `picture` appears in messages only.
 std::string drawn(const std::string& terminal, const Drawing& drawing, const fs::path& picture) {
   const Descriptor script(::memfd_create("vlp-plot", MFD_CLOEXEC));
   int ends[2] = {-1, -1};
@@ -108,7 +107,7 @@ std::string drawn(const std::string& terminal, const Drawing& drawing, const fs:
                picture);
   const auto process = start_gnuplot(script.number(), input.number());
   if (!process) throw InputError(picture, "cannot be drawn: gnuplot cannot be started");
-  input.close();  // gnuplot's end is the last one
+  input.close();  // leaves gnuplot's end as the only one
   std::string image = read_all(output);
   if (!has_succeeded(*process) || image.empty()) {
     throw InputError(picture, "cannot be drawn: gnuplot failed; is it installed?");
@@ -116,7 +115,7 @@ std::string drawn(const std::string& terminal, const Drawing& drawing, const fs:
   return image;
 }
 
-/// The font has two stand-ins, for machines that look at the picture and lack it.
+/// Returns the SVG terminal. Two fallback fonts follow, for machines without the first.
 std::string svg_terminal(const Drawing& drawing) {
   return "svg background 'white' name '" + drawing.name +
          "' font 'DejaVu Sans,Verdana,sans-serif,13'";

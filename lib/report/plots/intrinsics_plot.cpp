@@ -13,7 +13,7 @@
 namespace vlp {
 namespace {
 
-/// The data, in blocks: corners and outliers as u v du dv, and the map as u v sd.
+/// Returns the data blocks: corners and outliers as u v du dv, and the map as u v sd.
 std::string data_of(const IntrinsicsPlot& plot) {
   std::string corners, outliers, map;
   for (const auto& [seen_px, residual_px, outlier] : plot.corners) {
@@ -36,7 +36,7 @@ std::string data_of(const IntrinsicsPlot& plot) {
   return data_block("corners", corners) + data_block("outliers", outliers) + data_block("map", map);
 }
 
-/// For example "12 corners, 3 outliers (crosses)".
+/// Returns, for example, "12 corners, 3 outliers (crosses)".
 std::string counts(const IntrinsicsPlot& plot, const std::string& outliers) {
   const auto left_out = std::count_if(plot.corners.begin(), plot.corners.end(),
                                       [](const auto& corner) { return corner.outlier; });
@@ -46,7 +46,7 @@ std::string counts(const IntrinsicsPlot& plot, const std::string& outliers) {
   return text;
 }
 
-/// A layer of corners, and one of outliers where there are any.
+/// Returns the plot commands of the corners, and of the outliers if there are any.
 std::string layers(const IntrinsicsPlot& plot, const std::string& of_corners,
                    const std::string& of_outliers) {
   std::string layers =
@@ -69,7 +69,8 @@ double rms_px(const IntrinsicsPlot& plot) {
   return count > 0 ? std::sqrt(squares / count) : 0;
 }
 
-/// Colours by the logarithm, and lines at round numbers.
+/// Returns the map of the standard deviations, with logarithmic colors and contour lines at round
+/// numbers.
 std::string map_of(const IntrinsicsPlot& plot) {
   double least = INFINITY, most = 0;
   for (const double sd_px : plot.sd_px) {
@@ -102,7 +103,7 @@ std::string map_of(const IntrinsicsPlot& plot) {
               half_u + "):(" + half_v +
               "):3 with boxxyerror fillstyle solid linecolor palette notitle";
   if (!lines.empty()) {
-    // Room for the labels.
+    // Keeps labels away from the image edges.
     const auto away = [](const char* column, int size_px) {
       return "abs(" + std::string(column) + " / " + std::to_string(size_px) + " - 0.5) < 0.44";
     };
@@ -160,7 +161,7 @@ Drawing drawing_of(const IntrinsicsPlot& plot) {
       "]\n"
       "set yrange [" +
       significant(height - 0.5, kPlotDigits) +
-      ":-0.5]\n"  // as in the image
+      ":-0.5]\n"  // v downwards, as in the image
       "set xlabel 'u (px)'\n"
       "set ylabel 'v (px)'\n"
       "set multiplot layout 2,2 margins 0.1,0.9,0.08,0.88 spacing 0.13,0.2 title " +

@@ -7,8 +7,8 @@
 
 namespace vlp {
 
-/// Colours of Okabe and Ito, which the colour-blind can tell apart. What differs in colour differs
-/// in its marker or its dashes, too.
+/// Color-blind safe palette of Okabe and Ito. Items that differ in color also differ in marker or
+/// dashes.
 namespace plot_colors {
 constexpr const char* blue = "#0072b2";
 constexpr const char* vermillion = "#d55e00";
@@ -17,23 +17,23 @@ constexpr const char* purple = "#cc79a7";
 constexpr const char* grey = "#666666";
 }  // namespace plot_colors
 
-/// `text` as a gnuplot string, with nothing in it interpreted; lines stay lines.
+/// Returns `text` as a gnuplot string without interpretation of its content; line breaks are kept.
 std::string gnuplot_quoted(const std::string& text);
 
-/// Digits of the numbers in a plot.
+/// Significant digits of the numbers in a plot.
 constexpr int kPlotDigits = 7;
 
-/// A line of numbers.
+/// Returns a line of numbers.
 std::string data_row(std::initializer_list<double> values);
 
-/// Rows as the data block `$name`.
+/// Returns rows as the data block `$name`.
 std::string data_block(const std::string& name, const std::string& rows);
 
-/// What all plots begin with: the encoding, tics, grid, the key below, labels in boxes, and a
-/// palette (viridis) for maps that is even in lightness, legible to the colour-blind and in grey.
+/// Returns the settings common to all plots: encoding, tics, grid, key below, label boxes, and the
+/// palette viridis. Viridis is even in lightness, and readable in gray and for the color-blind.
 std::string plot_settings();
 
-/// `[from:to]`, a range.
+/// Returns the range `[from:to]`.
 std::string plot_range(double from, double to);
 
 }  // namespace vlp

@@ -11,7 +11,7 @@
 namespace vlp {
 namespace {
 
-/// Ranges of one length that show the whole box, v downwards as in the image.
+/// Returns axis ranges of equal length that contain the box, with v downwards as in the image.
 std::string square_around(const Eigen::AlignedBox2d& box) {
   constexpr double margin = 0.1, least_px = 1e-3;
   const Eigen::Vector2d center = box.center();
@@ -31,7 +31,7 @@ Drawing drawing_of(const RotationPlot& plot) {
     for (const auto& place : places_px) places += data_row({place.x(), place.y(), double(lamp)});
     ellipses +=
         data_row({center_px.x(), center_px.y(), 2 * radii_px.x(), 2 * radii_px.y(), double(lamp)});
-    // A lamp has one number, although it has an ellipse at each height.
+    // One label per lamp, although it has an ellipse at each height.
     if (labelled.insert(lamp).second) {
       labels += data_row({center_px.x(), center_px.y(), double(lamp)});
     }

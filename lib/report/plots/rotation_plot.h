@@ -11,10 +11,9 @@
 
 namespace vlp {
 
-/// Lamps while the camera turns on the spot, in the undistorted image (the figure 4 of Chen and
-/// Guan).
+/// Lamps in the undistorted image while the camera rotates in place: figure 4 of Chen and Guan.
 struct RotationPlot {
-  /// Of a lamp at one height, with the ellipse fitted to it.
+  /// Positions of a lamp at one camera height, with the fitted ellipse.
   struct Trace {
     int lamp;
     std::vector<Eigen::Vector2d> places_px;
@@ -27,8 +26,8 @@ struct RotationPlot {
   Eigen::Vector2d principal_point_px;
 };
 
-/// Makes the plot for draw(): the traces, and beside them, enlarged, the centres of the ellipses,
-/// the rotation centre and the principal point.
+/// Makes the plot for draw(): the traces, and next to them, enlarged, the centers of the ellipses,
+/// the rotation center and the principal point.
 Drawing drawing_of(const RotationPlot& plot);
 
 }  // namespace vlp

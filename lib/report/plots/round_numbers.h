@@ -7,20 +7,22 @@
 
 namespace vlp {
 
-/// The largest of ..., 0.1, 0.2, 0.5, 1, 2, 5, ... that is no larger, but for rounding.
-/// Precondition: value > 0.
+/// Returns the largest of ..., 0.1, 0.2, 0.5, 1, 2, 5, ... that does not exceed `value`, except for
+/// rounding.
+/// @pre value > 0
 double round_below(double value);
 
-/// Those numbers in turn, two or more, from the last that is no larger than `least` to the first
-/// that is no smaller than `most`. Precondition: 0 < least <= most.
+/// Returns consecutive numbers of that series, at least two. The first is the last one that does
+/// not exceed `least`, the last is the first one that is not below `most`.
+/// @pre 0 < least <= most
 std::vector<double> round_numbers(double least, double most);
 
-/// For people: that many significant digits, but all of those before the point and no exponent for
-/// it.
+/// Formats a number for humans with `digits` significant digits. Integer digits are all kept, so
+/// that large numbers have no exponent.
 std::string readable(double value, int digits);
 
-/// A length in millimetres for people, to three digits: readable, or, as one in a column of its
-/// like, with all three and the unit.
+/// Format a length in millimeters with three significant digits. readable_mm() has no unit and
+/// keeps all integer digits, as readable(). in_mm() appends the unit and is for columns.
 std::string readable_mm(double length_m);
 std::string in_mm(double length_m);
 

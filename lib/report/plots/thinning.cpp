@@ -9,7 +9,7 @@
 namespace vlp {
 namespace {
 
-/// "2nd", "11th".
+/// Returns "2nd", "11th".
 std::string ordinal(std::size_t number) {
   const bool teen = number / 10 % 10 == 1;
   const std::size_t last = teen ? 0 : number % 10;

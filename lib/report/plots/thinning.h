@@ -9,14 +9,15 @@
 
 namespace vlp {
 
-/// Every how many-th of `count` things to draw so that no more than `most` are drawn: 1 or more.
-/// Precondition: most > 0.
+/// Returns the step, at least 1, for which every step-th of `count` items are no more than `most`
+/// items.
+/// @pre most > 0
 std::size_t thinning_step(std::size_t count, std::size_t most);
 
-/// "every 3rd of 250 drawn"; empty for a step of 1.
+/// Returns "every 3rd of 250 drawn"; empty for a step of 1.
 std::string thinning_note(std::size_t count, std::size_t step);
 
-/// Which to draw: every step-th and so many of the largest, in their order.
+/// Returns the ascending indices of every step-th value and of the `largest` largest values.
 std::vector<std::size_t> thinned(std::span<const double> values, std::size_t step,
                                  std::size_t largest);
 

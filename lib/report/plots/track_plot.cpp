@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::size_t kMostFixes = 2000;
 
-/// Frame of the commanded line: from its start along it and to its left.
+/// Coordinate frame of the commanded line: x from its start along it, y to its left.
 struct LineFrame {
   Eigen::Vector2d start_m, along;
 
@@ -29,13 +29,13 @@ struct LineFrame {
   }
 };
 
-/// x and y in the world, metres along the commanded line, millimetres to its left.
+/// Returns x and y in the world, meters along the commanded line, and millimeters to its left.
 std::string row_of(const LineFrame& frame, const Eigen::Vector2d& point_m) {
   const Eigen::Vector2d in_line_m = frame.of(point_m);
   return data_row({point_m.x(), point_m.y(), in_line_m.x(), 1e3 * in_line_m.y()});
 }
 
-/// All three, for the columns of the data.
+/// Returns the plot command of commanded line, fixes and fitted line for these data columns.
 std::string layers(const std::string& columns) {
   const auto color = [](const char* name) { return std::string(" linecolor rgb '") + name + "' "; };
   return "plot $commanded using " + columns + " with lines linewidth 2 linecolor rgb 'black' " +
@@ -45,7 +45,7 @@ std::string layers(const std::string& columns) {
          "title 'fitted line'\n";
 }
 
-/// Data of the plot, and what they cover: in the world, and along the commanded line.
+/// Data of the plot and the area they cover, in the world and along the commanded line.
 struct TrackData {
   std::string commanded, fixes, fitted;
   Eigen::AlignedBox2d floor, along{Eigen::Vector2d::Zero()};
@@ -62,7 +62,8 @@ struct TrackData {
       floor.extend(plot.fixes_m[i]);
       along.extend(frame.of(plot.fixes_m[i]));
     }
-    // Drawn as far as the fixes go, wherever its two points are: a drive that ends early shows.
+    // The fitted line extends as far as the fixes, whatever its two points are. So a drive that
+    // ends early is visible.
     const LineFrame fitted_frame(plot.fitted_m);
     const auto along_fitted_m = [&](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
       return fitted_frame.of(a).x() < fitted_frame.of(b).x();

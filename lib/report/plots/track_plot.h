@@ -11,20 +11,21 @@
 
 namespace vlp {
 
-/// Fixes of a camera that drove along a commanded straight line, in the world: the figure 10 of
-/// Chen and Guan.
+/// Fixes of a camera on a drive along a commanded straight line, in the world: figure 10 of Chen
+/// and Guan.
 struct TrackPlot {
   std::string title;
-  /// Start and end, at different places.
+  /// Start and end, which differ.
   std::array<Eigen::Vector2d, 2> commanded_m;
-  /// In the order of the drive, one or more.
+  /// Fixes in the order of the drive, at least one.
   std::vector<Eigen::Vector2d> fixes_m;
-  /// The line fitted to the fixes: two different points of it.
+  /// Two different points of the line fitted to the fixes.
   std::array<Eigen::Vector2d, 2> fitted_m;
 };
 
-/// Above the floor, and below how far fixes and fitted line are to the left of the commanded line,
-/// in millimetres, along it. Of more than 2,000 fixes some are drawn, evenly in their order.
+/// Plots the lines and fixes on the floor. A second plot shows the distances of fixes and fitted
+/// line to the left of the commanded line, in mm, along it. If there are more than 2,000 fixes, a
+/// regular subset in their order is plotted.
 Drawing drawing_of(const TrackPlot& plot);
 
 }  // namespace vlp

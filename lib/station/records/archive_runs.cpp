@@ -26,13 +26,13 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kMostBytes = 1 << 26;
 
-/// 2026-03-14 or 2026-03-14T09:30:00.25 as 2026-03-14T09:30:00Z.
+/// Converts 2026-03-14 or 2026-03-14T09:30:00.25 to 2026-03-14T09:30:00Z.
 std::string utc_of_date(const std::string& date) {
   constexpr std::size_t day = 10, whole = 19;
   return date.size() == day ? date + "T00:00:00Z" : date.substr(0, whole) + "Z";
 }
 
-/// As new_run() has it.
+/// Makes a run id in the form of new_run().
 std::string run_name(std::string utc, const std::string& text) {
   constexpr std::size_t digits = 16;
   std::erase_if(utc, [](char c) { return c == '-' || c == ':'; });
@@ -45,7 +45,7 @@ std::optional<double> number_in(const nlohmann::json& object, const char* key) {
   return found->get<double>();
 }
 
-/// Adds the metrics in `metrics` or `gates` of session.json whose names are not in `figures` yet.
+/// Adds the entries of `metrics` or `gates` of session.json. Existing metrics are not replaced.
 void add_figures(const nlohmann::json& metrics, std::vector<CheckedMetric>& figures) {
   std::set<std::string> names;
   for (const CheckedMetric& figure : figures) names.insert(figure.name);

@@ -10,33 +10,36 @@
 
 namespace vlp {
 
-/// A session of an archive as a run, so that trends, capability and studies read archives, too.
+/// Session of an archive as a run, so that trends, capability and studies can use archives.
 struct ReprocessedSession {
-  /// All but its figures and its calibration.
+  /// The run without its metrics and its calibration.
   RunRecord run;
-  /// With what vlp-calibrate wrote.
+  /// Folder of the files that vlp-calibrate wrote.
   std::filesystem::path folder;
 };
 
 struct ReprocessedArchive {
-  /// In the order of their dates.
+  /// Sessions, in chronological order.
   std::vector<ReprocessedSession> sessions;
-  /// Those that are none of these, because nobody says when they were taken, or because their
-  /// program crashed, which says nothing of the session.
+  /// Number of sessions without a date, and of sessions whose program crashed. A crash is no result
+  /// of the session.
   std::size_t undated = 0, crashed = 0;
-  /// Reasons of the rows that are left out because their names are no ids.
+  /// Messages about rows that are skipped because their names are no valid ids.
   std::vector<std::string> refused;
 };
 
-/// Of summary.csv in RESULTS of scripts/reprocess.sh. The station is the archive, by the name of
-/// the folder of its results; kind "unit"; "pass" and "look" are PASS, "gate" is FAIL, no result is
-/// INVALID; config_sha256 is the session's key: of its inputs, the toolbox and the options. A
-/// session has the same name of a run each time: its date, and a digest of station, camera and
-/// session. Throws InputError for what reprocessing has not written.
+/// Reads the sessions of an archive from RESULTS/summary.csv of scripts/reprocess.sh. Throws
+/// InputError if reprocessing did not write `results`.
+///
+///   station        name of the folder of the results
+///   kind           "unit"
+///   verdict        PASS for "pass" and "look", FAIL for "gate", INVALID without a result
+///   config_sha256  key of the session: digest of its inputs, the toolbox and the options
+///   run            date, and a digest of station, camera and session: the same each time
 ReprocessedArchive sessions_of_archive(const std::filesystem::path& results);
 
-/// The run of a session, whole, with the figures and gates of its session.json. Throws InputError
-/// for what vlp-calibrate has not written.
+/// Loads the complete run of a session, with metrics and gates of its session.json. Throws
+/// InputError if vlp-calibrate did not write the file.
 RunRecord run_of(const ReprocessedSession& session);
 
 }  // namespace vlp

@@ -25,7 +25,7 @@ constexpr int kSixDigits = 6;
 
 using Values = std::vector<CertifiedValue>;
 
-/// x and y, with the standard deviations of a covariance.
+/// Adds x and y with the standard deviations of a covariance.
 template <typename Covariance>
 void add_pair(Values& values, const std::string& name, const std::string& unit,
               const Eigen::Vector2d& pair, const std::optional<Covariance>& covariance,
@@ -70,7 +70,7 @@ std::string subject_part(const RunRecord& record, const Calibration& calibration
                       {"images", fmt::format("{} taken, {} used", record.images.size(), used)}}});
 }
 
-/// Describes the inputs that the uncertainty includes, and those that are taken as exact.
+/// Describes the inputs that the uncertainty includes, and those that are assumed exact.
 std::string describe_inputs(const RunRecord& record, const Calibration& calibration) {
   const auto print = std::find_if(
       record.figures.begin(), record.figures.end(),
@@ -103,14 +103,13 @@ std::string results_part(const RunRecord& record, const Calibration& calibration
                       describe_inputs(record, calibration));
 }
 
-/// "rms_px: residuals of the board's corners, ..." for a reader who has only the certificate.
+/// Returns "rms_px: residuals of the board's corners, ..." for readers of the certificate only.
 std::string describe_requirement(const std::string& metric) {
   const auto kind = metric_kind(metric);
   return kind ? metric + ": " + kind->meaning : metric;
 }
 
-/// Makes the table of the gates: the figure, what is asked for, and whether it conforms, by which
-/// rule.
+/// Makes the table of the gates: metric, limit, and conformity with its decision rule.
 std::string conformity_part(const RunRecord& record) {
   HtmlTable table{"", {"requirement", "figure", "limit", "accepted", "conforms", "rule"}, {}};
   constexpr int digits = 4, of_probability = 3;
@@ -169,7 +168,7 @@ std::string traceability_part(const RunRecord& record, const Calibration& calibr
          history_list(calibration.history);
 }
 
-/// What a record does not have.
+/// Makes the part with the data that a record does not contain.
 std::string part_to_fill_in() {
   HtmlTable table{"", {}, {}};
   for (const char* line : {"laboratory, address", "customer", "temperature, humidity",

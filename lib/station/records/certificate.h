@@ -11,37 +11,47 @@
 
 namespace vlp {
 
-/// A figure of a calibration, and its standard uncertainty where the calibration states one.
+/// Value of a calibration, with its standard uncertainty if the calibration contains one.
 struct CertifiedValue {
   std::string name, unit;
   double value;
   std::optional<double> standard_uncertainty;
 };
 
-/// Focal length, principal point, and what else there is: rotation centre, zenith, lever arm,
-/// dispersion offset; each along x and y. The uncertainty is of the captures' scatter, that of the
-/// zenith and the dispersion with the parts of the steps before. The board is taken as exact unless
-/// it states print_sd, the lamp map unless it states sd_m, and the known points always.
+/// Returns the values that a calibration contains, each along x and y: focal length, principal
+/// point, rotation center, zenith, lever arm, dispersion offset.
+///
+/// The uncertainties are estimated from the scatter of the captures. Those of zenith and dispersion
+/// include the contributions of the earlier steps. The board is assumed exact unless it has
+/// print_sd, the lamp map unless it has sd_m. Known points are always assumed exact.
 std::vector<CertifiedValue> certified_values(const Calibration& calibration);
 
-/// "12.346 +- 0.012 px": the value to the last digit of the expanded uncertainty U = 2 u, which has
-/// two (JCGM 100:2008, 7.2.6); six digits, and that it is not stated, without one.
+/// Formats a value as "12.346 +- 0.012 px". The expanded uncertainty U = 2 u has two significant
+/// digits (JCGM 100:2008, 7.2.6), and the value ends at the same digit. Without an uncertainty the
+/// value has six digits and a note that none is stated.
 std::string words_of(const CertifiedValue& value);
 
-/// Throws InputError for a run that has no certificate: of a golden unit, not judged, without a
-/// calibration, or changed by hand.
+/// Throws InputError for a run that cannot have a certificate:
+/// - a run of a golden unit,
+/// - a run that was not judged or has no calibration,
+/// - a record that was edited manually.
 void check_certifiable(const RunRecord& record);
 
-/// The certificate of a unit's run, a page of HTML that needs nothing else: what ISO/IEC 17025:2017
-/// (7.8.2, 7.8.4, 7.8.6) asks of one as far as a record has it. Unit, place, dates, number (the
-/// run), procedure; values with U, k = 2; for each gate the statement of conformity with its
-/// decision rule; the digests of all that it rests on. What no record has, who issues it and under
-/// what conditions, is left to be filled in. Same record, same bytes. `calibration` is the
-/// record's. Throws as check_certifiable().
+/// Returns the certificate of a unit's run as a self-contained HTML page. Equal records give
+/// identical bytes. `calibration` is the calibration of the record. Throws as check_certifiable().
+///
+/// Contents, according to ISO/IEC 17025:2017 (7.8.2, 7.8.4, 7.8.6) as far as a record contains
+/// them:
+/// - unit, location, dates, number (the run), procedure,
+/// - values with U (k = 2),
+/// - for each gate the statement of conformity with its decision rule,
+/// - digests of all inputs.
+///
+/// Issuer and conditions are not recorded; the page has blanks for them.
 std::string certificate(const RunRecord& record, const Calibration& calibration);
 
-/// Writes it as certificate.html beside the files of the run, which are written where they are
-/// missing (publish_run()); the file. Throws InputError.
+/// Writes the certificate to certificate.html next to the files of the run, and returns its path.
+/// Writes missing files of the run, too (publish_run()). Throws InputError.
 std::filesystem::path write_certificate(const RunRecord& record,
                                         const std::filesystem::path& results);
 

@@ -31,7 +31,7 @@ const CheckedMetric* figure_of(const RunRecord& run, const MetricKind& kind) {
   return figure == run.figures.end() ? nullptr : &*figure;
 }
 
-/// unit_metrics(), and what else there is in these runs.
+/// Returns unit_metrics() and the other metrics of these runs.
 std::vector<MetricKind> columns_of(const std::vector<RunRecord>& runs) {
   auto kinds = unit_metrics();
   for (const MetricKind& kind : metric_kinds({MetricSource::evaluation})) {
@@ -98,7 +98,7 @@ nlohmann::ordered_json json_of(const RunRecord& run) {
   return json;
 }
 
-/// Bytes that are no UTF-8 are replaced.
+/// Serializes JSON; replaces bytes that are no UTF-8.
 std::string text_of(const nlohmann::ordered_json& json) {
   constexpr int indent = 1;
   return json.dump(indent, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";

@@ -10,15 +10,18 @@
 
 namespace vlp {
 
-/// Returns a run as a JSON object for the hook: "event", which is "verdict", or "voided" if the run
-/// was voided; then the run as write_runs() has it.
+/// Returns a run as a JSON object for the hook: "event" ("verdict", or "voided" for a voided run),
+/// then the members written by write_runs().
 std::string hook_json(const RunRecord& run);
 
-/// Writes runs, whole or not at all. To .csv: a line for each with run, kind, station, camera,
-/// operator_name, shift, begun_utc, ended_utc, verdict, causes, program, config_sha256 and each
-/// figure, empty where there is none. To .json: a list of
-/// objects with the texts of run_fields(), each figure with value, unit, gate and whether it is
-/// met, images, events. Throws InputError, for another ending, too.
+/// Writes runs atomically, in the format of the file's extension. Throws InputError, also for
+/// another extension.
+///
+///   .csv   one row per run: run, kind, station, camera, operator_name, shift, begun_utc,
+///   ended_utc,
+///          verdict, causes, program, config_sha256, and a column per metric, empty if missing
+///   .json  list of objects: the texts of run_fields(), images, events, and each metric with value,
+///          unit, gate and result of the gate
 void write_runs(const std::filesystem::path& file, const std::vector<RunRecord>& runs);
 
 }  // namespace vlp

@@ -31,13 +31,13 @@ std::string name_of_note(const StationConfig& config) {
   return ".golden-" + sha256_of_text(config.station).substr(0, digits);
 }
 
-/// Of a note that is no whole one.
+/// Returns the message about an incomplete note.
 std::string damaged(const std::string& why) {
   return fmt::format("what the golden unit said is not known ({}): 'vlp-station verify' is due",
                      why);
 }
 
-/// An earlier PASS must not stand where this run could not be noted: without a note it is due.
+/// Deletes the note, so that an earlier PASS is not valid after a run that could not be noted.
 void forget(const StationConfig& config) {
   std::error_code ignored;
   fs::remove(config.spool / name_of_note(config), ignored);
@@ -80,7 +80,7 @@ std::string golden_problem(const StationConfig& config, GoldenAt at) {
   if (failed) {
     return fmt::format("the golden unit failed (run {}): mend the station, then {}", run, verify);
   }
-  if (measured_with.empty()) {  // an older program's note
+  if (measured_with.empty()) {  // note of an older program
     return fmt::format("with which lamp map the golden unit was measured is not known (run {}): {}",
                        run, verify);
   }
@@ -128,7 +128,7 @@ bool forget_golden(const StationConfig& config, const std::string& run) {
   try {
     const auto note = SharedFolder(config.spool).read(name_of_note(config), kMaxBytes);
     if (!note || note->substr(0, note->find(' ')) != run) return false;
-  } catch (const InputError&) {  // no spool, or no note that counts (golden_problem())
+  } catch (const InputError&) {  // no spool, or no valid note (golden_problem())
     return false;
   }
   forget(config);

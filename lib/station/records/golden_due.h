@@ -9,28 +9,36 @@
 
 namespace vlp {
 
-/// When it is asked whether the golden unit is due.
+/// Time at which golden_problem() is called.
 enum class GoldenAt { first_image, verdict };
 
-/// Why no unit may pass now, for people: the golden unit failed, is due
-/// (StationConfig::verify_due), was measured with something else that measures
-/// (measuring_digest()), or never here; empty when units may. Of what note_for_golden() has noted
-/// in the station's spool, whatever the records say, which may be away. A clock that was set back
-/// makes it due, a damaged note too.
-/// Of a unit that was begun when nothing stood against it, hours and units that ran out since do
-/// not count at its verdict: it was measured as soon after the golden unit as `verify_due` asks,
-/// and to do it again would tell nothing more. What tells against the station does: that the golden
-/// unit failed, or that something that measures was changed.
+/// Returns the human-readable reason why no unit may pass now; empty if units may. Always empty
+/// without `verify_due`.
+///
+/// Reasons: the golden unit
+/// - failed,
+/// - is due (StationConfig::verify_due),
+/// - was measured with another measuring setup (measuring_digest()),
+/// - was never measured here.
+///
+/// The function uses only the note of note_for_golden() in the station's spool, because the records
+/// may be offline. The golden unit is due, too, if the clock was set back or the note is damaged.
+///
+/// GoldenAt::verdict ignores limits of hours and units that expired after the unit was started. At
+/// its start the golden unit met `verify_due`, and a repetition would give no further information.
+/// A failed golden unit and a changed setup count at both times.
 std::string golden_problem(const StationConfig& config, GoldenAt at = GoldenAt::first_image);
 
-/// Notes a run: of the golden unit that it passed or failed, of a unit that was judged that it is
-/// one more. An INVALID run is neither. File .golden-DIGEST of the station's name: run, verdict and
-/// end of the golden unit and the measuring_digest(), then a line for each unit since.
-/// Throws InputError when it cannot be noted; then there is no note any more, and the golden unit
-/// is due. Without `verify_due` nothing is noted.
+/// Notes a run in the spool: the result of a golden unit, or one more judged unit. Ignores INVALID
+/// runs, and all runs without `verify_due`.
+///
+/// File .golden-DIGEST, with a digest of the station's name: run, verdict and end of the golden run
+/// and the measuring_digest(), then a line for each later unit. Throws InputError if the file
+/// cannot be written. The note is then deleted, so that the golden unit is due.
 void note_for_golden(const StationConfig& config, const RunRecord& record);
 
-/// Of a golden run that counts no more: when it is the one that is noted, the golden unit is due.
+/// Deletes the note if it is of the golden run `run`, which is no longer valid; the golden unit is
+/// then due. Returns true if it was.
 bool forget_golden(const StationConfig& config, const std::string& run);
 
 }  // namespace vlp

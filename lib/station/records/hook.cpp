@@ -55,7 +55,7 @@ class Descriptor {
   int number_;
 };
 
-/// The processes whose parent is this one. Where /proc is not to be read there are none.
+/// Returns the child processes of this process; empty if /proc is not readable.
 std::vector<pid_t> children() {
   std::vector<pid_t> found;
   std::error_code none;
@@ -64,7 +64,7 @@ std::vector<pid_t> children() {
     if (name.find_first_not_of("0123456789") != std::string::npos) continue;
     std::string stat;
     std::getline(std::ifstream(entry.path() / "stat"), stat);
-    // PID (NAME) STATE PARENT, where the name may hold anything.
+    // PID (NAME) STATE PARENT; NAME can contain any character.
     std::istringstream after_name(stat.substr(std::min(stat.size(), stat.rfind(')') + 1)));
     std::string state;
     pid_t parent = 0;
@@ -73,9 +73,8 @@ std::vector<pid_t> children() {
   return found;
 }
 
-/// While it is there, what a process leaves behind comes to this one, and not to init, so that
-/// nothing that a hook has started gets away from its time limit, whatever group or session it
-/// makes for itself.
+/// Adopts orphaned descendants of this process in place of init while it exists. A hook's processes
+/// therefore cannot evade the time limit by an own group or session.
 class Adoption {
  public:
   Adoption() : before_(children()) { ::prctl(PR_SET_CHILD_SUBREAPER, 1); }
@@ -83,7 +82,7 @@ class Adoption {
   Adoption(const Adoption&) = delete;
   Adoption& operator=(const Adoption&) = delete;
 
-  /// Kills those that came, and what comes when they die.
+  /// Kills the new children, and the orphans that they leave.
   void kill_all() const {
     constexpr int tries = 100;
     for (int i = 0; i < tries; ++i) {
@@ -103,15 +102,16 @@ class Adoption {
   std::vector<pid_t> before_;
 };
 
-/// What a process of its own group writes, and how it ends.
+/// Process in its own group, with its output and its exit status.
 struct Process {
   pid_t id;
   int output;
-  /// The last of it.
+  /// End of the output.
   std::string written = {};
   bool closed = false;
 
-  /// No more at once than a pipe holds: one that is always full must not keep from the time limit.
+  /// Reads at most the capacity of a pipe, so that a permanently full pipe does not delay the time
+  /// limit.
   void read() {
     constexpr std::size_t most = 4096;
     constexpr int parts = 16;
@@ -124,8 +124,8 @@ struct Process {
       if (written.size() > most) written.erase(0, written.size() - most);
     }
   }
-  /// Its status; nothing when it had to be killed. Throws std::system_error when it cannot be
-  /// known.
+  /// Waits for the process. Returns its status; std::nullopt if it was killed at the time limit.
+  /// Throws std::system_error if the status is not available.
   std::optional<int> wait(double time_limit_s) {
     constexpr int often_ms = 10;
     const auto begun = Clock::now();
@@ -136,7 +136,7 @@ struct Process {
       if (ended < 0 && errno != EINTR) throw std::system_error(errno, std::generic_category());
       if (std::chrono::duration<double>(Clock::now() - begun).count() > time_limit_s) {
         ::kill(-id, SIGKILL);
-        ::kill(id, SIGKILL);  // it may have left its group
+        ::kill(id, SIGKILL);  // it can have left its group
         while (::waitpid(id, &status, 0) < 0 && errno == EINTR) continue;
         return std::nullopt;
       }
@@ -147,13 +147,13 @@ struct Process {
         read();
       }
     }
-    read();  // not to its end: what it left running may hold the pipe
+    read();  // not to its end: a remaining child can hold the pipe
     return status;
   }
 };
 
-/// A file without a name that holds the whole text, open at its beginning; negative, with errno,
-/// when there is no room.
+/// Returns an anonymous file with the text, open at its beginning; negative, with errno, on
+/// failure.
 int file_with(const std::string& text) {
   const int file = ::memfd_create("run", MFD_CLOEXEC);
   for (std::size_t at = 0; file >= 0 && at < text.size();) {
@@ -171,8 +171,8 @@ int file_with(const std::string& text) {
   return file;
 }
 
-/// Starts it in a group of its own, with no descriptors but the lock's and no signals of this
-/// program; an errno when it could not be.
+/// Starts the hook in its own group, with no other descriptor than the lock's and default signal
+/// handling. Returns an errno on failure, otherwise 0.
 int start(const Hook& hook, int input, int output, int lock, pid_t& id) {
   posix_spawn_file_actions_t actions;
   posix_spawnattr_t attributes;
@@ -203,7 +203,7 @@ int start(const Hook& hook, int input, int output, int lock, pid_t& id) {
   return error;
 }
 
-/// The last line that is not empty, shortened.
+/// Returns the last non-empty line, shortened.
 std::string last_line(std::string text) {
   constexpr std::size_t most = 200;
   while (!text.empty() && std::isspace(static_cast<unsigned char>(text.back())) != 0) {
@@ -217,7 +217,7 @@ std::string last_line(std::string text) {
 
 RunEvent failed(const std::string& why) { return new_event(kHookFailed, why); }
 
-/// How many events it is from the last of a kind to the end; nothing without one.
+/// Returns the number of events after the last one of a kind; std::nullopt if there is none.
 std::optional<std::ptrdiff_t> from_end(const RunRecord& record, const char* what) {
   const auto last = std::find_if(record.events.rbegin(), record.events.rend(),
                                  [&](const RunEvent& event) { return event.what == what; });
@@ -225,7 +225,7 @@ std::optional<std::ptrdiff_t> from_end(const RunRecord& record, const char* what
   return last - record.events.rbegin();
 }
 
-/// Whether the file that is open is still the one of that name.
+/// Returns true if the open file is still the one of this name.
 bool is_that(int descriptor, const std::filesystem::path& file) {
   struct stat open {
   }, named{};
@@ -250,7 +250,7 @@ RunEvent run_hook(const Hook& hook, const RunRecord& record, const HookLock& loc
   Descriptor to(pipe[1]);
   ::fcntl(from.get(), F_SETFL, O_NONBLOCK);
   Process process{0, from.get()};
-  std::signal(SIGCHLD, SIG_DFL);  // who inherited that it is ignored never hears how it ended
+  std::signal(SIGCHLD, SIG_DFL);  // if SIGCHLD is ignored, no status is available
   const Adoption adoption;
   if (const int error = start(hook, input.get(), to.get(), lock.descriptor(), process.id);
       error != 0) {
@@ -295,13 +295,13 @@ HookLock::HookLock(const std::filesystem::path& spool, const std::string& run)
   for (;;) {
     try {
       descriptor_ = SharedFolder(spool).open(".hook-" + run, O_CREAT | O_RDWR);
-    } catch (const InputError&) {  // no folder, or no regular file: nobody shares a lock there
+    } catch (const InputError&) {  // no folder, or no regular file: no shared lock
       descriptor_ = -1;
     }
     if (descriptor_ < 0) return;
-    // Where the file system has no locks, no other program holds one.
+    // On a file system without locks no other program holds one.
     held_ = ::flock(descriptor_, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK;
-    // Who held it before may have taken the file away meanwhile.
+    // The previous holder can have removed the file.
     if (!held_ || is_that(descriptor_, file_)) return;
     ::close(descriptor_);
   }

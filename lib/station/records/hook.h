@@ -10,18 +10,18 @@
 
 namespace vlp {
 
-/// The trail's entry that a run's hook is to be run, which is kept together with the run: a hook
-/// that never came to its end is known by it.
+/// Makes the event that a hook is to run, which is recorded together with the run. It identifies
+/// hooks that did not finish.
 RunEvent hook_wanted(const Hook& hook, const std::string& operator_name);
 
-/// Whether a hook was wanted for a run, at its verdict or when it was voided, and has not been done
-/// since.
+/// Returns true if a hook was requested for a run, at its verdict or when it was voided, and has
+/// not succeeded since.
 bool hook_is_open(const RunRecord& record);
-/// Why a hook is open, for people in one line; empty when it is not.
+/// Returns the human-readable reason why a hook is open, in one line; empty if it is not open.
 std::string hook_problem(const RunRecord& record);
 
-/// The right to run the hook of a run, among the programs that share a spool: file .hook-RUN there.
-/// Where that cannot be written, there is none to share.
+/// Lock for the hook of a run among the programs that share a spool: file .hook-RUN in the spool.
+/// If the file cannot be written, no lock is needed, because the spool is not shared.
 class HookLock {
  public:
   HookLock(const std::filesystem::path& spool, const std::string& run);
@@ -29,9 +29,10 @@ class HookLock {
   HookLock(const HookLock&) = delete;
   HookLock& operator=(const HookLock&) = delete;
 
-  /// Whether no other program runs it now.
+  /// Returns true unless another program is running the hook.
   bool held() const { return held_; }
-  /// Who has it holds the lock; negative where there is none.
+  /// Returns the file descriptor of the lock; negative if there is no lock file. A process that has
+  /// the descriptor holds the lock.
   int descriptor() const { return descriptor_; }
 
  private:
@@ -40,12 +41,16 @@ class HookLock {
   bool held_ = true;
 };
 
-/// Runs the hook with hook_json() of the run on its stdin. Whatever becomes of it is what the event
-/// tells: kHookDone with the last line that it wrote, kHookFailed with exit code, signal or time
-/// limit before that line, or why it could not be started. Takes no longer than the time limit, at
-/// which it is killed with all that it has started, those that left its group too, unless they run
-/// as another user. It has the lock's descriptor, 3: when this program is killed, nobody else runs
-/// the hook before it has ended. Sets SIGCHLD to its default.
+/// Runs the hook with hook_json() of the run on its stdin, and returns the event of its result.
+/// Sets SIGCHLD to its default.
+///
+///   kHookDone    the last line of its output
+///   kHookFailed  exit code, signal or time limit, then the last line of its output; or the reason
+///                why it could not be started
+///
+/// At the time limit the hook is killed with all processes that it has started. That includes
+/// processes that left its group, but not those of another user. The hook inherits the lock's
+/// descriptor as 3. If this program is killed, no other program runs the hook until it has ended.
 RunEvent run_hook(const Hook& hook, const RunRecord& record, const HookLock& lock);
 
 }  // namespace vlp

@@ -7,7 +7,7 @@
 
 namespace vlp {
 
-/// null where there is no number.
+/// Returns the number, or null if there is none.
 inline nlohmann::ordered_json number_or_null(const std::optional<double>& value) {
   return value ? nlohmann::ordered_json(*value) : nlohmann::ordered_json(nullptr);
 }

@@ -89,7 +89,7 @@ Records& KnownRuns::records() {
 
 std::vector<RunSummary> KnownRuns::list(const RunFilter& filter) {
   std::vector<RunSummary> runs;
-  // First, so that a run that another program brings there meanwhile is in one of the two.
+  // First, so that a run that another program delivers at this time is in one of the two.
   const std::vector<RunRecord> waiting = this->waiting();
   if (records_) runs = records_->list(filter);
   for (const RunRecord& run : waiting) {
@@ -174,7 +174,8 @@ RunCounts count_runs(std::span<const RunSummary> runs) {
 
 namespace {
 
-/// Renames the files of a voided run. Returns why they keep their names; empty if they do not.
+/// Renames the files of a voided run. Returns the reason why they were not renamed; empty if they
+/// were.
 std::string rename_files(const StationConfig* own_station, const RunRecord& record) {
   if (own_station == nullptr) {
     return fmt::format(
@@ -198,8 +199,8 @@ bool is_hook_told(const RunRecord& record) {
                      [](const RunEvent& event) { return event.what == kHookWanted; });
 }
 
-/// Does at the station of a run what its voiding by the records alone (--records) left undone: the
-/// golden unit, the files and the hook. Returns false if nothing was left.
+/// Completes at the station of a run a voiding by the records alone (--records): golden unit, files
+/// and hook. Returns false if no step was missing.
 bool finish_voiding(KnownRuns& known, RunRecord& record, const std::string& who,
                     const std::optional<HookLock>& lock, Voided& result) {
   const StationConfig& station = *known.station();
@@ -232,11 +233,11 @@ Voided void_run(KnownRuns& known, const std::string& run, const std::string& ope
   std::optional<HookLock> lock;
   if (own && station->hook) {
     lock.emplace(known.spool()->folder(), record.run);
-    // Its end would be taken for that of the hook that is told of the voiding.
+    // The result of that hook would be mistaken for that of the hook about the voiding.
     if (!lock->held()) {
       throw InputError(record.run, "its hook is being run: void it when that has ended");
     }
-    record = known.find(run);  // another may have voided it before the lock was had
+    record = known.find(run);  // it can have been voided before the lock was acquired
   }
   const StationConfig* own_station = own ? &*station : nullptr;
   if (own) check_may_void(*station, operator_name);

@@ -16,7 +16,8 @@
 
 namespace vlp {
 
-/// Records that a command needs are away. what() is for the operator; `details` has the reason.
+/// Error if records are offline that a command needs. what() is for the operator, `details` has the
+/// reason.
 class RecordsUnavailable : public std::runtime_error {
  public:
   RecordsUnavailable(const std::string& notice, std::string why)
@@ -24,37 +25,37 @@ class RecordsUnavailable : public std::runtime_error {
   std::string details;
 };
 
-/// What is known of runs: records, and of a station also what waits for them in its spool, which is
-/// brought there first.
+/// Runs of the records and, for a station, runs that wait in its spool. The constructor of a
+/// station delivers waiting runs first.
 class KnownRuns {
  public:
-  /// Reads the runs of a station. Throws RecordsUnavailable if its records are away and nothing
+  /// Opens the runs of a station. Throws RecordsUnavailable if its records are offline and no run
   /// waits.
   explicit KnownRuns(StationConfig station);
-  /// Reads the runs of records alone (Records). Throws RecordsUnavailable if they are away, and for
-  /// a file that is not there: no records are made.
+  /// Opens the runs of records without a station (Records). Throws RecordsUnavailable if they are
+  /// offline, or if the file does not exist: no records are created.
   explicit KnownRuns(const std::string& records);
 
   const std::optional<StationConfig>& station() const { return station_; }
-  /// Null without a station.
+  /// Returns the station's spool; null without a station.
   Spool* spool() { return spool_ ? &*spool_ : nullptr; }
-  /// For what cannot do without them: throws RecordsUnavailable when they are away.
+  /// Returns the records. Throws RecordsUnavailable if they are offline.
   Records& records();
-  /// Returns true if the records cannot be asked: what is known are the runs that wait.
+  /// Returns true if the records are offline. Only the waiting runs are known then.
   bool are_away() const { return !records_; }
 
-  /// Of the records, if they answer, and of those that wait, whose causes say so; from the first to
-  /// the last.
+  /// Returns the runs of the records, if online, and the waiting runs, in chronological order. The
+  /// causes of waiting runs contain a note that they wait.
   std::vector<RunSummary> list(const RunFilter& filter);
-  /// A run that waits, or that the records have. Throws std::invalid_argument without one, and as
-  /// records().
+  /// Returns a run that waits or that the records contain. Throws std::invalid_argument if no run
+  /// has this id, otherwise as records().
   RunRecord find(const std::string& run);
-  /// The last run that the filter lets through; throws as find().
+  /// Returns the last run that matches the filter. Throws as find().
   RunRecord last(const RunFilter& filter);
-  /// All of the runs that the records have.
+  /// Returns the complete runs that the records contain.
   std::vector<RunRecord> whole(const RunFilter& filter);
-  /// By name, of the station, whose hooks 'vlp-station hook' runs: those with a hook that has not
-  /// ended well.
+  /// Returns the ids of the station's runs with an open hook (hook_is_open()), which 'vlp-station
+  /// hook' runs.
   std::vector<std::string> with_open_hook();
 
  private:
@@ -65,16 +66,16 @@ class KnownRuns {
   std::optional<StationConfig> station_ = {};
   std::optional<Spool> spool_ = {};
   std::optional<Records> records_ = {};
-  /// Why the records cannot be asked.
+  /// Reason why the records are offline.
   std::string away_ = {};
 };
 
-/// How runs ended, those that were voided apart.
+/// Numbers of runs by result; voided runs are counted separately.
 struct RunCounts {
   std::size_t passed = 0, failed = 0, invalid = 0, voided = 0;
-  /// Of the units that were judged, those that passed.
+  /// Judged runs of units, and those that passed.
   std::size_t units_passed = 0, units_judged = 0;
-  /// Cameras that were judged as units: all, those whose first run passed, and those with two runs
+  /// Cameras with judged runs as units: all, those whose first run passed, and those with two runs
   /// or more.
   std::size_t cameras = 0, cameras_passed_first = 0, cameras_reworked = 0;
 
@@ -84,22 +85,26 @@ struct RunCounts {
   std::optional<double> first_pass_yield() const;
 };
 
-/// Counts runs, given from the first to the last.
+/// Counts runs. `runs` are in chronological order.
 RunCounts count_runs(std::span<const RunSummary> runs);
 
 struct Voided {
   RunRecord run;
-  /// Why it is not recorded what became of the hook; empty when it is.
+  /// Reason why the result of the hook is not recorded; empty if it is.
   std::string problem = {};
-  /// Reason for which the files of the run keep their names; empty if they do not.
+  /// Reason why the files of the run were not renamed; empty if they were.
   std::string files_problem = {};
 };
-/// Voids a run: it counts no more, in no yield, trend or study, which its events tell, with who and
-/// why, and a golden run makes the golden unit due. At the station whose run it is, its files are
-/// renamed (mark_files_voided()), and its hook is told (call_hook()). A run that was voided before
-/// with its records alone gets there what is missing. Throws std::invalid_argument for an operator
-/// who is not among StationConfig::void_operators of that station, and for a run that was voided
-/// before if nothing is missing, InputError when it cannot be kept or its hook is being run.
+/// Voids a run, which then counts in no yield, trend or study. Its events record operator and
+/// reason. A voided golden run makes the golden unit due.
+///
+/// At the station of the run its files are renamed (mark_files_voided()), and its hook is called
+/// (call_hook()). These steps are completed there for a run that was voided before with records
+/// alone.
+///
+/// Throws std::invalid_argument if the operator is not among StationConfig::void_operators of that
+/// station. Throws it, too, if the run was voided before and no step is missing. Throws InputError
+/// if the event cannot be recorded or the hook is running.
 Voided void_run(KnownRuns& known, const std::string& run, const std::string& operator_name,
                 const std::string& reason);
 

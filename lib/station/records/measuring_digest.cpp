@@ -14,8 +14,8 @@
 namespace vlp {
 namespace {
 
-/// Names and values, a line each: a number as the shortest text that is read as it again, a text
-/// with its length.
+/// Text of names and values, one per line. Numbers have the shortest text that is parsed to the
+/// same value; texts are preceded by their length.
 class Lines {
  public:
   void add(const char* name, double value) { text_ += fmt::format("{} {}\n", name, value); }

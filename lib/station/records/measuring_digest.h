@@ -8,11 +8,13 @@
 
 namespace vlp {
 
-/// SHA-256 of what of a station measures and decides, as it was read: camera type, board, lamp map,
-/// the station's place, what is enough, what is refused, gates with their guard bands, the golden
-/// unit. Two files that say the same have the same, however they are written, commented, ordered
-/// and named. Not in it is what measures nothing: the station's name, when the golden unit is due,
-/// serials, folders, records, spool, hook, retention.
+/// Computes the SHA-256 of the parsed configuration that affects measurements and verdicts.
+///
+///   included  camera type, board, lamp map, position, completion and rejection limits, gates with
+///             guard bands, golden unit
+///   excluded  name of the station, `verify_due`, serials, folders, records, spool, hook, retention
+///
+/// Format, comments, order and names of files do not change it.
 std::string measuring_digest(const StationConfig& config);
 
 }  // namespace vlp

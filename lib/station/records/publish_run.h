@@ -12,31 +12,31 @@
 
 namespace vlp {
 
-/// Checks before a camera's run is begun that its results can be written: makes the folder, writes
-/// a file, and compares the room. Throws InputError.
+/// Checks, before a camera's run is started, that its results can be written: creates the folder,
+/// writes a file, and checks the free space. Throws InputError.
 void check_results(const std::filesystem::path& results, const std::string& camera);
 
-/// Returns the name of a run's calibration among its files, by its verdict: calibration.yaml,
+/// Returns the file name of a run's calibration, by its verdict: calibration.yaml,
 /// failed-calibration.yaml, invalid-calibration.yaml, or voided-calibration.yaml.
 const char* calibration_name(const RunRecord& record);
 
 /// Renames calibration, report and certificate in RESULTS/CAMERA/RUN/ to voided-calibration.yaml,
-/// voided-report.html and voided-certificate.html, so that nobody takes them for valid. Skips files
-/// that do not exist. Returns true if it renamed any. Throws InputError.
+/// voided-report.html and voided-certificate.html, so that they cannot be mistaken for valid files.
+/// Skips missing files. Returns true if it renamed any. Throws InputError.
 bool mark_files_voided(const RunRecord& record, const std::filesystem::path& results);
 
-/// Report that exists already: a run that is published again keeps it, with its pictures. `restore`
-/// replaces it by the record's and keeps it as replaced-report.html.
+/// Treatment of an existing report. A run that is published again keeps its report with its plots.
+/// `replace` writes the record's report instead and keeps the old one as replaced-report.html.
 enum class ExistingReport { keep, replace };
 
-/// Opens RESULTS/CAMERA/RUN/, and makes it if it does not exist. Throws InputError, also if camera
-/// or run is no id.
+/// Opens RESULTS/CAMERA/RUN/, and creates it if it does not exist. Throws InputError, also if
+/// camera or run is no valid id.
 SharedFolder open_run_folder(const RunRecord& record, const std::filesystem::path& results);
 
-/// Writes the files of RESULTS/CAMERA/RUN/ that are missing, and returns the folder: the
-/// calibration, if there is one, as calibration_name(); then report.html, which without `pictures`
-/// has none. Can be repeated at any time. Throws InputError, also if the calibration exists and
-/// differs from the record's.
+/// Writes the missing files of RESULTS/CAMERA/RUN/, and returns the folder. The files are the
+/// calibration, if the run has one, as calibration_name(), and then report.html with `pictures`.
+/// Can be repeated at any time. Throws InputError, also if the existing calibration differs from
+/// the record's.
 std::filesystem::path publish_run(const RunRecord& record,
                                   const std::vector<ReportPicture>& pictures,
                                   const std::filesystem::path& results,

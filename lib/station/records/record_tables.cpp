@@ -13,7 +13,7 @@
 namespace vlp {
 namespace {
 
-constexpr const char* kFigures =  // gate: no limit is no gate; guard_k: none is no guard band
+constexpr const char* kFigures =  // gate: NULL without a gate; guard_k: NULL without a guard band
     "CREATE TABLE IF NOT EXISTS figures (run VARCHAR(64) NOT NULL REFERENCES runs (run), "
     "place INTEGER NOT NULL, name VARCHAR(64) NOT NULL, value DOUBLE PRECISION, "
     "gate DOUBLE PRECISION, at_least INTEGER NOT NULL, met INTEGER NOT NULL, "
@@ -35,7 +35,7 @@ constexpr const char* kEvents =
 
 constexpr const char* kEventsByRun = "CREATE INDEX IF NOT EXISTS events_by_run ON events (run)";
 
-/// Refers to no run, so that it tells of one that was removed.
+/// Without a reference to runs, so that an entry remains when its run is removed.
 constexpr const char* kTrail =
     "CREATE TABLE IF NOT EXISTS trail (number BIGINT PRIMARY KEY, run VARCHAR(64) NOT NULL, "
     "event VARCHAR(64) NOT NULL, content TEXT NOT NULL, digest TEXT NOT NULL)";
@@ -57,8 +57,8 @@ std::vector<std::string> tables() {
           kImagesByDigest};
 }
 
-/// Units of the figures of version 1, which did not keep them. It stays as it is, whatever becomes
-/// of the figures.
+/// Units of the metrics of version 1, which did not store them. This table never changes, even if
+/// metrics do.
 constexpr const char* kUnitsOfVersion1 =
     "UPDATE figures SET unit = CASE "
     "WHEN name IN ('blur_px', 'center_px', 'nominal_px', 'rms_px', 'uncertainty_px', 'halves_px', "
@@ -78,7 +78,7 @@ void from_1_to_2(soci::session& sql) {
 /// failed.
 void from_2_to_3(soci::session& sql) { sql << kImagesByDigest; }
 
-/// Adds guard bands, which older programs cannot judge.
+/// Adds guard bands, which older programs cannot evaluate.
 void from_3_to_4(soci::session& sql) {
   sql << "ALTER TABLE figures ADD COLUMN uncertainty DOUBLE PRECISION";
   sql << "ALTER TABLE figures ADD COLUMN guard_k DOUBLE PRECISION";
@@ -89,8 +89,8 @@ constexpr const char* kEventsOfVersion5 =
     "run VARCHAR(64) NOT NULL REFERENCES runs (run), what VARCHAR(32) NOT NULL, "
     "text TEXT NOT NULL)";
 
-/// Adds events, operator and shift. An older program would bring runs here without their events,
-/// and take them from the spool.
+/// Adds events, operator and shift. An older program would store runs without their events, and
+/// remove them from the spool.
 void from_4_to_5(soci::session& sql) {
   sql << kEventsOfVersion5;
   sql << kEventsByRun;
@@ -98,23 +98,24 @@ void from_4_to_5(soci::session& sql) {
   sql << "ALTER TABLE runs ADD COLUMN shift TEXT NOT NULL DEFAULT ''";
 }
 
-/// Adds the authors of events, and the trail, without an entry in which an older program would keep
-/// runs.
+/// Adds the authors of events, and the trail. Older programs would store runs without entries in
+/// it.
 void from_5_to_6(soci::session& sql) {
   sql << "ALTER TABLE events ADD COLUMN who TEXT NOT NULL DEFAULT ''";
   sql << kTrail;
 }
 constexpr int kFirstWithTrail = 6;
 
-/// From each version to the next; the first is of version 1.
+/// Migrations from each version to the next, starting with version 1.
 constexpr std::array kMigrations{from_1_to_2, from_2_to_3, from_3_to_4, from_4_to_5, from_5_to_6};
 
 bool is_sqlite(soci::session& sql) { return sql.get_backend_name() == "sqlite3"; }
 
-/// 0 without tables. Throws for a later version than this program's.
+/// Returns the version of the tables; 0 without tables. Throws for a later version than this
+/// program's.
 int version_of(soci::session& sql) {
-  // Not to_regclass(): a connection that looked before remembers that there was no table, and may
-  // go on to say so to who waited for the lock while another made it.
+  // Not to_regclass(): an earlier result of a connection can be cached, and be wrong after waiting
+  // for the lock.
   const char* const look =
       is_sqlite(sql)
           ? "SELECT COUNT(*) FROM sqlite_master WHERE type = 'table' AND name = 'vlp_schema'"
@@ -135,19 +136,20 @@ int version_of(soci::session& sql) {
 const int kSchemaVersion = static_cast<int>(kMigrations.size()) + 1;
 
 bool has_record_tables(soci::session& sql) {
-  // Versions only grow. Without a lock, so that who may only read can.
+  // Versions only increase. Takes no lock, so that read-only users can call it.
   return version_of(sql) == kSchemaVersion;
 }
 
 void make_record_tables(soci::session& sql) {
   soci::transaction transaction(sql);
-  // One at a time, and who waited sees what the other did.
+  // Serialized: a waiting program sees the changes of the other.
   if (is_sqlite(sql)) {
-    // As a writer from the start: a reader who goes on to write may not wait for other writers.
+    // Write lock from the start: a reader that becomes a writer may not wait for other writers.
     sql << "COMMIT";
     sql << "BEGIN IMMEDIATE";
   } else {
-    // CREATE TABLE IF NOT EXISTS alone fails, in several ways, beside another of the same table.
+    // CREATE TABLE IF NOT EXISTS alone fails, in several ways, concurrently with another of the
+    // same table.
     sql << "SELECT pg_advisory_xact_lock(" + std::to_string(kLockOfTables) + ")";
   }
   if (version_of(sql) == 0) {
@@ -156,13 +158,13 @@ void make_record_tables(soci::session& sql) {
            "(SELECT 1 FROM vlp_schema)",
         soci::use(kSchemaVersion);
   }
-  // Waits for those who write already.
+  // Waits for current writers.
   lock_trail(sql);
   const int found = version_of(sql);
   for (int version = found; version < kSchemaVersion; ++version) {
     kMigrations.at(static_cast<std::size_t>(version) - 1)(sql);
   }
-  // When all columns are there.
+  // Requires all columns.
   if (found < kFirstWithTrail) append_all(sql);
   if (found < kSchemaVersion) {
     sql << "UPDATE vlp_schema SET version = :version", soci::use(kSchemaVersion);

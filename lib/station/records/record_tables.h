@@ -6,21 +6,21 @@
 
 namespace vlp {
 
-/// Present version of the tables, which vlp_schema holds: it counts the migrations.
+/// Current version of the tables, the number of migrations, stored in vlp_schema.
 extern const int kSchemaVersion;
 
-/// Whether the tables are those of the present version; looks without a lock. Throws as
+/// Returns true if the tables have the current version. Takes no lock. Throws as
 /// make_record_tables().
 bool has_record_tables(soci::session& sql);
 
-/// The advisory lock of PostgreSQL behind which tables are made and changed ("vlp"). A program from
-/// before it does not ask for it: of two that begin with an empty database at one moment it can
-/// still make one fail, which then works when it is started again.
+/// Advisory lock of PostgreSQL for creating and migrating tables ("vlp"). Older programs do not
+/// take it. If two programs start with an empty database at the same time, one of them can
+/// therefore fail; a second start then succeeds.
 inline constexpr int kLockOfTables = 0x766c70;
 
-/// Makes the tables of the records when they are not there, the same in SQLite and PostgreSQL, and
-/// brings those of an earlier version up to date, wholly or not at all, one program at a time.
-/// Throws soci::soci_error, and std::runtime_error for tables of a later version.
+/// Creates the tables of the records, identical in SQLite and PostgreSQL, or migrates tables of an
+/// earlier version. Runs in one transaction and in one program at a time. Throws soci::soci_error,
+/// and std::runtime_error for tables of a later version.
 void make_record_tables(soci::session& sql);
 
 }  // namespace vlp

@@ -27,24 +27,24 @@
 namespace vlp {
 namespace {
 
-/// What a connection has to be told each time that it is made.
+/// Configures a new connection.
 void set_up(soci::session& sql, int patience_s) {
   if (sql.get_backend_name() == "postgresql") {
     sql << "SET client_min_messages TO warning";
-    // Before this program gives up, so that the server says what it waits for.
+    // Ends before this program's time limit, so that the server reports what it waits for.
     constexpr int of_patience_ms = 900;
     sql << "SET lock_timeout TO " + std::to_string(patience_s * of_patience_ms);
-    // One that stands still holds the trail for no longer than others wait for it.
+    // An idle transaction holds the trail for no longer than others wait for it.
     sql << "SET idle_in_transaction_session_timeout TO " +
                std::to_string(patience_s * of_patience_ms);
-    // Who waited for a lock sees what the other did.
+    // A program that waited for a lock sees the changes of the other.
     sql << "SET SESSION CHARACTERISTICS AS TRANSACTION ISOLATION LEVEL READ COMMITTED";
-    // What is committed is on the disk, whatever the server is told to do otherwise.
+    // Committed data is on the disk, regardless of the server's settings.
     sql << "SET synchronous_commit TO on";
     return;
   }
-  // What is committed is on the disk, its folder too: without it a power cut could bring the
-  // journal back and take a run away; a second connection sees runs whole.
+  // Committed data is on the disk, including its folder. Otherwise a power failure could restore
+  // the journal and remove a run. A second connection sees complete runs.
   sql << "PRAGMA synchronous = EXTRA";
   sql << "PRAGMA foreign_keys = ON";
 }
@@ -61,7 +61,8 @@ void open(soci::session& sql, const std::string& where) {
   }
 }
 
-/// Whether another try may do: another program holds a lock, or the file cannot be opened or read.
+/// Returns true if a later attempt can succeed: another program holds a lock, or the file cannot be
+/// opened or read.
 bool may_pass(const soci::soci_error& error) {
   if (const auto* file = dynamic_cast<const soci::sqlite3_soci_error*>(&error)) {
     constexpr int without_extension = 0xff;
@@ -75,22 +76,22 @@ bool may_pass(const soci::soci_error& error) {
          (server->sqlstate() == lock_not_available || server->sqlstate() == deadlock_detected);
 }
 
-/// Returns true if the server's user may not do what was asked for.
+/// Returns true if the server's user lacks the right for the statement.
 bool lacks_rights(const soci::soci_error& error) {
   const auto* server = dynamic_cast<const soci::postgresql_soci_error*>(&error);
   constexpr const char* insufficient_privilege = "42501";
   return server != nullptr && server->sqlstate() == insufficient_privilege;
 }
 
-/// Ends a connection on which nothing was heard for so long: libpq waits for the answer of a server
-/// that is frozen for ever, and what limits the server sets itself are frozen with it.
+/// Closes a connection without progress for patience_s(). libpq waits forever for a frozen server,
+/// which does not apply its own limits either.
 class Watch {
  public:
   Watch(soci::session& sql, int patience_s) : patience_(patience_s) {
     if (patience_s <= 0 || sql.get_backend_name() != "postgresql") return;
     const auto* server = static_cast<soci::postgresql_session_backend*>(sql.get_backend());
-    // Of its own: libpq closes its socket when the connection is lost, and another may get the
-    // number.
+    // Own descriptor: libpq closes its socket when the connection is lost, and its number can be
+    // reused.
     socket_ = ::fcntl(PQsocket(server->conn_), F_DUPFD_CLOEXEC, 0);
     if (socket_ >= 0) thread_ = std::thread([this] { wait(); });
   }
@@ -107,7 +108,7 @@ class Watch {
   Watch(const Watch&) = delete;
   Watch& operator=(const Watch&) = delete;
 
-  /// From now on again.
+  /// Restarts the time limit.
   void heard() {
     const std::lock_guard lock(mutex_);
     last_ = Clock::now();
@@ -150,10 +151,11 @@ struct Records::Database {
   int patience_s = 0;
   soci::session sql;
 
-  /// Tables are there; from then on a connection that was lost is made again.
+  /// True if the tables exist; from then on a lost connection is opened again.
   bool ready = false;
 
-  /// Throws why there is no connection. A server that took its time is not asked whether it exists.
+  /// Throws the reason of a failed connection. A server that took longer than 2 s counts as
+  /// unreachable.
   [[noreturn]] void throw_not_connected(std::string what,
                                         std::chrono::steady_clock::time_point begun) const {
     const std::string soci = "Cannot establish connection to the database. ";
@@ -165,7 +167,7 @@ struct Records::Database {
         name, "the server of the records answers, but refuses 'records' as it is: " + what);
   }
 
-  /// Errors name the database.
+  /// Runs an action; its errors name the database.
   template <typename Action>
   auto named(const Action& action) {
     const auto begun = std::chrono::steady_clock::now();
@@ -189,7 +191,8 @@ struct Records::Database {
     }
   }
 
-  /// The action may be done twice. It takes the watch, to tell of what it hears in between.
+  /// Runs an action, a second time after a lost connection. The action reports its progress to the
+  /// watch.
   template <typename Action>
   auto run(const Action& action, int times_the_patience = 1) {
     return named([&] {
@@ -198,8 +201,7 @@ struct Records::Database {
       } catch (const soci::soci_error&) {
         if (!ready || sql.is_connected()) throw;
       }
-      // A unit takes its minutes: meanwhile the server was started anew, or the network fell
-      // asleep.
+      // A unit takes minutes, in which the server can restart or the network can fail.
       sql.reconnect();
       return watched(
           [&](Watch& watch) {
@@ -227,9 +229,9 @@ struct Records::Database {
 
 namespace {
 
-/// Times the patience: the server gathers them before it sends the first.
+/// Factor of the time limit for many rows: the server collects them before it sends the first one.
 constexpr int kManyRows = 10;
-/// The same; an hour, where the patience is not said, for an index of all images there are.
+/// Factor of the time limit for tables: an hour by default, for an index of all images.
 constexpr int kAllTables = 360;
 
 bool same_texts(const RunRecord& a, const RunRecord& b) {
@@ -268,7 +270,7 @@ void put_images(soci::session& sql, const RunRecord& record, Watch& watch) {
   }
 }
 
-/// Those that are not kept yet; what they add to the trail.
+/// Stores the new events. Returns their contents for the trail.
 std::vector<TrailContent> put_events(soci::session& sql, const RunRecord& record, Watch& watch) {
   std::vector<TrailContent> added;
   for (const RunEvent& event : record.events) {
@@ -284,7 +286,7 @@ std::vector<TrailContent> put_events(soci::session& sql, const RunRecord& record
   return added;
 }
 
-/// Of a run of a query.
+/// Condition for a run in a query.
 const std::string kNotVoided =
     "NOT EXISTS (SELECT 1 FROM events WHERE events.run = runs.run AND events.what = 'voided')";
 
@@ -309,8 +311,8 @@ void bind(soci::statement& statement, const RunFilter& filter) {
   }
 }
 
-/// The rows that a query gives, each into the parts of `row`; `figure` is bound after the filter,
-/// unless it is empty.
+/// Returns the rows of a query, with its columns in the members of `Row`; a non-empty `figure` is
+/// bound after the filter.
 template <typename Row>
 std::vector<Row> rows_of(soci::session& sql, const std::string& query, const RunFilter& filter,
                          const std::string& figure, std::initializer_list<std::string Row::*> texts,
@@ -381,7 +383,7 @@ void Records::keep(const RunRecord& record) {
   database_->run([&](Watch& watch) {
     soci::session& sql = database_->sql;
     soci::transaction transaction(sql);
-    // Writes first, so that it waits for others before it has read anything.
+    // Writes first, so that the transaction waits for others before it reads.
     soci::statement insert(sql);
     std::string columns, places;
     for (const auto& [name, text, label, in_csv] : run_fields()) {
@@ -405,7 +407,7 @@ void Records::keep(const RunRecord& record) {
       throw InputError(database_->name, "has another run " + record.run);
     }
     for (TrailContent& event : put_events(sql, record, watch)) added.push_back(std::move(event));
-    // Last: all stations that share the records wait for it.
+    // Last, because all stations that share the records wait for it.
     append_to_trail(sql, added);
     transaction.commit();
   });
@@ -526,7 +528,7 @@ TrailCheck Records::check(const std::string& noted) {
       [&](Watch& watch) {
         soci::session& sql = database_->sql;
         soci::transaction transaction(sql);
-        // Of one moment, whatever others keep meanwhile; a transaction of SQLite is.
+        // Consistent snapshot despite concurrent writers; transactions of SQLite always have one.
         if (sql.get_backend_name() == "postgresql") {
           sql << "SET TRANSACTION ISOLATION LEVEL REPEATABLE READ";
         }

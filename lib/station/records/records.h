@@ -15,29 +15,30 @@
 
 namespace vlp {
 
-/// Which runs; what is empty is not asked for.
+/// Selection of runs. Empty members do not restrict it.
 struct RunFilter {
   std::string camera, station, verdict, kind;
   /// Operator and shift of the run.
   std::string operator_name = {}, shift = {};
-  /// Those that ended at this UTC or later, and before that one, as 2026-11-21 or 2026-11-21T13:45.
+  /// End of the run: at or after `since`, and before `until`, UTC, as 2026-11-21 or
+  /// 2026-11-21T13:45.
   std::string since = {}, until = {};
-  /// The last ones; 0 for all.
+  /// Maximum number of runs, the latest ones; 0 for all.
   int last = 0;
 };
 
-/// What is wrong with such a UTC, 2026-11-21T13:45:01Z or its beginning from the day on; empty when
-/// nothing is.
+/// Returns the problem of a UTC of a filter: 2026-11-21T13:45:01Z, or a prefix that includes the
+/// day. Empty if it is valid.
 std::string utc_problem(const std::string& text);
 
-/// A run as it is listed.
+/// Run in a list.
 struct RunSummary {
   std::string run, kind, station, camera, ended_utc, verdict, causes;
-  /// Why it was voided; empty when it was not.
+  /// Reason for voiding it; empty if it is not voided.
   std::string voided = {};
 };
 
-/// A figure of one run.
+/// Metric of one run.
 struct TrendPoint {
   std::string run, station, camera, verdict, ended_utc;
   double value;
@@ -45,7 +46,7 @@ struct TrendPoint {
 
 std::vector<double> values_of(std::span<const TrendPoint> points);
 
-/// The last so many of what is in order; all of it for 0.
+/// Returns the last `last` elements of `rows`; all of them if `last` is 0.
 template <typename Row>
 std::vector<Row> last_of(std::vector<Row> rows, int last) {
   const auto kept = static_cast<std::size_t>(last);
@@ -55,28 +56,36 @@ std::vector<Row> last_of(std::vector<Row> rows, int last) {
   return rows;
 }
 
-/// Records that give no answer, refuse the connection or their user, or are locked: a later try may
-/// do.
+/// Error if records do not respond, refuse the connection or its user, or are locked. A later
+/// attempt can succeed.
 class RecordsAway : public InputError {
  public:
   using InputError::InputError;
 };
-/// Records that answer but refuse access: somebody has to mend `records` or the server.
+/// Error if records respond but refuse access: the setting `records` or the server has to be
+/// corrected.
 class RecordsRefused : public RecordsAway {
  public:
   using RecordsAway::RecordsAway;
 };
 
-/// The records of one or more stations in a database: a file of SQLite, or PostgreSQL by a
-/// connection string postgresql://... Tables are made when they are not there, those of an earlier
-/// version brought up to date; of a later one they are refused. Any number of programs may use it
-/// at once: each run is written in one transaction, which waits for another's, with its entries in
-/// the trail (trail.h). What is kept is on
-/// the disk. A connection that was lost is made again. All throw InputError that names the
-/// database, but no password; it is RecordsAway when the server cannot be reached, or answers but
-/// refuses the connection (a wrong password, no such database, no TLS), which it says, the file
-/// cannot be opened, another program holds a lock, or no answer came for patience_s(), ten times as
-/// long where many runs are asked for, 360 times where tables are made or brought up to date.
+/// Records of one or more stations in a database: an SQLite file, or PostgreSQL by a connection
+/// string postgresql://...
+///
+/// Missing tables are created and tables of earlier versions migrated; later versions are an error.
+/// Any number of programs may use a database at the same time. Each run is written in one
+/// transaction, together with its entries in the trail (trail.h). A transaction waits for those of
+/// other programs. Committed data is on the disk. A lost connection is opened again.
+///
+/// All functions throw InputError that names the database, without passwords. The error is
+/// RecordsAway if
+/// - the server cannot be reached,
+/// - the server refuses the connection (wrong password, no such database, no TLS), which the
+///   message states,
+/// - the file cannot be opened,
+/// - another program holds a lock, or
+/// - the time limit expired: patience_s(), 10 times that for queries of many runs, 360 times that
+///   for creating or migrating tables.
 class Records {
  public:
   explicit Records(const std::string& where);
@@ -84,31 +93,31 @@ class Records {
   Records(const Records&) = delete;
   Records& operator=(const Records&) = delete;
 
-  /// Keeps a run, whole or not at all. One that is kept already stays as it is, but gets the events
-  /// that it does not have; another of its name is refused.
+  /// Stores a run atomically. A stored run is not changed but gets the events that it lacks. A
+  /// different run of the same id is an error.
   void keep(const RunRecord& record);
-  /// All of one run; nothing when it is not kept.
+  /// Returns a complete run; std::nullopt if no run has this id.
   std::optional<RunRecord> find(const std::string& run);
-  /// Throws InputError when no run could be kept now.
+  /// Throws InputError if runs cannot be stored now.
   void check_writable();
-  /// Returns the first run of another camera, not voided, that uses an image of
-  /// this digest; an empty string if there is none.
+  /// Returns the first run of another camera, not voided, that uses an image of this digest; empty
+  /// if none does.
   ImageOwner owner_of(const std::string& sha256, const std::string& other_than_camera);
   /// Returns the judged runs of a unit, not voided, that use an image of this digest, the earliest
   /// first.
   std::vector<std::string> judged_runs_with(const std::string& sha256, const std::string& camera);
-  /// The first judged run of a golden unit that uses an image of this digest; empty when there is
-  /// none.
+  /// Returns the first judged run of a golden unit that uses an image of this digest; empty if none
+  /// does.
   std::string golden_run_of(const std::string& sha256);
-  /// The runs of this station, or of all when it is empty, whose hook is open (hook_is_open()),
-  /// from the first to the last.
+  /// Returns the runs of this station with an open hook (hook_is_open()), in chronological order;
+  /// those of all stations if `station` is empty.
   std::vector<std::string> with_open_hook(const std::string& station);
-  /// From the first to the last.
+  /// Returns the runs that match the filter, in chronological order.
   std::vector<RunSummary> list(const RunFilter& filter);
-  /// Without runs that were voided.
+  /// Returns the values of a metric in the runs that match the filter, without voided runs.
   std::vector<TrendPoint> trend(const std::string& figure, const RunFilter& filter);
-  /// Whether all that is kept is as it was kept, by the trail (trail.h). `noted`: the last digest
-  /// of an earlier check, which the trail has to have still, or empty.
+  /// Checks by the trail (trail.h) that the records are unchanged. `expected_digest` is the last
+  /// digest of an earlier check, which the trail must still contain, or empty.
   TrailCheck check(const std::string& noted);
 
  private:

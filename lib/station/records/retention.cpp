@@ -27,7 +27,7 @@ constexpr std::size_t kRunLength = 33;  // of new_run()
 
 bool is_older(const std::string& utc, int days) {
   constexpr double seconds_per_day = 86'400;
-  return seconds_since(utc) > days * seconds_per_day;  // not for what is no time
+  return seconds_since(utc) > days * seconds_per_day;  // false for an invalid time
 }
 
 std::vector<fs::path> folders_in(const fs::path& folder) {
@@ -58,7 +58,7 @@ std::uintmax_t bytes_in(const fs::path& folder) {
 /// Returns true if a file is opened through a folder: by its name, or by a link on the way. Returns
 /// true as well if a link cannot be followed, so that a folder in doubt is kept.
 bool leads_through(const fs::path& file, const fs::path& folder) {
-  constexpr int max_links = 40;  // as the system has it
+  constexpr int max_links = 40;  // as in the kernel
   std::error_code error;
   const fs::path absolute = fs::absolute(file, error);
   if (error) return true;
@@ -94,7 +94,7 @@ bool is_in_use(const fs::path& folder, const StationConfig& config) {
   std::vector<fs::path> needed = config.inputs;
   needed.insert(needed.end(), {config.spool, config.captures, config.results});
   if (!is_server(config.records)) needed.emplace_back(config.records);
-  if (config.hook) {  // its arguments may be files, such as the script of an interpreter
+  if (config.hook) {  // its arguments can be files, such as the script of an interpreter
     for (const std::string& word : config.hook->command) {
       if (!word.empty()) needed.push_back(config.hook->folder / word);
     }
@@ -104,7 +104,7 @@ bool is_in_use(const fs::path& folder, const StationConfig& config) {
   });
 }
 
-/// A folder that is named by this camera and run.
+/// Makes an entry for a folder that is named by this camera and run.
 void add_if_expired(Retained& found, Records& records, const StationConfig& config,
                     const fs::path& folder, const std::string& camera, const std::string& run,
                     const char* what, int days) {
@@ -127,8 +127,8 @@ SharedFolder open_existing(const SharedFolder& parent, const Id& name) {
   return std::move(*found);
 }
 
-/// Opens the folder that an expired one is in, from the folder that station.yaml names, so that no
-/// link is followed.
+/// Opens the folder that contains an expired one, starting at the folder named in station.yaml,
+/// without following links.
 SharedFolder open_parent(const ExpiredFolder& expired, const StationConfig& config) {
   if (expired.what == std::string_view(kImagesDeleted)) return SharedFolder(config.captures);
   return open_existing(SharedFolder(config.results),

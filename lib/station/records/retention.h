@@ -12,41 +12,42 @@
 
 namespace vlp {
 
-/// A folder of a run that is kept no longer.
+/// Folder of a run whose retention time has expired.
 struct ExpiredFolder {
   std::filesystem::path folder;
-  /// kImagesDeleted or kResultsDeleted, once it is.
+  /// Event after its deletion: kImagesDeleted or kResultsDeleted.
   const char* what;
-  /// As long as it is kept.
+  /// Retention time, days.
   int days;
   std::uintmax_t bytes;
   RunRecord run;
 };
 
 struct Retained {
-  /// By name, images first.
+  /// Folders to delete, by name, images first.
   std::vector<ExpiredFolder> expired;
-  /// As old, but of no run of the records: left.
+  /// Folders of the same age without a run in the records; not deleted.
   std::vector<std::filesystem::path> without_record;
-  /// As old, but with something in them that station.yaml names: left.
+  /// Folders of the same age that contain files named in station.yaml; not deleted.
   std::vector<std::filesystem::path> in_use;
 };
 
-/// What of a station's runs is kept no longer, by StationConfig::keep and the end of each run as
-/// the records have it: images that were put away, CAPTURES/CAMERA.RUN, and results,
-/// RESULTS/CAMERA/RUN. What has another name, such as images that still arrive, is not looked at,
-/// nor are runs of other stations and symbolic links.
+/// Finds the folders of a station's runs whose retention time has expired, by StationConfig::keep
+/// and the end of each run in the records. The folders are those of images, CAPTURES/CAMERA.RUN,
+/// and of results, RESULTS/CAMERA/RUN. Ignores other names, such as folders in which images still
+/// arrive, runs of other stations, and symbolic links.
 Retained look_for_expired(const StationConfig& config, Records& records);
 
-/// Checks the clock, because by one that is years ahead all runs are expired. Throws InputError if
-/// the newest run of the station ended after the clock's time, or more than a year before it, and
-/// if the runs of less than seven days ended more than a year after those before. Ignores voided
-/// runs. Detects no clock by which runs were recorded for longer than these days.
+/// Checks the clock, because all runs appear expired if it is years ahead. Ignores voided runs. Throws
+/// InputError if the newest run of the station ended after the clock's time or more than a year
+/// before it, or if the runs of the last seven days ended more than a year after the previous ones.
+/// A wrong clock with which runs were recorded for more than seven days is not detected.
 void check_clock(const StationConfig& config, Records& records);
 
-/// Deletes the folder of a run; links below `config.captures` and `config.results` are not
-/// followed. Its record tells of it as soon as nothing is in the folder, which goes last, so that a
-/// program that is killed before it has told of it finds the folder again. Throws InputError.
+/// Deletes the folder of a run, without following links below `config.captures` and
+/// `config.results`. The event is recorded when the folder is empty, and the folder itself is
+/// deleted last. A program that is killed before the event is recorded therefore finds the folder
+/// again. Throws InputError.
 void delete_expired(const ExpiredFolder& expired, const StationConfig& config, Spool& spool);
 
 }  // namespace vlp

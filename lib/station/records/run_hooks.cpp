@@ -26,7 +26,7 @@ HooksRun run_open_hooks(
   for (const std::string& run : runs) {
     const HookLock lock(spool.folder(), run);
     auto record = spool.find(run);
-    // Another program may have done it meanwhile.
+    // Another program can have called it.
     if (!record || !hook_is_open(*record)) continue;
     if (!lock.held()) {
       tell(*record, "is being run");

@@ -11,15 +11,15 @@
 
 namespace vlp {
 
-/// Runs the hook of a run that is kept, and keeps what became of it, as another event of the run.
-/// Why that is not recorded; empty when it is. A verdict is a verdict without it.
+/// Runs the hook of a stored run and records the result as another event of the run. Returns the
+/// reason why the event is not recorded; empty if it is. The verdict is valid without the event.
 std::string call_hook(const Hook& hook, RunRecord& record, const HookLock& lock, Spool& spool);
 
 struct HooksRun {
   std::size_t runs = 0, failed = 0;
 };
-/// Runs the hooks of the station's runs again that have not ended well, one after the other, and
-/// tells what became of each, why that is not recorded, or that another program runs it now.
+/// Runs the open hooks of the station's runs again, sequentially. Calls `report` with each result,
+/// with the reason why it is not recorded, or with a note that another program is running the hook.
 /// Precondition: the station has a hook.
 HooksRun run_open_hooks(
     const StationConfig& config, Spool& spool,

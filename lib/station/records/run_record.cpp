@@ -32,14 +32,14 @@ std::string utc_of(std::time_t time, const char* format) {
   return {text, std::strftime(text, sizeof text, format, &parts)};
 }
 
-/// By the one clock of this file: std::time() lags behind it by a tick of the kernel.
+/// Returns the time of the clock of this file: std::time() lags behind it by a tick of the kernel.
 std::time_t now_s() {
   return std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
 }
 
 std::string utc(const char* format) { return utc_of(now_s(), format); }
 
-/// The account that runs this program, and its machine.
+/// Returns the account that runs this program, and its machine.
 std::string account() {
   const passwd* user = ::getpwuid(::geteuid());
   return fmt::format("{}@{}", user != nullptr ? user->pw_name : std::to_string(::geteuid()),

@@ -14,18 +14,18 @@
 
 namespace vlp {
 
-/// What became of a run after its verdict. Events are added to a run, never changed nor taken away.
+/// Event of a run after its verdict. Events are only added, never changed or removed.
 struct RunEvent {
-  /// Unique, in the order of time: 20261121T134501.123456Z-01234567.
+  /// Unique id that sorts chronologically: 20261121T134501.123456Z-01234567.
   std::string event;
-  /// One of those below.
+  /// Kind of the event: one of the constants below.
   std::string what;
-  /// Why, or what came of it, for people.
+  /// Reason or result, human-readable.
   std::string text;
-  /// Who: the operator, where it was said, and the account and machine of the program.
+  /// Operator, if given, with account and machine of the program.
   std::string who = {};
 
-  /// As 2026-11-21T13:45:01Z.
+  /// Returns the time of the event, as 2026-11-21T13:45:01Z.
   std::string utc() const;
 };
 inline constexpr const char *kHookWanted = "hook wanted", *kHookDone = "hook done",
@@ -33,43 +33,44 @@ inline constexpr const char *kHookWanted = "hook wanted", *kHookDone = "hook don
                             *kResultsDeleted = "results deleted", *kVoided = "voided",
                             *kUnchecked = "unchecked";
 
-/// One of now, by this program's account, as "Ann (vlp@station-7)" where an operator is known.
+/// Makes an event of the current time. RunEvent::who is this program's account, or "Ann
+/// (vlp@station-7)" with an operator.
 RunEvent new_event(const std::string& what, const std::string& text,
                    const std::string& operator_name = "");
 
-/// All that is kept of a run.
+/// Record of a run.
 struct RunRecord {
-  /// Unique over all stations, see new_run().
+  /// Unique id over all stations (new_run()).
   std::string run;
   /// "unit", or "golden" for the station's reference camera.
   std::string kind;
   std::string station, camera;
-  /// Who measured, and in which shift, where it was said.
+  /// Operator and shift, if given.
   std::string operator_name, shift;
   /// As 2026-11-21T13:45:01Z.
   std::string begun_utc, ended_utc;
-  /// name_of() a Verdict, and why, one cause to a line, the root first.
+  /// Verdict (name_of()), and its causes, one per line, the primary cause first.
   std::string verdict, causes;
-  /// Program with version, and the libraries that the result rests on with theirs.
+  /// Program with its version, and the libraries that affect the result with their versions.
   std::string program, libraries;
   std::string config_sha256;
-  /// calibration.yaml as far as it came; may be empty.
+  /// Content of calibration.yaml of the completed steps; can be empty.
   std::string calibration;
   std::vector<CheckedMetric> figures;
   struct Image {
     std::string step, name, sha256;
-    /// Why it was not used; empty when it was.
+    /// Reason why the image was not used; empty if it was.
     std::string refused;
   };
   std::vector<Image> images;
-  /// From the first to the last.
+  /// Events, in chronological order.
   std::vector<RunEvent> events;
 
   bool passed() const { return verdict == name_of(Verdict::pass); }
   bool invalid() const { return verdict == name_of(Verdict::invalid); }
-  /// Why it did not pass, in a line; empty when it did.
+  /// Returns the first cause, in one line; empty if the run passed.
   std::string first_cause() const { return causes.substr(0, causes.find('\n')); }
-  /// Sets verdict and causes.
+  /// Sets verdict and causes from `why`, the most important cause first.
   void judge(const std::vector<Cause>& why);
 };
 
@@ -90,53 +91,55 @@ std::string describe_owner(const ImageOwner& owner, const std::filesystem::path&
 /// Returns true if `run` uses images, and `earlier` used all of them; both of one camera.
 bool repeats_images(const RunRecord& run, const RunRecord& earlier);
 
-/// The event that voided a run; null when it was not.
+/// Returns the event that voided a run; null if it is not voided.
 const RunEvent* voided(const RunRecord& record);
 
-/// Why the verdict of a record is none: the run was voided, or it says what cannot be in one as it
-/// was written, PASS though a gate is not met, or for a cause, so that somebody has changed it.
-/// Empty when it is one.
+/// Returns the reason why the verdict of a record is not valid; empty if it is valid. The verdict
+/// is not valid if the run was voided, or if it is PASS despite a failed gate or a cause. The
+/// latter shows that the record was edited.
 std::string why_no_verdict(const RunRecord& record);
 
-/// A text of a record: a column of the table of runs and a key of their JSON.
+/// Text member of a record: a column of the table of runs and a key of its JSON.
 struct RunField {
   const char* name;
   std::string RunRecord::*text;
-  /// With which `show` has it among the last lines; without one it stands elsewhere or not at all.
+  /// Label in the last lines of `show`; null if `show` prints the text elsewhere or not at all.
   const char* label = nullptr;
-  /// A column of the CSV of runs; in JSON, too, it is brought on one line.
+  /// True if the CSV of runs has a column for it. Such a text is a single line in JSON, too.
   bool in_csv = true;
 };
 
-/// All texts of a record, in order. A new one is a member of RunRecord, a line in run_fields(),
-/// what fills it, new_record() or the program, and a migration in record_tables.cpp.
+/// Returns all text members of a record, in order. A new text requires a member of RunRecord, an
+/// entry in run_fields(), code that sets it (new_record() or the program), and a migration in
+/// record_tables.cpp.
 std::span<const RunField> run_fields();
 
-/// A name for a run that begins now: the time and 16 random hexadecimal digits,
-/// 20261121T134501Z-0123456789abcdef.
+/// Returns the id of a run that starts now, 20261121T134501Z-0123456789abcdef: UTC and 16 random
+/// hexadecimal digits.
 std::string new_run();
 /// Returns true if a text has the form of new_run().
 bool is_name_of_run(const std::string& text);
-/// When it began, as 2026-11-21T13:45:01Z; empty for what is no name of a run.
+/// Returns the UTC of the start of a run, as 2026-11-21T13:45:01Z; empty if `run` is no run id.
 std::string begun_utc(const std::string& run);
 std::string now_utc();
-/// Since a UTC as 2026-11-21T13:45:01Z; below 0 for one to come, NaN for what is none.
+/// Returns the time since a UTC as 2026-11-21T13:45:01Z, s: negative for a future time, NaN for an
+/// invalid text.
 double seconds_since(const std::string& utc);
 
-/// Returns the run with each text as a terminal, a report and the spool take it: printable(), and
-/// printable_line() for who measured, names of images and events.
+/// Returns the run with texts that are safe for terminals, reports and the spool: printable(), and
+/// printable_line() for operators and for names of images and events.
 RunRecord printable_run(RunRecord run);
 
-/// Returns the cause that makes a run INVALID whose clock went back; an empty string if the run
-/// ended after it began.
+/// Returns the cause INVALID of a run whose end is before its start, because the clock was set
+/// back; empty if there is none.
 std::string clock_problem(const RunRecord& run);
 
-/// What is alike in the record of a unit and of a golden one that ends now: all but the verdict,
-/// what it rests on, and who measured.
+/// Makes the common part of the records of units and golden units for a run that ends now: all
+/// members except verdict, inputs and operator.
 RunRecord new_record(const char* kind, const StationConfig& config, const std::string& camera,
                      const std::string& run, const ProgramVersion& program);
 
-/// OpenCV, Ceres, mrcal and so on, each with its version.
+/// Returns OpenCV, Ceres, mrcal and other libraries with their versions.
 std::string library_versions();
 
 }  // namespace vlp

@@ -11,10 +11,10 @@
 
 namespace vlp {
 
-/// The texts of a run (run_fields()) from the tables of the present version; nothing when it is
-/// not kept. All here throw soci::soci_error.
+/// Loads the texts of a run (run_fields()) from tables of the current version; std::nullopt if no
+/// run has this id. All functions of this header throw soci::soci_error.
 std::optional<RunRecord> texts_of_run(soci::session& sql, const std::string& run);
-/// All of a run; nothing when it is not kept.
+/// Loads a run with its metrics, images and events; std::nullopt if no run has this id.
 std::optional<RunRecord> rows_of_run(soci::session& sql, const std::string& run);
 
 }  // namespace vlp

@@ -31,7 +31,7 @@ using Clock = std::chrono::steady_clock;
 constexpr const char* kRunFormat = "vlp-run/1";
 constexpr const char* kRunEnding = ".json";
 constexpr std::size_t kMostRunBytes = 64 << 20;
-/// Of a run of hundreds of images, several times over.
+/// Several times the size of a run of hundreds of images.
 constexpr std::uintmax_t kRoom_bytes = 1'000'000;
 
 std::optional<double> number_if_any(const Json& json) {
@@ -77,14 +77,14 @@ SpooledRun run_from(const Json& json) {
   return spooled;
 }
 
-/// With another event another file: programs that bring the one before to the records take away no
-/// other.
+/// Returns the file name of a run. It changes with each event: a program that delivers an earlier
+/// version does not remove a later one.
 std::string file_name(const RunRecord& run) {
   const std::string last = run.events.empty() ? "" : "." + run.events.back().event;
   return run.run + last + kRunEnding;
 }
 
-/// The run of several files, with the events of all.
+/// Adds a run, merging the events of its files.
 void add_run(std::vector<RunRecord>& runs, const RunRecord& run) {
   if (runs.empty() || runs.back().run != run.run) {
     runs.push_back(run);
@@ -108,7 +108,7 @@ std::vector<fs::path> entries_of(const fs::path& folder, std::error_code& error)
   return entries;
 }
 
-/// Temporary files of programs that were killed, a day ago or longer: nobody writes them any more.
+/// Removes temporary files older than a day, which are those of killed programs.
 void remove_left_over(const fs::path& folder) {
   constexpr std::chrono::hours a_day(24);
   std::error_code error;
@@ -126,8 +126,8 @@ bool uses(const RunRecord& run, const std::string& sha256) {
   });
 }
 
-/// Returns what the operator has to know of records that are away; an empty string if only the
-/// error says what to do.
+/// Returns the operator's message about offline records; empty if only the error contains the
+/// remedy.
 std::string notice_of(const InputError& error) {
   if (dynamic_cast<const RecordsRefused*>(&error) != nullptr) {
     return "records are offline (access refused)";
@@ -195,7 +195,7 @@ void Spool::open() {
   records_ = std::make_unique<Records>(where_);
 }
 
-/// Why it was not done; empty when it was.
+/// Runs an action on the records. Returns the reason if it failed; empty on success.
 template <typename Action>
 std::string Spool::ask(const Action& action) {
   try {
@@ -242,7 +242,7 @@ void Spool::keep(const RunRecord& run) {
   try {
     make_folder(folder_);
     const std::string name = file_name(run);
-    known_.erase(folder_ / name);  // another, maybe, of the same name
+    known_.erase(folder_ / name);  // possibly a different run of the same name
     SharedFolder(folder_).replace(name, text_of_run({run, name_}));
   } catch (const InputError& error) {
     const std::string refused = ask([&](Records& records) { records.keep(run); });
@@ -267,7 +267,7 @@ void Spool::deliver() {
     SpooledRun spooled;
     try {
       spooled = read_run(file);
-    } catch (const InputError&) {  // state() tells of it
+    } catch (const InputError&) {  // reported by state()
       continue;
     }
     if (spooled.records != name_) continue;
@@ -339,7 +339,7 @@ std::vector<fs::path> Spool::files() {
     problem_ = folder_.string() + ": cannot be read: " + error.message();
   }
   std::erase_if(files, [](const fs::path& file) {
-    // Not the temporary file of one that is being written.
+    // Skips the temporary file of a run that is being written.
     return file.extension() != kRunEnding || file.filename().string().starts_with('.');
   });
   std::sort(files.begin(), files.end());
@@ -357,7 +357,7 @@ void Spool::read() {
     try {
       known_.emplace(file, read_run(file));
     } catch (const InputError& error) {
-      // Another program may have brought it to the records.
+      // Another program can have delivered it.
       std::error_code gone;
       if (fs::exists(file, gone)) unread_ = error.what();
     }
@@ -391,7 +391,7 @@ std::vector<std::string> Spool::with_open_hook(const std::string& station) {
   std::set<std::string> runs(kept.begin(), kept.end());
   for (const RunRecord& run : waiting()) {
     if (!station.empty() && run.station != station) continue;
-    // What waits is newer.
+    // Waiting runs are newer.
     if (hook_is_open(run)) {
       runs.insert(run.run);
     } else {
@@ -419,7 +419,7 @@ std::optional<std::string> Spool::repeated_run_of(const RunRecord& run) {
   const auto first = std::find_if(run.images.begin(), run.images.end(),
                                   [](const auto& image) { return image.refused.empty(); });
   if (first == run.images.end()) return "";
-  std::set<std::string> voided_runs;  // which the records may not know yet
+  std::set<std::string> voided_runs;  // possibly not yet voided in the records
   for (const RunRecord& earlier : waiting()) {
     if (voided(earlier) != nullptr) {
       voided_runs.insert(earlier.run);

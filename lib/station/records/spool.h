@@ -15,67 +15,75 @@
 
 namespace vlp {
 
-/// A run and the records that it is for, as identity_of_database() has them.
+/// Run and identity_of_database() of the records that it belongs to.
 struct SpooledRun {
   RunRecord run;
   std::string records;
 };
 
-/// A station's runs on their way to its records, which need not be there: each waits, whole, as a
-/// file of the spool, RUN.json, or RUN.EVENT.json with what became of it (`vlp-run/1`), until the
-/// records have it that it is for; it goes into no others (identity_of_database), so that stations
-/// with other records may share a folder. Nothing is lost, whatever is killed and when: a file
-/// appears as a whole and goes when the run is committed. Nothing is twice: records keep a run by
-/// its name, once. Any number of programs may use a spool at once. Records that did not answer are
-/// left alone for a minute, so that a unit waits for them once.
+/// Queue of a station's runs that are to be delivered to its records, which may be offline.
+///
+/// Each run waits as a complete file of the spool: RUN.json, or RUN.EVENT.json with later events
+/// (`vlp-run/1`). It is delivered only to the records that it belongs to (identity_of_database()),
+/// so that stations with different records can share a folder.
+///
+/// No run is lost if a program is killed at any time. Files are written atomically and removed
+/// after the run is committed. No run is stored twice, because records store a run once by its id.
+/// Any number of programs may use a spool at the same time. Records that did not answer are not
+/// contacted for a minute, so that a unit waits for them once.
 class Spool {
  public:
-  /// The folder is made when it is needed. `records` is as Records takes it; nothing is reached for
-  /// yet. Throws InputError when it is no connection string.
+  /// Opens a spool. The folder is created when needed, and nothing is contacted yet. `records` is
+  /// as in Records. Throws InputError if it is no connection string.
   Spool(std::filesystem::path folder, std::string records);
   ~Spool();
   Spool(const Spool&) = delete;
   Spool& operator=(const Spool&) = delete;
 
-  /// Before the first image: throws InputError when no run could be kept in the folder. Records
-  /// that are away or cannot be written are no error, see state(); those that another try does not
-  /// open, of a later version or no database, are. This alone makes a database that is not there:
-  /// elsewhere it may be on a share that is not mounted.
+  /// Checks before the first image that runs can be stored. Throws InputError if the folder is not
+  /// writable. Offline or read-only records are no error (state()). Throws for errors that do not
+  /// disappear by themselves: tables of a later version, or a file that is no database. Only this
+  /// function creates a missing database, because a file can also be missing if its share is not
+  /// mounted.
   void prepare();
-  /// Keeps a run in the folder, again when it has another event; where that cannot be written, in
-  /// the records. Throws InputError when neither can be.
+  /// Stores a run in the folder, as another file if it has a new event. If the folder cannot be
+  /// written, the run goes directly into the records. Throws InputError if both fail.
   void keep(const RunRecord& run);
-  /// Brings what waits to the records, from the first to the last. It begins no other run after ten
-  /// seconds, so that a backlog keeps nobody waiting, nor after records that are away. A run that
-  /// the records refuse holds up no other.
+  /// Delivers the waiting runs to the records, in chronological order. Starts no further run after
+  /// ten seconds, so that a backlog delays no caller, and none when the records are offline. A run
+  /// that the records reject does not block the others.
   void deliver();
-  /// "kept here, 3 waiting: WHY", or why the records are away; how many are here for other records;
-  /// a file that cannot be read; how many digests were looked for here only. Empty when
-  /// there is nothing to tell.
+  /// Returns a message about the spool; empty if there is nothing to report. The message can
+  /// contain
+  /// - "kept here, 3 waiting: WHY", or the reason why the records are offline,
+  /// - the number of runs for other records,
+  /// - a file that cannot be read,
+  /// - the number of digests that were not compared with the records.
   std::string state();
-  /// Returns state() for the operator, in one line: "records are offline; 1 run kept, delivered
-  /// automatically" in place of why they are away.
+  /// Returns state() for the operator, in one line. The reason why the records are offline is
+  /// replaced by "records are offline; 1 run kept, delivered automatically".
   std::string notice();
-  /// Leaves the records alone for a minute, because of `error`.
+  /// Suspends access to the records for a minute because of `error`.
   void put_off(const InputError& error);
   const std::filesystem::path& folder() const { return folder_; }
-  /// Why the records are away, since they were asked last; empty when they are not.
+  /// Returns the reason why the records were offline at the last access; empty if they were online.
   const std::string& away() const { return away_; }
 
-  /// Those that wait for these records, from the first to the last; without files that are no runs.
+  /// Returns the runs that wait for these records, in chronological order. Skips files that are no
+  /// runs.
   std::vector<RunRecord> waiting();
-  /// A run that waits, for whichever records, or that the records have; nothing, too, when these do
-  /// not answer, see away().
+  /// Returns a run that waits for any records, or that the records contain; otherwise std::nullopt,
+  /// also if the records do not answer (away()).
   std::optional<RunRecord> find(const std::string& run);
-  /// Records::with_open_hook() of those that wait and, when they answer, the records.
+  /// Returns Records::with_open_hook() of the waiting runs and, if online, of the records.
   std::vector<std::string> with_open_hook(const std::string& station);
-  /// Records::owner_of() of those that wait and, when they answer, the records.
+  /// Returns Records::owner_of() of the waiting runs and, if online, of the records.
   ImageOwner owner_of(const std::string& sha256, const std::string& other_than_camera);
   /// Returns the first judged run of the same unit, not voided, that used all images of `run`
-  /// (repeats_images()), of those that wait and of the records; an empty string if there is none.
-  /// Returns std::nullopt if the records do not answer and none that waits is one.
+  /// (repeats_images()). Searches the waiting runs and the records. Returns an empty string if
+  /// there is none, and std::nullopt if the records do not answer and no waiting run matches.
   std::optional<std::string> repeated_run_of(const RunRecord& run);
-  /// Records::golden_run_of() of those that wait and, when they answer, the records.
+  /// Returns Records::golden_run_of() of the waiting runs and, if online, of the records.
   std::string golden_run_of(const std::string& sha256);
 
  private:
@@ -87,31 +95,31 @@ class Spool {
   bool may_ask() const;
   /// Counts the runs that wait for these records.
   std::size_t count_waiting() const;
-  /// Returns `first`, unless it is empty, and what else there is to say: runs for other records,
-  /// files that cannot be read, images that were not looked up.
+  /// Returns `first`, unless it is empty, and further remarks: runs for other records, unreadable
+  /// files, images that were not compared with the records.
   std::string with_remarks(const std::string& first) const;
 
   std::filesystem::path folder_;
-  /// `name_` is what files of runs for these records say.
+  /// Connection string, and its identity_of_database(), which the files of runs contain.
   std::string where_, name_;
   std::unique_ptr<Records> records_;
-  /// Why the records are away; why they did not take a run; a file that read() could not read, or
-  /// that is no run.
+  /// Reason why the records are offline; why they did not accept a run; a file that read() could
+  /// not read, or that contains no run.
   std::string away_, problem_, unread_;
-  /// `away_` for the operator; empty if only `away_` says what to do.
+  /// `away_` for the operator; empty if only `away_` contains the remedy.
   std::string away_notice_;
   std::chrono::steady_clock::time_point ask_again_;
-  /// What read() has found, for these records and for others.
+  /// Runs that read() has found, for these and for other records.
   std::map<std::filesystem::path, SpooledRun> known_;
   std::size_t not_asked_ = 0;
 };
 
-/// All of a run as `vlp-run/1`: a JSON object with "records", the texts of run_fields(), "figures",
-/// with "uncertainty" and "guard_k" where there is a guard band, "images" and "events". Bytes that
-/// are no text stand as printable() has them.
+/// Serializes a run as `vlp-run/1`: a JSON object with "records", the texts of run_fields(),
+/// "figures", "images" and "events". Figures with a guard band have "uncertainty" and "guard_k".
+/// Invalid text is written as by printable().
 std::string text_of_run(const SpooledRun& spooled);
-/// A text of run_fields() that is not there is empty: the program that wrote it did not know it.
-/// Throws InputError with the file, also when it is no run.
+/// Reads a run in the format of text_of_run(). A missing text of run_fields() is empty, as in files
+/// of older programs. Throws InputError with the file, also if it contains no run.
 SpooledRun read_run(const std::filesystem::path& file);
 
 }  // namespace vlp

@@ -16,11 +16,11 @@
 namespace vlp {
 namespace {
 
-/// Texts one after another, so that none can be taken for a part of another.
+/// Concatenation of texts with their lengths, which makes it unambiguous.
 class Digested {
  public:
   void add(std::string_view text) { text_ += fmt::format("{} {}\n", text.size(), text); }
-  /// To the last bit, and in the same digits by every program.
+  /// Adds a number with all bits, in the same digits for every program.
   void add(double number) { add(fmt::format("{:.17g}", number)); }
   std::string sha256() const { return sha256_of_text(text_); }
 
@@ -28,8 +28,8 @@ class Digested {
   std::string text_;
 };
 
-/// Without its events, which have entries of their own. A text that is empty is left out: one that
-/// a later version of the tables adds changes nothing.
+/// Computes the digest of a run without its events, which have their own entries. Skips empty
+/// texts, so that texts added by later versions of the tables do not change it.
 std::string digest_of(const RunRecord& run) {
   Digested content;
   for (const RunField& field : run_fields()) {
@@ -52,7 +52,7 @@ std::string digest_of(const RunRecord& run) {
     content.add(figure.guard->standard_uncertainty);
     content.add(figure.guard->k);
   }
-  // Each database sorts names in its own way.
+  // Databases sort names differently.
   auto images = run.images;
   std::sort(images.begin(), images.end(), [](const auto& a, const auto& b) {
     return std::tie(a.step, a.name) < std::tie(b.step, b.name);
@@ -74,7 +74,7 @@ std::string digest_of(const std::string& run, const RunEvent& event) {
 
 struct Entry {
   long long number = 0;
-  /// `event` is empty where the entry is of the run.
+  /// `event` is empty for the entry of a run.
   std::string run, event, content, digest;
 };
 
@@ -113,11 +113,10 @@ std::string words_for(const std::string& run, const std::string& event) {
   return event.empty() ? "run " + run : fmt::format("event {} of run {}", event, run);
 }
 
-/// What of the trail itself does not fit.
+/// Checks the digests and numbers of the entries.
 void check_chain(const std::vector<Entry>& entries, std::vector<std::string>& problems) {
   long long next = 1;
-  // As the entry before has it, and as it should be: of two entries only the one that was changed
-  // is named.
+  // Stored and recomputed digest of the previous entry: a single change is then reported once.
   std::string before, should_be;
   for (const Entry& entry : entries) {
     const bool gap = entry.number != next;
@@ -138,7 +137,7 @@ void check_chain(const std::vector<Entry>& entries, std::vector<std::string>& pr
   }
 }
 
-/// The contents that entries tell of, by run and event; what is found is taken out.
+/// Contents of the entries by run and event. Checked ones are removed.
 class Contents {
  public:
   Contents(const std::vector<Entry>& entries, std::vector<std::string>& problems)
@@ -159,7 +158,7 @@ class Contents {
     if (entry->second != content) problems_.push_back(words_for(run, event) + " was changed");
     entries_.erase(entry);
   }
-  /// Those that were not found.
+  /// Reports the remaining contents, which were not found.
   void end() {
     for (const auto& [name, content] : entries_) {
       problems_.push_back(words_for(name.first, name.second) + " was removed");
@@ -176,7 +175,7 @@ class Contents {
 void lock_trail(soci::session& sql) { sql << "UPDATE vlp_schema SET version = version"; }
 
 TrailContent content_of_run(soci::session& sql, const std::string& run) {
-  // As the database has it: it may keep a number in another way than it was given.
+  // As read from the database, which can store a number differently than given.
   return {run, "", digest_of(rows_of_run(sql, run).value())};
 }
 

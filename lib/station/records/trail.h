@@ -15,39 +15,43 @@ class session;
 
 namespace vlp {
 
-/// The trail of the records: an entry for each run that was kept and for each of its events, from 1
-/// on, never changed nor taken away. Who, when, what and why are in the run or the event; the entry
-/// has the SHA-256 of all of it, `content`, and one over its own number, run, event and content and
-/// over the `digest` of the entry before: what is changed later, or taken out of the middle, no
-/// longer fits. Only who takes entries from the end, with what they are of, or writes all of them
-/// anew, changes no digest that is there: an earlier last digest, noted elsewhere, tells of that.
+/// The trail is an audit log (hash chain) of the records. It has an entry for each stored run and
+/// for each of its events, numbered from 1. Entries are never changed or removed.
+///
+/// User, time, action and reason are in the run or the event. An entry has `content`, the SHA-256
+/// of the run or event, and `digest`. The latter is the SHA-256 of number, run, event and content
+/// of the entry and of the `digest` of the previous entry.
+///
+/// Later changes, and removals from the middle, are therefore detected. Two manipulations change no
+/// existing digest: removing the last entries with their runs, and rewriting all entries. They are
+/// detected by a last digest that was stored elsewhere.
 
-/// What an entry is to be of: a run that is kept, or an event of it, and the digest of all of it.
+/// Content of a new entry: a run or one of its events, and the digest of it.
 struct TrailContent {
   std::string run, event, content;
 };
 TrailContent content_of_run(soci::session& sql, const std::string& run);
 TrailContent content_of_event(const std::string& run, const RunEvent& event);
 
-/// From here to the end of its transaction this program alone goes on with the trail. What is
-/// slow is done before.
+/// Locks the trail for this program until the end of its transaction. Slow work should be done
+/// before.
 void lock_trail(soci::session& sql);
-/// Adds entries, behind those of all other programs: locks the trail.
+/// Locks the trail and appends entries.
 void append_to_trail(soci::session& sql, const std::vector<TrailContent>& contents);
-/// Adds entries of all runs there are, of an earlier version that had no trail.
+/// Appends entries of all runs, for records of an earlier version without a trail.
 void append_all(soci::session& sql);
 
-/// Whether the records are what was kept.
+/// Result of comparing the records with their trail.
 struct TrailCheck {
   std::size_t runs = 0, entries = 0;
-  /// Of the last entry; empty without one.
+  /// Digest of the last entry; empty if there is none.
   std::string last_digest;
-  /// What was changed, removed or added by hand, a line each, by name.
+  /// Manual changes, removals and additions, one line each, by id.
   std::vector<std::string> problems;
 };
 
-/// Of all records, in the transaction that there is. `noted`: a last digest of before, or empty.
-/// `heard` is called now and then.
+/// Checks all records in the current transaction. `expected_digest` is the last digest of an
+/// earlier check, or empty. `on_progress` is called repeatedly during the check.
 TrailCheck check_trail(soci::session& sql, const std::string& noted,
                        const std::function<void()>& heard);
 

@@ -11,10 +11,9 @@
 
 namespace vlp {
 
-/// The page for people that tells of a run (report.html): verdict and causes, gates, other figures,
-/// the calibration with its history, the pictures of its steps, the images that were refused.
-/// `calibration`: the file with the record's calibration; empty when there is none. Throws
-/// InputError.
+/// Returns the report of a run (report.html): verdict and causes, gates, other metrics, the
+/// calibration with its history, the plots of its steps, and the rejected images. `calibration` is
+/// the file with the record's calibration; empty if there is none. Throws InputError.
 std::string unit_report(const RunRecord& record, const std::filesystem::path& calibration,
                         const std::vector<ReportPicture>& pictures);
 

@@ -20,7 +20,7 @@ namespace {
 
 constexpr double kLevel = 0.05;
 
-/// Sum of (x - mean x) (y - mean y).
+/// Computes the sum of (x - mean x) (y - mean y).
 double products_about_means(const std::vector<double>& x, const std::vector<double>& y) {
   const double of_x = mean_of(x), of_y = mean_of(y);
   double sum = 0;
@@ -91,7 +91,7 @@ BiasStudy bias_study(const std::vector<ReferenceValue>& values) {
     differences.push_back(value - reference);
   }
   BiasStudy study;
-  double within = 0;  // squares about the units' means
+  double within = 0;  // sum of squared deviations from the units' means
   for (const auto& [key, of_unit] : by_unit) {
     const auto& [reference, unit] = key;
     if (of_unit.size() < 2) {

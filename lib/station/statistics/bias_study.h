@@ -10,23 +10,25 @@
 
 namespace vlp {
 
-/// A value of a reference unit, whose figure is known from elsewhere.
+/// Measured value of a reference unit and its known reference value.
 struct ReferenceValue {
   std::string unit;
   double reference, value;
 };
 
-/// An estimate, and whether chance explains that it is not 0: t = value / standard error, p = P(|T|
-/// > |t|) with `dof` degrees of freedom, and a 95 % interval. Without scatter p is 0, or 1 of a
-/// value of 0.
+/// Estimate with a t-test against 0.
+///
+///   t = value / standard_error,   p = P(|T| > |t|) with `dof` degrees of freedom
+///
+/// `low` to `high` is the 95 % interval. Without scatter p is 0, or 1 for a value of 0.
 struct TestedEstimate {
   double value = 0, standard_error = 0, dof = 0, t = 0, p = 1, low = 0, high = 0;
 
-  /// At the 5 % level.
+  /// Returns true if the value differs significantly from 0 (p < 0.05).
   bool shows() const;
 };
 
-/// Of the values of one unit.
+/// Bias of one unit.
 struct UnitBias {
   std::string unit;
   double reference = 0;
@@ -35,36 +37,41 @@ struct UnitBias {
   TestedEstimate bias;
 };
 
-/// The bias of each value as a line over the reference: value - reference = intercept + slope *
-/// reference + e, by least squares over all values.
+/// Regression of the bias on the reference value, by least squares over all values:
+///
+///   value - reference = intercept + slope * reference + e.
 struct Linearity {
   TestedEstimate slope, intercept;
-  /// s of the residuals; the share of the variance that the line explains.
+  /// Standard deviation s of the residuals, and fraction of the variance that the line explains.
   double residual_sd = 0, r_squared = 0;
   double count = 0, mean_reference = 0, squares_of_references = 0;
 
   double bias_at(double reference) const;
-  /// Half of the 95 % confidence band of the line there: t s sqrt(1 / n + (x - mean)^2 / S_xx).
+  /// Returns half of the 95 % confidence band of the line at a reference x: t s sqrt(1 / n + (x -
+  /// mean)^2 / S_xx).
   double band_at(double reference) const;
 };
 
-/// Bias and linearity of a measuring system against reference units (AIAG MSA, 4th ed., chapter III
-/// section B: independent sample method and linearity): a t-test of each unit's mean difference,
-/// with its standard deviation, one of the mean of all differences, with that of repeats, pooled
-/// over the units, and the regression where there are two references or more that differ.
+/// Bias and linearity of a measurement system against reference units (AIAG MSA, 4th ed., chapter
+/// III section B: independent sample method and linearity).
+///
+///   units      t-test of each unit's mean difference, with the unit's standard deviation
+///   all        t-test of the mean of all differences, with the repeatability pooled over the units
+///   linearity  regression, if there are two or more different reference values
 struct BiasStudy {
-  /// In the order of their references.
+  /// Biases by unit, by increasing reference.
   std::vector<UnitBias> units;
-  /// Of all values: what it tells when the slope does not show.
+  /// Bias of all values. It is meaningful only if the slope is not significant.
   TestedEstimate all;
   std::optional<Linearity> linearity;
 };
 
-/// Throws std::invalid_argument, which says what is missing: no value, or a unit with one.
+/// Computes bias and linearity. Throws std::invalid_argument if there is no value, or a unit with a
+/// single value; the message names what is missing.
 BiasStudy bias_study(const std::vector<ReferenceValue>& values);
 
-/// The differences over the references, the mean of each unit, the line and its band, as .png or
-/// .svg. Throws InputError.
+/// Plots the differences over the references, the mean of each unit, the line and its band, as .png
+/// or .svg. Throws InputError.
 void draw_bias(const std::filesystem::path& picture, const std::string& title,
                const std::vector<ReferenceValue>& values, const BiasStudy& study);
 

@@ -8,49 +8,55 @@
 
 namespace vlp {
 
-/// Between which values a figure has to be; a gate has one of the two.
+/// Limits of a metric. A gate sets one of them.
 struct ToleranceLimits {
   std::optional<double> lower, upper;
 };
 
-/// An index with its 95 % interval.
+/// Capability index with its 95 % interval.
 struct CapabilityIndex {
   double value, low, high;
 };
 
-/// How a figure's scatter compares with its limits (ISO 22514-2; AIAG SPC), of values in the order
-/// of time, normally distributed:
+/// Capability and performance of a metric (ISO 22514-2; AIAG SPC). Assumes normally distributed
+/// values in chronological order.
 ///
-///   Cp = (U - L) / (6 s),   Cpk = min((U - m) / (3 s), (m - L) / (3 s)),
+///   Cp = (U - L) / (6 s),   Cpk = min((U - m) / (3 s), (m - L) / (3 s))
 ///
-/// m the mean; with one limit there is no Cp, and Cpk is of that limit. Capability (Cp, Cpk) takes
-/// for s the mean moving range / 1.128, what differs from one unit to the next; performance (Pp,
-/// Ppk) the standard deviation of all values, drifts included. That Ppk is much below Cpk tells of
-/// a drift.
+/// m is the mean, L and U are the limits. With a single limit Cp is undefined, and Cpk refers to
+/// that limit. Capability (Cp, Cpk) uses s = mean moving range / 1.128, the variation between
+/// successive units. Performance (Pp, Ppk) uses the standard deviation of all values, including
+/// drifts. A Ppk far below Cpk indicates a drift.
 ///
-/// Intervals: of Cp, Pp by chi squared, Cp sqrt(chi2(0.025; v) / v) to Cp sqrt(chi2(0.975; v) / v);
-/// of Cpk, Ppk those of Bissell (1990, Applied Statistics 39, 331-340), which Kushler and Hurley
-/// (1992, J. Quality Technology 24, 188-195) found good from n = 30 on:
+/// Intervals of Cp and Pp, by chi squared with v degrees of freedom:
 ///
-///   Cpk -+ 1.960 sqrt(1 / (9 n) + Cpk^2 / (2 v)).
+///   Cp sqrt(chi2(0.025; v) / v)  to  Cp sqrt(chi2(0.975; v) / v)
 ///
-/// v = n - 1 for all values; of the moving range, whose variance is 0.826 s^2 / (n - 1) (Cryer and
-/// Ryan 1990, J. Quality Technology 22, 187-192), v = (n - 1) / (2 * 0.826).
+/// Intervals of Cpk and Ppk, by Bissell (1990, Applied Statistics 39, 331-340), which are accurate
+/// from n = 30 (Kushler and Hurley 1992, J. Quality Technology 24, 188-195):
+///
+///   Cpk -+ 1.960 sqrt(1 / (9 n) + Cpk^2 / (2 v))
+///
+/// v = n - 1 for the standard deviation of all values. For the moving range v = (n - 1) / (2 *
+/// 0.826), because its variance is 0.826 s^2 / (n - 1) (Cryer and Ryan 1990, J. Quality Technology
+/// 22, 187-192).
 struct Capability {
   std::size_t count = 0;
   double mean = 0, within_sd = 0, overall_sd = 0;
-  /// Only with two limits.
+  /// Requires two limits.
   std::optional<CapabilityIndex> cp = {}, pp = {};
   CapabilityIndex cpk{}, ppk{};
 };
 
-/// Nothing for fewer than two values, for values that do not differ, and without a limit.
+/// Computes capability and performance. Returns std::nullopt for fewer than two values, for equal
+/// values, and without a limit.
 std::optional<Capability> capability(std::span<const double> values, const ToleranceLimits& limits);
 
-/// (U - L) / (6 s) with its interval, of a standard deviation with these degrees of freedom.
+/// Computes Cp = (U - L) / (6 s) with its interval. `tolerance` is U - L, and `dof` the degrees of
+/// freedom of `sd`.
 CapabilityIndex cp_of(double tolerance, double sd, double dof);
-/// The smaller of (U - m) / (3 s) and (m - L) / (3 s), of a mean of so many values. Precondition:
-/// there is a limit.
+/// Computes Cpk, the smaller of (U - m) / (3 s) and (m - L) / (3 s), with its interval. `count` is
+/// the number of values of the mean. Precondition: at least one limit.
 CapabilityIndex cpk_of(const ToleranceLimits& limits, double mean, double sd, double dof,
                        std::size_t count);
 

@@ -19,8 +19,8 @@ namespace {
 
 using Sigmas = std::span<const double>;
 
-/// Of the last `of` values, the last among them, so many are more than so many sigmas away on one
-/// side.
+/// Returns true if at least `many` of the last `of` values, including the last one, are more than
+/// `away` sigmas from the mean on one side.
 template <int many, int of, int away>
 bool beyond(Sigmas sigmas) {
   if (sigmas.size() < many) return false;
@@ -34,7 +34,8 @@ bool beyond(Sigmas sigmas) {
   return false;
 }
 
-/// Each of the last `many` values is higher than the one before, or lower; if `turns`, in turns.
+/// Returns true if the last `many` values increase or decrease throughout; if `turns`, if they
+/// alternate.
 template <std::size_t many, bool turns>
 bool steps(Sigmas sigmas) {
   if (sigmas.size() < many) return false;
@@ -50,7 +51,8 @@ bool steps(Sigmas sigmas) {
   return false;
 }
 
-/// All of the last `many` values are nearer to the mean than a sigma, or all are farther.
+/// Returns true if all of the last `many` values are nearer to the mean than one sigma, or all
+/// farther.
 template <std::size_t many, bool nearer>
 bool all_about(Sigmas sigmas) {
   if (sigmas.size() < many) return false;
@@ -85,7 +87,7 @@ bool is_of(const std::string& rule, const std::string& name) {
   return rule == name || rule.substr(0, rule.rfind('-')) == name;
 }
 
-/// Throws for a name of no rule.
+/// Throws for an unknown rule.
 void check_rules(const std::vector<std::string>& names) {
   for (const std::string& name : names) {
     const bool known = name == kEwma || std::any_of(kRules.begin(), kRules.end(), [&](auto& rule) {

@@ -13,31 +13,33 @@
 
 namespace vlp {
 
-/// An individuals chart (Shewhart; ISO 7870-2): sigma is the mean moving range, the mean distance
-/// of each value from the one before, / 1.128 (d2 of ranges of two); the limits are mean -+ 3
+/// Individuals chart (Shewhart; ISO 7870-2). sigma is the mean moving range, the mean distance
+/// between successive values, divided by 1.128 (d2 of ranges of two). The limits are mean -+ 3
 /// sigma.
 struct ControlChart {
   double mean = 0, sigma = 0, lower = 0, upper = 0;
 };
 
-/// Two values or more are needed for limits; otherwise they are the mean.
+/// Computes the chart of `values`. The limits equal the mean for fewer than two values.
 ControlChart control_chart(std::span<const double> values);
 
-/// What no chance, or hardly any, makes of values that only scatter. It is of a value and those
-/// before it, as distances from the mean in sigmas; a value at the mean is on neither side.
+/// Pattern that is improbable for values with random variation only. It refers to a value and its
+/// predecessors, as distances from the mean in units of sigma. A value at the mean is on neither
+/// side.
 struct ChartRule {
-  /// "western-electric-1" to -4 (Statistical Quality Control Handbook, 1956), "nelson-1" to -8
-  /// (Nelson 1984, J. Quality Technology 16, 237-239).
+  /// Name: "western-electric-1" to -4 (Statistical Quality Control Handbook, 1956), "nelson-1" to
+  /// -8 (Nelson 1984, J. Quality Technology 16, 237-239).
   const char* name;
   const char* meaning;
-  /// Whether it holds of the last of them.
+  /// Returns true if the pattern ends at the last value.
   bool (*holds)(std::span<const double> sigmas);
 };
 std::span<const ChartRule> chart_rules();
 
-/// The exponentially weighted moving average, from the target on: z_i = w x_i + (1 - w) z_{i-1},
-/// z_0 the target; its limits are target -+ width sigma sqrt(w / (2 - w)) (NIST/SEMATECH
-/// e-Handbook 6.3.2.4).
+/// Exponentially weighted moving average (NIST/SEMATECH e-Handbook 6.3.2.4):
+///
+///   z_i = w x_i + (1 - w) z_{i-1},   z_0 = target,
+///   limits = target -+ width sigma sqrt(w / (2 - w)).
 struct Ewma {
   double lower = 0, upper = 0;
   std::vector<double> averages;
@@ -45,20 +47,20 @@ struct Ewma {
 Ewma ewma(std::span<const double> values, double target, double sigma, double weight,
           double width = 3);
 
-/// A value that ends a pattern.
+/// Value at which a pattern ends.
 struct ChartAlarm {
   std::string rule, meaning;
   std::size_t index;
 };
 
-/// Alarms in the order of the values, by rules of these names; "western-electric" and "nelson" are
-/// all of them, "ewma" is the average with weight 0.3. Values that are all equal have none. Throws
-/// std::invalid_argument for another name.
+/// Finds alarms, in the order of the values, by rules of these names. "western-electric" and
+/// "nelson" select all of their rules, "ewma" the moving average with weight 0.3. Equal values have
+/// no alarms. Throws std::invalid_argument for an unknown name.
 std::vector<ChartAlarm> chart_alarms(std::span<const double> values,
                                      const std::vector<std::string>& rules);
 
-/// Draws values in their order with mean and limits, a gate if there is one, and the alarms; .png
-/// or .svg. Throws InputError, see draw().
+/// Plots values in their order with mean, limits, alarms and the gate, if any, as .png or .svg.
+/// Throws InputError (draw()).
 void draw_trend(const std::filesystem::path& picture, const std::string& title,
                 std::span<const TrendPoint> points, std::span<const ChartAlarm> alarms,
                 std::optional<double> gate);

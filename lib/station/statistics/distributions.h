@@ -6,7 +6,7 @@
 
 namespace vlp {
 
-/// Computes the mean; of equal values exactly their value. Precondition: not empty.
+/// Computes the mean; exactly the common value if all values are equal. Precondition: not empty.
 double mean_of(std::span<const double> values);
 
 /// Returns the quantile of chi squared. Precondition: 0 < probability < 1, dof > 0.
@@ -17,8 +17,8 @@ double f_upper_tail(double x, double dof_above, double dof_below);
 
 /// Returns P(|T| > |t|) of Student's t. Precondition: t is finite, dof > 0.
 double t_two_tails(double t, double dof);
-/// Returns the t > 0 for which t_two_tails() is `both_tails`. Precondition: 0 < both_tails < 1,
-/// dof > 0.
+/// Returns the quantile t > 0 with t_two_tails(t, dof) = `both_tails`. Precondition: 0 < both_tails
+/// < 1, dof > 0.
 double t_quantile(double both_tails, double dof);
 
 }  // namespace vlp

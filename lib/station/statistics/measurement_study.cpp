@@ -22,7 +22,7 @@ double squares_about(const std::vector<double>& values, double center) {
   });
 }
 
-/// The values of each unit on each station; as many of each.
+/// Values of each unit on each station, of equal number.
 using Cells = std::map<std::string, std::map<std::string, std::vector<double>>>;
 
 Cells cells_of(const std::vector<StudyValue>& values) {
@@ -49,7 +49,7 @@ Cells cells_of(const std::vector<StudyValue>& values) {
   return cells;
 }
 
-/// Sums of squares and degrees of freedom.
+/// Computes sums of squares and degrees of freedom.
 MeasurementStudy analysis_of(const Cells& cells) {
   MeasurementStudy study;
   study.units = cells.size();

@@ -14,37 +14,39 @@
 #include "station/statistics/capability.h"
 #include "station/statistics/measurement_study.h"
 
-/// What trends, capability and studies are made of: a figure over runs, with its gate.
+/// Input of trends, capability and studies: a metric over runs, with its gate.
 namespace vlp {
 
-/// Those that runs have: unit_metrics(), and of the sessions of an archive (archive_runs.h) what
-/// errors their fixes have.
+/// Returns the metrics of runs: unit_metrics(), and the metrics of errors of fixes in sessions of
+/// archives (archive_runs.h).
 std::vector<MetricKind> run_figures();
-/// The one of this name. Throws std::invalid_argument, which names those there are.
+/// Returns the metric of this name. Throws std::invalid_argument that lists the valid names.
 MetricKind run_figure(const std::string& name);
 
-/// The values of runs that were judged, unless the filter asks for one verdict.
+/// Returns the values of a metric in judged runs, or in runs of the verdict that the filter
+/// selects.
 std::vector<TrendPoint> judged_values(Records& records, const std::string& figure,
                                       RunFilter filter);
 
-/// Throws std::invalid_argument for values of two stations, which are not compared unless that is
-/// asked for.
+/// Throws std::invalid_argument if the values are of two stations. They are compared only on
+/// request.
 void check_one_station(const std::vector<TrendPoint>& points);
 
-/// The gate of a figure: that of the station, or, without one, of the last of the runs.
+/// Returns the gate of a metric in the station's configuration or, without a station, in the last
+/// run. Returns std::nullopt if there is none.
 std::optional<double> gate_of(const std::string& figure, const StationConfig* station,
                               Records& records, const std::vector<TrendPoint>& points);
 ToleranceLimits limits_of(const MetricKind& kind, std::optional<double> gate);
 
-/// The values of a study's units: of those that are named, or of those with two runs or more.
-/// Throws std::invalid_argument for units of which there is none.
+/// Returns the values of the named units; those of all units with two runs or more if `units` is
+/// empty. Throws std::invalid_argument for units without a value.
 std::vector<StudyValue> study_values(const std::vector<TrendPoint>& points,
                                      const std::vector<std::string>& units);
-/// Throws std::invalid_argument, which names them, if two runs of one of the units use the same
-/// images: they show no repeatability. Runs without images are not compared.
+/// Throws std::invalid_argument that names two runs of one of the units that use the same images,
+/// because such runs do not show repeatability. Ignores runs without images.
 void check_repetitions(Records& records, const std::vector<TrendPoint>& points,
                        const std::vector<StudyValue>& values);
-/// Those of reference units, with what their figure is known to be. Throws as study_values().
+/// Returns the values of reference units with their known values. Throws as study_values().
 std::vector<ReferenceValue> reference_values(const std::vector<TrendPoint>& points,
                                              const std::map<std::string, double>& references);
 

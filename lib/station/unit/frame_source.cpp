@@ -18,7 +18,7 @@ std::filesystem::path FrameSource::save_next(const SharedFolder& folder) {
     return {};
   }
   const std::string content = codecs().encode(".png", frame->image, {});
-  // A run that goes on does not write over the frames that it has.
+  // A continued run does not overwrite its frames.
   std::string name;
   do {
     name = fmt::format("frame-{:06}.png", frames_++);

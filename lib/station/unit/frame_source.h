@@ -11,16 +11,17 @@
 
 namespace vlp {
 
-/// Frames of a camera or of a video, as images in a folder.
+/// Frames of a camera or a video, written as images to a folder.
 class FrameSource {
  public:
-  /// A camera is asked for frames of this size. Throws InputError when it cannot be opened.
+  /// Opens a camera or a video. Frames of `imager_px` are requested from a camera. Throws
+  /// InputError if it cannot be opened.
   FrameSource(const std::string& source, const std::array<int, 2>& imager_px)
       : source_(source), video_(source, imager_px) {}
 
-  /// Saves the next frame, grey, as FOLDER/frame-000123.png, whole or not at all. Returns its path,
-  /// which is empty at the end of a file. Throws InputError if it cannot be written, if the path of
-  /// the folder leads elsewhere by now, or if a camera gives no frame.
+  /// Writes the next frame, in gray, atomically as FOLDER/frame-000123.png, and returns its path;
+  /// empty at the end of a video. Throws InputError if it cannot be written, if the path of the
+  /// folder leads elsewhere by now, or if a camera delivers no frame.
   std::filesystem::path save_next(const SharedFolder& folder);
 
   bool ended() const { return ended_; }

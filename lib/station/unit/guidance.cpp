@@ -13,7 +13,7 @@
 namespace vlp {
 namespace {
 
-/// Where the views have corners, as vlp-intrinsics says it, the poses by the nominal lens.
+/// Computes the coverage of the views as in vlp-intrinsics, with poses from the nominal lens.
 ViewCoverage coverage_so_far(const Unit& unit) {
   const StationConfig& config = unit.config();
   const Lens nominal(config.type.lens_model, config.type.intrinsics);

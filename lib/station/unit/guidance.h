@@ -9,13 +9,13 @@
 
 namespace vlp {
 
-/// What there is of a step, drawn with letters, 78 columns wide at most.
+/// Returns the progress of a step as text of at most 78 columns.
 std::vector<std::string> progress_of(const Unit& unit, StationStep step);
 
-/// What to do next, in one or two lines of 70 columns at most.
+/// Returns the next instruction for the operator, in one or two lines of at most 70 columns.
 std::string next_of(const Unit& unit, StationStep step);
 
-/// How many of how many: "12/36".
+/// Returns the number of images and the required number: "12/36".
 std::string count_of(const Unit& unit, StationStep step);
 
 }  // namespace vlp

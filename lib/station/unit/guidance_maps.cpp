@@ -63,7 +63,7 @@ std::vector<std::string> turn_lines(const Unit& unit) {
   for (const TurnMap::Height& height : turn_of(unit).heights) {
     std::string parts;
     for (const bool there : height.parts) parts += there ? '#' : '.';
-    const double z_m = std::round(100 * height.z_m) / 100 + 0.0;  // zero without a sign
+    const double z_m = std::round(100 * height.z_m) / 100 + 0.0;  // without negative zero
     lines.push_back(fmt::format("  height {:5.2f} m  [{}]  {} captures over {:.0f} degrees", z_m,
                                 parts, height.captures, deg_from_rad(height.arc_rad)));
     const std::string missing = missing_angles(height);

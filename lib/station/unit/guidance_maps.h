@@ -10,15 +10,15 @@
 
 namespace vlp {
 
-/// Corners over the image: '#' many, '+' some, '.' none.
+/// Returns a map of the corners over the image: '#' many, '+' some, '.' none.
 std::vector<std::string> board_map(const Unit& unit);
 
-/// The turn on the spot so far; nothing before the lens is known.
+/// Returns the covered angles of the rotation in place; empty before the lens is known.
 TurnMap turn_of(const Unit& unit);
-/// Its heights with the angles that are there, and those that are missing.
+/// Returns the heights of the rotation with covered and missing angles, as lines.
 std::vector<std::string> turn_lines(const Unit& unit);
 
-/// Which lamps the captures of a step show, and which they do not.
+/// Returns a line with the lamps that the captures of a step contain, and the missing ones.
 std::string lamps_line(const Unit& unit, const UnitStep& step);
 
 }  // namespace vlp

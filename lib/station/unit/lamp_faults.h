@@ -17,28 +17,27 @@
 namespace vlp {
 
 /// Describes the errors of the map of a station's lamps (calibration/map/map_errors.h), one line
-/// each. Requires three captures. Offsets count from `min_offset_px` on, as seen in the image. For
-/// a camera that is being calibrated the default is large, so that a small error of the map does
-/// not excuse the camera; for a known camera it can be smaller.
+/// each. Requires three captures. Offsets below `min_offset_px` in the image are ignored. The
+/// default is large, so that small errors of the map do not excuse a camera that is being
+/// calibrated. It can be smaller for a known camera.
 std::vector<std::string> lamp_faults(std::span<const Frame> frames, const LampMap& map,
                                      const Calibration& calibration, double min_offset_px = 2.5);
 
 /// Describes the lamps of the map that no capture contains, one line each. Requires three captures.
 std::vector<std::string> unseen_lamps(std::span<const Frame> frames, const LampMap& map);
 
-/// Describes captures that were taken elsewhere than their table says, or by another camera
-/// (describe_check_outliers()), by fixes of three lamps or more. Returns an empty string if there
+/// Describes captures at other places than in their table, or by another camera
+/// (describe_check_outliers()), from fixes of three lamps or more. Returns an empty string if there
 /// are none.
 std::string place_fault(std::span<const Frame> frames, const LampMap& map,
                         const Calibration& calibration, const CapturesTable& places);
 
-/// Describes captures whose lamps do not fit the calibration while those of the others do
-/// (describe_residual_outliers()), by fixes of three lamps or more. Returns an empty string if
-/// there are none.
+/// Describes captures whose residuals are outliers (describe_residual_outliers()), from fixes of
+/// three lamps or more. Returns an empty string if there are none.
 std::string capture_fault(std::span<const Frame> frames, const LampMap& map,
                           const Calibration& calibration);
 
-/// Offset that the errors of all captures at known points share.
+/// Common offset of all captures at known points.
 struct CommonOffset {
   /// Fix minus known point: in the frame of the level camera if `in_camera`, otherwise in the
   /// world.
@@ -51,8 +50,11 @@ struct CommonOffset {
 };
 
 /// Finds an offset of more than 5 mm, without which the errors of captures at known points are a
-/// third or less. Returns std::nullopt if there is none, for fewer than five fixes, and if the
-/// camera did not rotate between the captures, so that the two frames cannot be separated.
+/// third or less.
+///
+/// Returns std::nullopt if there is none, and for fewer than five fixes. Returns std::nullopt, too,
+/// if the camera did not rotate between the captures, because the two frames cannot be separated
+/// then.
 std::optional<CommonOffset> find_common_offset(std::span<const Frame> frames, const LampMap& map,
                                                const Calibration& calibration,
                                                const CapturesTable& places);

@@ -20,8 +20,8 @@ namespace {
 
 constexpr Eigen::Index kFocalAndCenter = 4;
 
-/// The lens as it is, and beyond that any other of its kind: what else bends rays, the type of
-/// camera has in common.
+/// Returns the calibration with additional variance for focal lengths and center, 5 % of the focal
+/// length. Distortion is common to the type of camera and is not freed.
 Calibration with_free_focus(Calibration calibration) {
   constexpr double share = 0.05;
   const double sd_px =
@@ -48,14 +48,14 @@ AdjustmentResult adjusted(std::span<const Frame> frames, const LampMap& map,
 /// Errors of the heights of fixes at known points.
 struct HeightErrors {
   double median_m;
-  /// Stated standard deviation of one height, the median.
+  /// Median of the reported standard deviations of one height.
   double sd_m;
 };
 
 /// Returns the errors of fixes of three lamps or more; std::nullopt for fewer than five.
 std::optional<HeightErrors> find_height_errors(const PlacedCaptures& captures, const LampMap& map,
                                                const Calibration& calibration) {
-  constexpr std::size_t min_heights = 5;  // of fewer, the median is not typical
+  constexpr std::size_t min_heights = 5;  // fewer make the median unreliable
   const Positioner positioner(map, calibration);
   std::vector<double> errors_m, sds_m;
   for (const Frame& frame : captures.frames) {
@@ -70,12 +70,12 @@ std::optional<HeightErrors> find_height_errors(const PlacedCaptures& captures, c
   return HeightErrors{upper_median(errors_m), upper_median(sds_m)};
 }
 
-/// By how much a corner of the image is elsewhere, the worst.
+/// Returns the largest displacement of an image corner between two lenses.
 double corner_shift_px(const Camera& a, const Camera& b) {
   double worst_px = 0;
   for (const double u : {0., double(a.imager_px[0])}) {
     for (const double v : {0., double(a.imager_px[1])}) {
-      // Of the ray that is seen there; distortion is the same in both.
+      // Ray of the corner; the distortion is the same in both lenses.
       const Eigen::Vector2d corner(u, v);
       const Eigen::Vector2d ray = (corner - a.center_px()).cwiseQuotient(a.focal_px());
       worst_px =
@@ -90,7 +90,7 @@ double corner_shift_px(const Camera& a, const Camera& b) {
 std::string lens_fault(std::span<const Frame> frames, const LampMap& map,
                        const Calibration& calibration) {
   constexpr std::size_t least_captures =
-      10;  // of fewer a free lens takes up what other faults leave
+      10;  // with fewer a free lens absorbs residuals of other faults
   if (frames.size() < least_captures) return "";
   const AdjustmentResult as_stated = adjusted(frames, map, calibration);
   const AdjustmentResult freed = adjusted(frames, map, with_free_focus(calibration));
@@ -114,7 +114,7 @@ std::string find_other_focal_length(const PlacedCaptures& captures, const Placed
   const auto heights = find_height_errors(captures, map, calibration);
   const auto own_heights = find_height_errors(own, map, calibration);
   if (!heights || !own_heights) return "";
-  // A unit that is loose sideways may have moved as far along its axis.
+  // A unit that is loose sideways can have moved by the same amount along its axis.
   constexpr double min_difference_m = kMinOutlierError_m, sigmas = 3, mm_per_m = 1e3;
   const double difference_m = heights->median_m - own_heights->median_m;
   const double sd_m = std::hypot(heights->sd_m, own_heights->sd_m);

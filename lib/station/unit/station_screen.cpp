@@ -20,7 +20,7 @@ namespace {
 
 constexpr std::size_t kColumns = 80;
 
-/// The text in lines of the screen's width, the first with this label.
+/// Adds a text in lines of the screen's width, the first one with a label.
 void add_wrapped(std::vector<ScreenLine>& lines, const std::string& label, const std::string& text,
                  Tone tone) {
   std::istringstream words(text);
@@ -40,9 +40,9 @@ std::string outcome_of(const UnitImage& image) {
   return image.is_used() ? "taken" : "refused: " + image.refusal();
 }
 
-/// Returns the step of a unit's run that did not finish, which its causes begin with
+/// Returns the step of a unit's run that did not finish, with which its causes begin
 /// (find_causes()); std::nullopt if all did, and for golden units, whose steps are optional.
-/// Figures do not show it: a step may fail after it measured some.
+/// Metrics do not show it, because a failed step can have some.
 std::optional<StationStep> find_unfinished_step(const RunRecord& record) {
   if (record.kind != "unit") return std::nullopt;
   std::istringstream causes(record.causes);
@@ -55,8 +55,8 @@ std::optional<StationStep> find_unfinished_step(const RunRecord& record) {
   return std::nullopt;
 }
 
-/// Returns how many gates have no figure, and why: "20 gates, because boards did not finish"; their
-/// names if all steps finished. Empty if all gates have a figure.
+/// Describes the gates without a value and the reason: "20 gates, because boards did not finish";
+/// their names if all steps finished. Returns an empty string if all gates have a value.
 std::string describe_unmeasured_gates(const RunRecord& record) {
   std::vector<std::string> names;
   for (const CheckedMetric& figure : record.figures) {
@@ -125,7 +125,7 @@ std::vector<ScreenLine> station_screen(const Unit& unit) {
                 image->second.is_used() ? Tone::good : Tone::bad);
   }
   for (const CheckedMetric& figure : unit.figures()) {
-    // Blur is of all views so far: a few may mislead.
+    // Blur of all current views: a few views can be misleading.
     const bool known = figure.value && figure.name != "blur_px";
     if (known && !figure.met()) add_wrapped(lines, "Fails", cause_of(figure), Tone::bad);
   }
@@ -178,7 +178,7 @@ std::vector<ScreenLine> verdict_screen(const RunRecord& record) {
     add_wrapped(lines, "Cause", cause, Tone::bad);
   }
   if (!no_verdict.empty()) add_wrapped(lines, "Cause", no_verdict, Tone::bad);
-  // Last, so that it stands on a terminal of 24 lines, too.
+  // Last, so that it is visible on a terminal of 24 lines.
   lines.push_back({""});
   const std::span<const char* const> banner = passed             ? std::span(kPass)
                                               : record.invalid() ? std::span(kInvalid)

@@ -10,7 +10,7 @@
 
 namespace vlp {
 
-/// How a line is to be shown, where there is colour.
+/// Style of a line on terminals with color.
 enum class Tone { plain, heading, good, bad };
 
 /// A line of at most 80 columns of ASCII.
@@ -19,20 +19,21 @@ struct ScreenLine {
   Tone tone = Tone::plain;
 };
 
-/// What the operator of a station sees while a unit is worked on: the steps, what there is of the
-/// present one, what to do next, and what became of the last image.
+/// Returns the operator's screen while a unit is processed: the steps, progress of the current
+/// step, the next instruction, and the result of the last image.
 std::vector<ScreenLine> station_screen(const Unit& unit);
 
-/// The same in one line, of the image that came last.
+/// Returns the result of an image of a step, in one line.
 std::string last_image_line(const Unit& unit, StationStep step, const std::string& image);
 
-/// hook_problem() with what to do; nothing when that is nothing.
+/// Returns hook_problem() with its remedy as lines; no line if it is empty.
 std::vector<ScreenLine> hook_lines(const RunRecord& record);
 
 /// Returns Spool::notice() as lines; no line if it is empty.
 std::vector<ScreenLine> spool_lines(const std::string& notice);
 
-/// The gates with figure and limit, the causes, the root first, and PASS, FAIL or INVALID, large.
+/// Returns the screen of a verdict: gates with value and limit, causes, the primary one first, and
+/// PASS, FAIL or INVALID in large letters.
 std::vector<ScreenLine> verdict_screen(const RunRecord& record);
 
 }  // namespace vlp

@@ -7,7 +7,7 @@
 
 namespace vlp {
 
-/// What the station does with a unit, in this order. Each has a folder of its name.
+/// Steps of a station, in this order. Each has a folder of its name.
 enum class StationStep { boards, rotation, dispersion, check };
 
 inline constexpr std::array kStationSteps{StationStep::boards, StationStep::rotation,

@@ -24,13 +24,13 @@ namespace {
 
 constexpr double kMillimetres = 1e3;
 
-/// What failed, before why.
+/// Prepends the failed part to the reason.
 StepResult named(const char* what, StepResult result) {
   if (!result.ok()) result.why = fmt::format("{}: {}", what, result.why);
   return result;
 }
 
-/// How far the lens is from the nominal one.
+/// Adds metrics of the difference between the lens and the nominal one.
 void compare(const Camera& type, LensResult& result) {
   constexpr double percent = 100;
   const auto& found = result.lens.solution.problem.intrinsics;
@@ -55,8 +55,8 @@ LampCaptures captures_of(const StationConfig& config, const Calibration& calibra
   return {frames, config.lamps, "lamp map", calibration};
 }
 
-/// Why too few of the captures are at known places; empty when as many are as there are, or as are
-/// wanted.
+/// Returns the reason if too few captures have known positions; empty if at least `wanted`, or all,
+/// have one.
 std::string places_problem(std::size_t known, std::size_t captures, int wanted) {
   if (known > 0 && known >= std::min(captures, static_cast<std::size_t>(wanted))) return "";
   return fmt::format(
@@ -65,8 +65,8 @@ std::string places_problem(std::size_t known, std::size_t captures, int wanted) 
       captures - known, captures);
 }
 
-/// Fails a solved step if some captures do not fit the result: they are rejected as outliers, but
-/// may be those of another camera. The operator takes them again.
+/// Fails a solved step if some captures do not fit the result. They are rejected as outliers, but
+/// can be those of another camera. The operator has to repeat them.
 StepResult fail_if_inconsistent(const StationConfig& config, const std::vector<Frame>& frames,
                                 StepResult result) {
   if (!result.ok()) return result;
@@ -75,7 +75,7 @@ StepResult fail_if_inconsistent(const StationConfig& config, const std::vector<F
   return result;
 }
 
-/// Those at known points, and the points.
+/// Captures at known points, and the points.
 struct KnownPoints {
   std::vector<Frame> frames;
   std::vector<TruthRow> truth;
@@ -94,7 +94,8 @@ KnownPoints known_points(const std::vector<Frame>& frames, const CapturesTable& 
   return known;
 }
 
-/// Shares of captures with a fix, of lamps seen that fixes rest on, and of the map's lamps seen.
+/// Adds three fractions: captures with a fix, detections used by fixes, and lamps of the map that
+/// were detected.
 void add_shares(const LocateResult& located, const std::vector<Frame>& frames, const LampMap& map,
                 StepResult& result) {
   std::set<int> seen;
@@ -134,7 +135,8 @@ StepResult solve_boards(const StationConfig& config, const std::string& camera_i
   result.skipped.clear();  // the station reports images itself
   if (result.failure == StepFailure::wrong_board) return named("wrong board", std::move(result));
   if (result.ok()) compare(config.type, result);
-  // A lens from images of two cameras is that of neither; the operator removes the wrong images.
+  // A lens from images of two cameras fits neither of them. The operator has to remove the wrong
+  // images.
   if (result.ok() && !result.lens.inconsistent_views.empty()) {
     result.fail(StepFailure::undetermined, result.lens.inconsistent_views);
   }

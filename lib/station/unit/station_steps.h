@@ -12,25 +12,25 @@
 #include "session/step_result.h"
 #include "station/station_config.h"
 
-/// The steps of the session (lib/session), fed with what the station has looked at, with the
-/// station's own metrics added. Each takes the calibration that the one before gave; the history is
-/// left to who calls.
+/// Steps of a session (lib/session), applied to the station's observations, with additional metrics
+/// of the station. Each step uses the calibration of the step before; the caller adds the history.
 namespace vlp {
 
-/// The lens; metrics, too: focal_percent, center_px, nominal_px, against the type's, board_bend_mm.
+/// Calibrates the lens. Further metrics: focal_percent, center_px and nominal_px against the
+/// nominal lens, and board_bend_mm.
 StepResult solve_boards(const StationConfig& config, const std::string& camera_id,
                         Observations seen);
 
 StepResult solve_rotation(const StationConfig& config, const Calibration& calibration,
                           const std::vector<Frame>& frames);
 
-/// Places: those of the table, or of the config. wrong_place when fewer captures than the station
-/// wants have one.
+/// Calibrates the dispersion. Positions are those of the table, or else that of the configuration.
+/// Fails with wrong_place if fewer captures than the station requires have a position.
 StepResult solve_dispersion(const StationConfig& config, const Calibration& calibration,
                             const std::vector<Frame>& frames, const CapturesTable& places);
 
-/// Fixes at known points; their errors are the metrics check_*. Captures without a place are not
-/// counted; wrong_place when fewer than the station wants have one.
+/// Locates captures at known points; the errors are the metrics check_*. Ignores captures without a
+/// position. Fails with wrong_place if fewer than the station requires have one.
 StepResult check_fixes(const StationConfig& config, const Calibration& calibration,
                        const std::vector<Frame>& frames, const CapturesTable& places);
 

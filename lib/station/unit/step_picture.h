@@ -10,11 +10,11 @@
 
 namespace vlp {
 
-/// A picture for the unit's report that is being drawn; nothing when it could not be.
+/// Plot for the unit's report, rendered asynchronously; std::nullopt if it could not be rendered.
 using StepPicture = std::shared_future<std::optional<ReportPicture>>;
 
-/// Makes a drawing and draws it on a thread of its own, while the unit goes on: gnuplot takes
-/// longer than an operator should wait for a verdict. The last copy waits for the end.
+/// Makes and renders a drawing on its own thread, while the unit continues, because gnuplot would
+/// delay the verdict. Destroying the last copy of the result waits for the thread.
 StepPicture draw_aside(std::function<Drawing()> drawing);
 
 }  // namespace vlp

@@ -13,25 +13,25 @@
 
 namespace vlp {
 
-/// The cameras and videos from which a unit's images come, by step.
+/// Cameras and videos that deliver a unit's images, by step.
 class StepSources {
  public:
-  /// Each is "STEP=SOURCE" for one step, or "SOURCE" for those that have none of their own. Throws
-  /// InputError when one cannot be opened.
+  /// Opens the sources: "STEP=SOURCE" for one step, or "SOURCE" for all steps without one. Throws
+  /// InputError if a source cannot be opened.
   StepSources(const std::vector<std::string>& sources, const std::array<int, 2>& imager_px);
 
   bool any() const { return !by_step_.empty(); }
-  /// Puts the next frame into the folder of the present step, once the one before is judged. A
-  /// frame that is refused is taken away: a camera that moves blurs, one that rests shows nothing
-  /// new. The record tells of those with a fault. Throws InputError as FrameSource::save_next()
-  /// and WatchedRun::discard().
+  /// Writes the next frame to the folder of the current step, after the previous one was processed.
+  /// The file of a rejected frame is removed, because a moving camera blurs images and a resting
+  /// one repeats them. Rejected frames with a fault remain in the record. Throws InputError as
+  /// FrameSource::save_next() and WatchedRun::discard().
   void feed(const Unit& unit, WatchedRun& run);
-  /// Whether the present step's video is at its end, and all of it is judged.
+  /// Returns true if the current step's video has ended and all of its frames are processed.
   bool ended(const Unit& unit) const;
 
  private:
   std::map<StationStep, std::shared_ptr<FrameSource>> by_step_;
-  /// The frame that came last, and its step.
+  /// Last frame, and its step.
   std::filesystem::path last_;
   StationStep last_step_ = StationStep::boards;
 };

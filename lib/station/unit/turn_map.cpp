@@ -42,7 +42,7 @@ std::vector<Seen> fixes_of(const std::vector<Frame>& frames, const StationConfig
 
 TurnMap turn_map(const std::vector<Frame>& frames, const StationConfig& config,
                  const Calibration& calibration) {
-  constexpr double same_height = 0.06;  // spot_captures() has the last word
+  constexpr double same_height = 0.06;  // spot_captures() decides
   const auto parts = static_cast<std::size_t>(config.enough.turn_captures);
   const auto seen = fixes_of(frames, config, calibration);
   TurnMap map;

@@ -11,19 +11,19 @@
 
 namespace vlp {
 
-/// Which angles of a turn on the spot are there, by fixes without the rotation centre.
+/// Angles of a rotation in place that captures cover, from fixes without rotation center.
 struct TurnMap {
   struct Height {
     double z_m;
     int captures;
     double arc_rad;
-    /// Whether each of `turn_captures` equal parts of the turn has a capture, from the first
-    /// capture's yaw on.
+    /// Cells of the rotation with a capture: `turn_captures` equal cells, starting at the yaw of
+    /// the first capture.
     std::vector<bool> parts;
   };
-  /// From low to high.
+  /// Heights, in increasing order.
   std::vector<Height> heights;
-  /// Heights, captures at each and arc are what the station wants.
+  /// True if heights, captures at each and angular range meet the station's criteria.
   bool enough = false;
 };
 

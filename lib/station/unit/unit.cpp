@@ -22,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// As UnitImage has it.
+/// Returns UnitImage::level for an image.
 Eigen::Matrix3d level_in(const LevelRotations& levels, const std::string& image) {
   const auto level = levels.find(image);
   return level == levels.end() ? Eigen::Matrix3d::Zero().eval() : level->second.value();
@@ -50,7 +50,7 @@ void Unit::reread(StationStep step) {
   forget_after(step);
 }
 
-/// At the images whose inclination is told otherwise by now. They were counted when they came.
+/// Processes the images again whose inclination changed. They are not counted again.
 void Unit::look_again(StationStep step) {
   const LevelRotations levels = levels_of(step);
   UnitStep& state = at(step);
@@ -138,7 +138,7 @@ void Unit::add(StationStep step, const std::vector<fs::path>& files, bool more_t
   if (!more_to_come) count_refusals(step);
 }
 
-/// In a row, of all that came together.
+/// Updates the number of consecutive rejections after a batch.
 void Unit::count_refusals(StationStep step) {
   UnitStep& state = at(step);
   const int refused = std::exchange(state.refused_together, 0);
@@ -146,14 +146,15 @@ void Unit::count_refusals(StationStep step) {
   state.refused_in_a_row = used ? 0 : state.refused_in_a_row + refused;
 }
 
-/// Of the captures whose inclination is told, but for those of the turn, whose axis is level.
+/// Returns the rotations of captures of known inclination. Those of the rotation step have none,
+/// because its axis is vertical.
 LevelRotations Unit::levels_of(StationStep step) const {
   if (step != StationStep::dispersion && step != StationStep::check) return {};
   const auto calibration = calibration_before(step);
   if (!calibration) return {};
   try {
     return level_rotations(captures_table(this->step(step).folder), *calibration, 0);
-  } catch (const InputError&) {  // the step will say so
+  } catch (const InputError&) {  // reported by the step
     return {};
   }
 }
@@ -198,8 +199,8 @@ void Unit::take(StationStep step, UnitImage image) {
   forget_after(step);
 }
 
-/// Rejects a good image that is not needed: one of the same content, of any step, or that shows
-/// what one of the step shows, or any if the step has enough.
+/// Rejects an image without a fault that is redundant. It has the content of an image of any step,
+/// shows the same as an image of this step, or the step is complete.
 void Unit::reject_redundant(StationStep step, UnitImage& image) const {
   for (const UnitStep& any : steps_) {
     for (const UnitImage* other : used_images(any)) {
@@ -215,8 +216,8 @@ void Unit::reject_redundant(StationStep step, UnitImage& image) const {
   image.seen.reject(RejectionReason::not_needed, "not needed: the step has enough");
 }
 
-/// Takes an image out of its step, and with it what rests on it; those that it stood in the way of
-/// get their turn.
+/// Removes an image and the results that depend on it. Images that were redundant because of it are
+/// used again.
 void Unit::drop(StationStep step, const std::string& name) {
   UnitStep& state = at(step);
   const auto image = state.images.find(name);
@@ -256,7 +257,7 @@ void Unit::discard(StationStep step, const std::string& name) {
   }
 }
 
-/// What rests on a step is looked at anew with what will come of it.
+/// Resets the later steps; their images are processed again with the new result.
 void Unit::forget_after(StationStep step) {
   for (const StationStep later : kStationSteps) {
     if (later <= step) continue;
@@ -309,7 +310,7 @@ StepResult Unit::solve(StationStep step, bool all_in) const {
       case StationStep::check:
         return check_fixes(config_, before, frames_of(state), captures_in(state.folder));
     }
-  } catch (const InputError& error) {  // a table, maybe in the making
+  } catch (const InputError& error) {  // the table may be incomplete
     if (all_in) throw;
     result.fail(StepFailure::bad_input, error.what());
     return result;

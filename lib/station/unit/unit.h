@@ -21,62 +21,69 @@
 
 namespace vlp {
 
-/// A unit on its way through the station. Images are looked at as they come; a step is solved as
-/// soon as it has enough, and again when its images change, and with it those that rest on it. The
-/// result depends on the images and their names only, not on threads, nor on when they came, unless
-/// more came than enough, or two that show the same: the first of them is taken.
+/// Processing of a unit on the station.
+///
+/// Images are processed as they arrive. A step is solved as soon as it is complete, and again when
+/// its images change, together with the later steps. The result depends only on the images and
+/// their names, not on threads or times of arrival. There are two exceptions, in which the first
+/// images are used: more images than required, and two redundant images.
 class Unit {
  public:
-  /// `config` outlives it.
+  /// Precondition: `config` outlives the unit.
   Unit(const StationConfig& config, std::string camera_id, ProgramVersion program, int threads);
   Unit(const Unit&) = delete;
   Unit& operator=(const Unit&) = delete;
 
-  /// Images of a step that came, or changed. One that comes when the step is done is not used.
-  /// Nobody knows in which order those were taken that came together: of them, refusals count as in
-  /// a row when none is used. `more_to_come`: others came with them, which the next call has.
+  /// Adds new or changed images of a step. Images of a completed step are not used. The order of
+  /// images that arrive together is unknown, so their rejections count as consecutive only if none
+  /// of them is used. `more_to_come` is true if the next call has more images that arrived with
+  /// these.
   void add(StationStep step, const std::vector<std::filesystem::path>& files,
            bool more_to_come = false);
-  /// An image that is there no more. What was refused because of it is taken.
+  /// Removes an image whose file was deleted. Images that are redundant only because of it are used
+  /// instead.
   void remove(StationStep step, const std::string& name);
-  /// The file of a refused image is there no more, but it was of the unit: the refusal stays, not
-  /// counted as one in a row, because a camera that moves blurs. Without a fault it is forgotten.
+  /// Marks the file of a rejected image as deleted. The rejection remains, but does not count as
+  /// consecutive, because a moving camera blurs images. A redundant image is removed.
   void discard(StationStep step, const std::string& name);
-  /// The step's captures.csv or truth.csv changed.
+  /// Handles a change of the step's captures.csv or truth.csv.
   void reread(StationStep step);
-  /// Solves what has enough; with `all_in`, nothing more comes, and what there is has to do: then,
-  /// a captures.csv that cannot be read throws InputError, and is the step's problem before.
+  /// Solves the steps that are complete. If `all_in`, no more images arrive, and incomplete steps
+  /// are solved, too. An unreadable captures.csv then throws InputError; otherwise it is the step's
+  /// problem.
   void advance(bool all_in);
-  /// Refuses images that another camera's run used, by their SHA-256.
+  /// Sets the function that finds another camera's run by the SHA-256 of an image. Such images are
+  /// rejected.
   void refuse_images_of_others(std::function<ImageOwner(const std::string& sha256)> owner) {
     owner_ = std::move(owner);
   }
-  /// Nothing more comes although a step has not enough; `why` for people, as "the operator ended
-  /// the run".
+  /// Ends an incomplete unit: no more images arrive. `why` is human-readable, as "the operator
+  /// ended the run".
   void end_early(std::string why) { ended_ = std::move(why); }
   /// The reason given to end_early(); empty if the unit was not ended early.
   const std::string& ended() const { return ended_; }
 
-  /// No verdict of this unit counts, because of the station: `why`, for people, comes first of its
-  /// causes. Empty: it does.
+  /// Makes the verdict of this unit not count, because of the station. `why`, human-readable,
+  /// becomes the first of its causes; empty if the verdict counts.
   void distrust(std::string why) { distrusted_ = std::move(why); }
   const std::string& distrusted() const { return distrusted_; }
 
   const UnitStep& step(StationStep step) const { return steps_[index(step)]; }
-  /// Returns the row time of the camera's type compared with that of the lamps of all steps, as of
-  /// the last advance().
+  /// Returns the comparison of the type's row time with that of the lamps of all steps, as of the
+  /// last advance().
   const RowTimeCheck& row_time() const { return row_time_; }
-  /// The first step that is not done; nothing when all are.
+  /// Returns the first step that is not completed; std::nullopt if all are.
   std::optional<StationStep> current() const;
-  /// It is of no use to go on: a step has so many refused images in a row, or enough images that
-  /// lead to nothing because of the lamps.
+  /// Returns true if continuing is useless. A step then has too many consecutive rejected images,
+  /// or it is complete but fails because of the lamps.
   bool hopeless() const;
 
-  /// As far as it came; nothing before the lens is known.
+  /// Returns the calibration of the last completed step; std::nullopt before the lens is known.
   std::optional<Calibration> calibration() const;
-  /// All figures, gates among them.
+  /// Returns all metrics, including those with gates.
   std::vector<CheckedMetric> figures() const;
-  /// For the report: of lens, rotation centre and dispersion, as far as it came. Waits for them.
+  /// Returns the plots of lens, rotation center and dispersion for the report, of the solved steps.
+  /// Waits for their rendering.
   std::vector<ReportPicture> pictures() const;
   const StationConfig& config() const { return config_; }
   const std::string& camera_id() const { return camera_id_; }

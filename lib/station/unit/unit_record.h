@@ -13,8 +13,8 @@ namespace vlp {
 /// Makes the record of a unit's run that ends now, under the run's name `run`.
 RunRecord make_unit_record(const Unit& unit, const std::string& run, const ProgramVersion& program);
 
-/// Makes a judged run of a unit INVALID because `earlier`, a judged run of the unit, used all of
-/// its images: it is no repetition, and would count twice.
+/// Makes a judged run of a unit INVALID because `earlier`, another judged run of the unit, used all
+/// of its images. Such a run is no repetition and would count twice.
 void reject_repetition(RunRecord& record, const std::string& earlier,
                        const std::filesystem::path& station_file);
 

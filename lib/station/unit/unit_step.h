@@ -17,26 +17,26 @@
 
 namespace vlp {
 
-/// One step of a unit.
+/// State of one step of a unit.
 struct UnitStep {
-  /// Where captures.csv and truth.csv are looked for.
+  /// Folder of captures.csv and truth.csv.
   std::filesystem::path folder = {};
-  /// By name.
+  /// Images, by name.
   std::map<std::string, UnitImage> images = {};
-  /// Images that wait for the step before.
+  /// Images that wait for the previous step.
   std::vector<std::filesystem::path> waiting = {};
-  /// There are as many as the station wants.
+  /// True if the images meet the station's completion criterion.
   bool enough = false;
-  /// What the images come to, once there are enough of them.
+  /// Result of the images, after the step is complete.
   std::optional<StepResult> result = {};
-  /// Of the result, if it has one.
+  /// Plot of the result, if it has one.
   StepPicture picture = {};
-  /// Of the images refused one after another, the last ones.
+  /// Number of consecutive rejected images at the end.
   int refused_in_a_row = 0;
-  /// Of the images that came together, of which more are to come.
+  /// Number of rejected images of an incomplete batch.
   int refused_together = 0;
   bool used_together = false;
-  /// The image that came last.
+  /// Name of the last image.
   std::string last = {};
 
   bool done() const { return enough && result && result->ok(); }
@@ -50,11 +50,11 @@ std::vector<Frame> frames_of(const UnitStep& step);
 /// Returns the images that are used, by name.
 std::vector<const UnitImage*> used_images(const UnitStep& step);
 
-/// Counts the corners of the views that are used in the parts of the image.
+/// Counts the corners of the used views in the cells of the image.
 ImageCoverage board_coverage(const UnitStep& step, const std::array<int, 2>& imager_px);
 
-/// Returns the median blur of the views that are used, once there are enough; before, that of all
-/// views, rejected ones too, because a blurred lens has no others.
+/// Returns the median blur of the used views, once the step is complete. Before that it includes
+/// rejected views, because all views of a blurred lens are rejected.
 std::optional<double> typical_blur_px(const UnitStep& boards);
 
 }  // namespace vlp

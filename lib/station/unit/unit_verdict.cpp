@@ -28,15 +28,15 @@ void append(std::vector<Cause>& causes, std::vector<Cause> more) {
 
 bool is_solved(const UnitStep& state) { return state.result && state.result->ok(); }
 
-/// Rejected images of a step that did not end well.
+/// Rejected images of an unfinished step.
 struct Refusals {
   /// "12 of 36 images refused: 10 blurred, 2 too dark"; empty if most are used.
   std::string text = {};
-  /// True if most are blurred, and so many that the operator's hand cannot be the reason.
+  /// True if most are blurred, and too many for a shaky hand to be the reason.
   bool are_blurred = false;
 };
 
-/// Returns the number of images from which on a fault is the camera's; fewer may be an accident.
+/// Returns the minimum number of images for a fault of the camera; fewer can be accidental.
 int min_images_to_blame(const StationConfig& config) {
   return std::min(config.max_rejected_in_a_row, (config.enough.board_views + 1) / 2);
 }
@@ -57,7 +57,7 @@ Refusals find_refusals(const UnitStep& state, const StationConfig& config) {
           2 * blurred > std::ssize(rejected) && blurred >= min_images_to_blame(config)};
 }
 
-/// Returns what keeps a step from ending well.
+/// Returns the reasons why a step did not finish.
 std::vector<Cause> find_problems(const Unit& unit, StationStep step) {
   const UnitStep& state = unit.step(step);
   if (state.done()) return {};
@@ -80,7 +80,7 @@ std::vector<Cause> find_problems(const Unit& unit, StationStep step) {
   return causes;
 }
 
-/// Returns the gates that figures of a step miss, those of the station before those of the camera.
+/// Returns the failed gates of a step, those of the station before those of the camera.
 std::vector<Cause> find_missed_gates(const UnitStep& state,
                                      const std::vector<CheckedMetric>& figures) {
   std::vector<Cause> causes;
@@ -119,7 +119,7 @@ bool is_blur_known(const UnitStep& boards, const StationConfig& config) {
          }) >= min_images_to_blame(config);
 }
 
-/// Returns the causes that the board images show: another board, blur, and those of the lens.
+/// Returns the causes visible in the board images: another board, blur, and faults of the lens.
 std::vector<Cause> find_board_causes(const Unit& unit, const std::vector<CheckedMetric>& figures) {
   std::vector<Cause> causes;
   const UnitStep& boards = unit.step(StationStep::boards);
@@ -132,7 +132,7 @@ std::vector<Cause> find_board_causes(const Unit& unit, const std::vector<Checked
   return causes;
 }
 
-/// Returns the causes of the steps with lamps, as far as the step before is solved.
+/// Returns the causes of the steps with lamps whose previous step is solved.
 std::vector<Cause> find_lamp_step_causes(const Unit& unit,
                                          const std::vector<CheckedMetric>& figures) {
   std::vector<Cause> causes;
@@ -144,7 +144,7 @@ std::vector<Cause> find_lamp_step_causes(const Unit& unit,
   return causes;
 }
 
-/// Returns the gates that the metrics of row_time_metrics() miss. These are of all steps together.
+/// Returns the failed gates of row_time_metrics(), which refer to all steps together.
 std::vector<Cause> find_missed_row_time_gates(const std::vector<CheckedMetric>& figures) {
   std::vector<Cause> causes;
   for (const CheckedMetric& figure : figures) {
@@ -154,7 +154,7 @@ std::vector<Cause> find_missed_row_time_gates(const std::vector<CheckedMetric>& 
   return causes;
 }
 
-/// Returns the gates without a figure of a unit whose steps are all done.
+/// Returns the gates without a value of a unit whose steps are all completed.
 std::vector<Cause> find_missing_figures(const Unit& unit,
                                         const std::vector<CheckedMetric>& figures) {
   std::vector<Cause> causes;
@@ -165,13 +165,13 @@ std::vector<Cause> find_missing_figures(const Unit& unit,
   return causes;
 }
 
-/// Returns faults of the known points, of the images of the check, or of the camera there.
+/// Returns faults of the known points, of the images of the check, or of the camera in the check.
 std::vector<Cause> find_check_faults(const Unit& unit, const Calibration& calibration) {
   const UnitStep& check = unit.step(StationStep::check);
   if (!is_solved(check)) return {};
   const LampMap& lamps = unit.config().lamps;
   const PlacedCaptures captures{frames_of(check), captures_in(check.folder)};
-  // One offset of all captures is no fault of single ones; one that rotates is the camera's.
+  // A common offset is no fault of single captures; one that rotates is a fault of the camera.
   const auto offset = find_common_offset(captures.frames, lamps, calibration, captures.places);
   if (offset && !offset->in_camera) return {{describe(*offset)}};
   if (!offset) {
@@ -181,7 +181,7 @@ std::vector<Cause> find_check_faults(const Unit& unit, const Calibration& calibr
   const UnitStep& dispersion = unit.step(StationStep::dispersion);
   const PlacedCaptures own{frames_of(dispersion), captures_in(dispersion.folder)};
   std::string other = find_other_focal_length(captures, own, lamps, calibration);
-  // Without an offset, residuals may be those of a lens that is measured badly near the corners.
+  // Without an offset, residuals can be caused by a lens that is inaccurate near the corners.
   if (other.empty() && offset) {
     other = find_other_lens(captures.frames, own.frames, lamps, calibration);
   }
@@ -192,12 +192,12 @@ std::vector<Cause> find_check_faults(const Unit& unit, const Calibration& calibr
   return {};
 }
 
-/// Returns faults of the lamps and of the lens that saw them, by the captures of all steps; without
-/// these, faults of the known points or of the camera there, by the captures of the check.
+/// Returns faults of the lamps and of the lens, from the captures of all steps. Without these,
+/// returns faults of the known points or of the camera in the check.
 std::vector<Cause> find_station_faults(const Unit& unit) {
   const auto known = unit.calibration();
   if (!known) return {};
-  // A wrong row time exchanges lamps or leaves none, so it is tested first.
+  // Tested first, because a wrong row time confuses or removes lamps.
   const Lens lens(known->camera.lens_model, known->camera.intrinsics);
   std::string row_time = find_row_time_error(lamp_observations(unit), unit.config().lamps, lens,
                                              stated_row_time(unit.config()));

@@ -9,9 +9,9 @@
 
 namespace vlp {
 
-/// Returns why a unit does not pass, the most important cause first; empty if it passes. Faults of
-/// the station and of the operator come before what was measured with them, so that verdict_of()
-/// blames the camera only for its own errors.
+/// Returns the reasons why a unit does not pass, the most important one first; empty if it passes.
+/// Faults of the station and of the operator precede results that depend on them. The camera
+/// therefore fails by verdict_of() only for its own errors.
 std::vector<Cause> find_causes(const Unit& unit);
 
 }  // namespace vlp

@@ -90,14 +90,14 @@ class Verification {
     for (const Metric& metric : row_time_metrics(row_time)) values_.push_back(metric);
     const auto figures = check_all(golden_.gates, values_, unit_metrics());
     for (const CheckedMetric& figure : figures) {
-      // It is the station that is measured, and fails by its figures.
+      // The station is under test, and fails by its metrics.
       if (!figure.met()) causes_.push_back({cause_of(figure), figure.value.has_value()});
     }
-    // Whatever the gates are of: this camera is known.
+    // Independent of the gates: this camera is known.
     constexpr double min_offset_px = 0.6;
     auto faults = lamp_faults(frames_, config_.lamps, golden_.calibration, min_offset_px);
     if (!causes_.empty()) {
-      // Where all gates are met it is for them to say whether all lamps have to be seen.
+      // If all gates pass, they decide whether all lamps must be detected.
       auto unseen = unseen_lamps(frames_, config_.lamps);
       std::move(unseen.begin(), unseen.end(), std::back_inserter(faults));
     }
@@ -162,7 +162,7 @@ class Verification {
   std::vector<StepPicture> drawn_ = {};
   std::vector<Cause> causes_ = {};
   std::optional<CommonOffset> common_offset_ = {};
-  /// Describes captures of the check that were taken elsewhere.
+  /// Description of captures of the check at wrong positions.
   std::string place_fault_ = {};
   std::vector<RunRecord::Image> images_ = {};
 };

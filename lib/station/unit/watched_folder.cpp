@@ -15,7 +15,7 @@ WatchedFolder::Changes WatchedFolder::look() {
        entry.increment(error)) {
     const std::string name = entry->path().filename().string();
     if (name.starts_with('.') || !is_image_name(entry->path())) continue;
-    std::error_code gone;  // in the meantime
+    std::error_code gone;  // the file was removed
     const bool file = entry->is_regular_file(gone);
     const File found{entry->file_size(gone), entry->last_write_time(gone), false};
     if (file && !gone && found.bytes > 0) now.emplace(name, found);

@@ -10,21 +10,21 @@
 
 namespace vlp {
 
-/// A folder into which somebody puts images. It need not be there yet.
+/// Folder in which images arrive. It need not exist yet.
 class WatchedFolder {
  public:
   explicit WatchedFolder(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
   struct Changes {
-    /// By name. An image that is overwritten comes again.
+    /// New images, by name. An overwritten image is new again.
     std::vector<std::filesystem::path> came;
     std::vector<std::string> gone;
   };
-  /// What changed since the last look. An image has come when it is the same file, of the same size
-  /// and time, in two looks one after another: it is no longer written. Names that begin with a dot
-  /// are not looked at: files in the making.
+  /// Returns the changes since the last call. An image is new if file, size and time are the same
+  /// in two successive calls, so that it is no longer being written. Ignores names that begin with
+  /// a dot, which are incomplete files.
   Changes look();
-  /// Of a file that is about to be removed: that it goes is no change.
+  /// Ignores the removal of a file that the caller is about to delete.
   void forget(const std::string& name) { files_.erase(name); }
 
   const std::filesystem::path& folder() const { return folder_; }

@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 
 constexpr const char *kKept = "kept", *kState = ".run";
 
-/// Changes when the tables that tell the captures' places do.
+/// Returns a state that changes with the tables of the captures' positions.
 std::string state_of_tables(const fs::path& folder) {
   std::string state;
   for (const char* table : {"captures.csv", "truth.csv"}) {
@@ -60,7 +60,7 @@ WatchedRun::~WatchedRun() {
   if (lock_ >= 0) ::close(lock_);
 }
 
-/// Reads the name of the run from `.run`. Returns true if the run is kept.
+/// Reads the run id from `.run`. Returns true if the run is stored.
 bool WatchedRun::read_state() {
   constexpr std::size_t max_bytes = 100;
   const auto state = files_.read(kState, max_bytes);
@@ -100,7 +100,7 @@ void WatchedRun::begin(Spool& spool) {
                     "begin again when it can, or move the folder away",
                     run_, spool.away().empty() ? "the records do not have it" : spool.away()));
   }
-  if (!finished_) return;  // goes on
+  if (!finished_) return;  // the run continues
   publish_run(*finished_, {}, unit_.config().results);
   put_away();
 }
@@ -138,7 +138,7 @@ std::vector<WatchedRun::Arrival> WatchedRun::look(std::size_t most) {
 void WatchedRun::mark_kept() const {
   try {
     files_.replace(kState, fmt::format("{}\n{}\n", run_, kKept));
-  } catch (const InputError&) {  // put_away() will tell; records refuse a second verdict of a run
+  } catch (const InputError&) {  // put_away() reports it; records reject a second verdict
   }
 }
 

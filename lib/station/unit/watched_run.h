@@ -15,27 +15,31 @@
 
 namespace vlp {
 
-/// The folder of a finished run, CAPTURES/CAMERA, becomes CAPTURES/CAMERA.RUN, images and all.
+/// Renames the folder of a finished run, CAPTURES/CAMERA, to CAPTURES/CAMERA.RUN, with its images.
 /// Throws InputError.
 void put_away(const std::filesystem::path& folder, const std::string& run);
 
-/// A run of a unit whose images arrive in CAPTURES/CAMERA/STEP/. The folders are the truth: an
-/// image that is taken away is no longer of the unit, one that is overwritten counts anew, so does
-/// a captures.csv, and a program that starts again after it was killed goes on where it was, with
-/// the same name of the run (file `.run` there, with a second line when the run is kept). One
-/// program at a time.
+/// Run of a unit whose images arrive in CAPTURES/CAMERA/STEP/. One program at a time processes a
+/// camera.
+///
+/// The folders determine the state. A deleted image no longer belongs to the unit, and an
+/// overwritten image or captures.csv is processed again. A program that is started again after it
+/// was killed continues the run under the same id. File `.run` in the folder has the id, and a
+/// second line if the run is stored.
 class WatchedRun {
  public:
-  /// Makes the folders. Throws InputError: another program works on this camera, a folder cannot be
-  /// made or is a symbolic link, `.run` names no run or one of another camera, a run that is kept
-  /// was not put away and its record cannot be read.
+  /// Creates the folders and starts or continues the run. Throws InputError if
+  /// - another program processes this camera,
+  /// - a folder cannot be created or is a symbolic link,
+  /// - `.run` contains no run id, or that of another camera, or
+  /// - a stored run was not moved away and its record cannot be read.
   WatchedRun(Unit& unit, Spool& spool);
   ~WatchedRun();
   WatchedRun(const WatchedRun&) = delete;
   WatchedRun& operator=(const WatchedRun&) = delete;
 
-  /// The record of a run that was killed after its verdict: it is published and put away, and there
-  /// is nothing left to look at.
+  /// Returns the record of a run whose program was killed after the verdict. The run is already
+  /// published and moved away, and no images are left to process.
   const std::optional<RunRecord>& finished() const { return finished_; }
 
   struct Arrival {
@@ -43,11 +47,12 @@ class WatchedRun {
     std::string image;
     bool gone;
   };
-  /// Takes what changed, a few images at a time, and solves what has enough.
+  /// Processes changes, at most `max_images` images, and solves the steps that are complete.
+  /// Returns the changes.
   std::vector<Arrival> look(std::size_t most);
 
-  /// Removes the file of a refused image, not the refusal (Unit::discard). Throws InputError if it
-  /// cannot be removed.
+  /// Deletes the file of a rejected image; its rejection remains (Unit::discard). Throws InputError
+  /// if it cannot be deleted.
   void discard(StationStep step, const std::string& image);
 
   const std::string& run() const { return run_; }
@@ -56,7 +61,7 @@ class WatchedRun {
     return step_folders_[static_cast<std::size_t>(step)];
   }
 
-  /// After the run is kept: from then on it is not judged again, though the records be away.
+  /// Marks the run as stored. It is not judged again afterwards, even if the records are offline.
   void mark_kept() const;
   /// Renames the folder by put_away(). Throws InputError also if its path leads elsewhere by now.
   void put_away() const;

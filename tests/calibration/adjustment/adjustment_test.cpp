@@ -20,7 +20,7 @@ std::vector<int> moved_lamps(const AdjustmentResult& result) {
   return ids;
 }
 
-TEST(Adjustment, FindsAllOfItWithoutNoiseFromARightMap) {
+TEST(AdjustCaptures, ReturnsExactResultWithoutNoise) {
   Survey survey;
   survey.five_places(1e-4);
   survey.stand({{0.2, -0.1, 0}, 2.0});
@@ -39,7 +39,7 @@ TEST(Adjustment, FindsAllOfItWithoutNoiseFromARightMap) {
   EXPECT_TRUE(moved_lamps(found).empty());
 }
 
-TEST(Adjustment, RefinesAMapThatIsOffByTapeMeasureOrByPaces) {
+TEST(AdjustCaptures, RefinesMapWithMillimeterOrCentimeterErrors) {
   for (const double sd_m : {0.002, 0.02}) {
     Random random(3);
     Survey survey(sd_m);
@@ -61,7 +61,7 @@ TEST(Adjustment, RefinesAMapThatIsOffByTapeMeasureOrByPaces) {
   }
 }
 
-TEST(Adjustment, NamesALampThatHasMovedAndKeepsTheOthersFromIt) {
+TEST(AdjustCaptures, DetectsLampMovedByCentimeters) {
   for (const double by_m : {0.01, 0.03}) {
     Random random(4);
     Survey survey(0.001);
@@ -75,8 +75,8 @@ TEST(Adjustment, NamesALampThatHasMovedAndKeepsTheOthersFromIt) {
   }
 }
 
-/// A survey of 0.5 mm, pixels as noisy as real captures' are: 3 mm is named whatever lamp it is.
-TEST(Adjustment, NamesALampThatIsThreeMillimetresOff) {
+/// Survey with sd 0.5 mm, pixel noise as in real captures.
+TEST(AdjustCaptures, DetectsAnyLampMovedByThreeMillimeters) {
   for (std::size_t moved = 0; moved < 8; ++moved) {
     Random random(50 + moved);
     Survey survey(0.0005);
@@ -92,7 +92,7 @@ TEST(Adjustment, NamesALampThatIsThreeMillimetresOff) {
   }
 }
 
-TEST(Adjustment, DoesNotSpreadAMovedLampWithoutKnownPlaces) {
+TEST(AdjustCaptures, KeepsOtherLampsExactWhenOneMoved) {
   Survey survey(0.001);
   survey.turn({0, 0, 0}, 12);
   survey.turn({0.3, 0.1, 0.3}, 12);
@@ -100,14 +100,14 @@ TEST(Adjustment, DoesNotSpreadAMovedLampWithoutKnownPlaces) {
   const AdjustmentResult found = adjust_captures(survey.input);
   ASSERT_TRUE(found.ok()) << found.undetermined;
   EXPECT_EQ(moved_lamps(found), std::vector<int>{5});
-  // With its survey out of the way nothing else is off.
+  // Without the survey of the moved lamp, the other lamps are exact.
   for (std::size_t i = 0; i < 8; ++i) {
     EXPECT_THAT(survey.misplaced(i, found.refined), IsNear(Eigen::Vector3d(0, 0, 0), 1e-7));
   }
   EXPECT_THAT(found.notes, testing::Contains(HasSubstr("0 known places")));
 }
 
-TEST(Adjustment, SaysWhatASpotWithoutATurnLacks) {
+TEST(AdjustCaptures, ReportsMissingSecondHeight) {
   Survey survey;
   survey.turn({0, 0, 0}, 1);
   survey.input.captures[0].detections.resize(2);
@@ -118,7 +118,7 @@ TEST(Adjustment, SaysWhatASpotWithoutATurnLacks) {
   EXPECT_THAT(*found.center.lever_arm_m, IsNear(survey.lever_arm_m, 1e-6));
 }
 
-TEST(Adjustment, NamesAWrongPlace) {
+TEST(AdjustCaptures, DetectsWrongKnownPosition) {
   Survey survey;
   survey.five_places(1e-4);
   for (auto& capture : survey.input.captures) {
@@ -131,7 +131,7 @@ TEST(Adjustment, NamesAWrongPlace) {
   EXPECT_THAT(found.places[2].misfit_m, IsNear(Eigen::Vector3d(-0.02, 0, 0), 1e-6));
 }
 
-TEST(Adjustment, CorrectsTheLensWithinItsCovarianceAndNamesAnotherLens) {
+TEST(AdjustCaptures, DetectsLensContradictingItsCovariance) {
   Survey survey(0.001);
   Camera& camera = survey.input.calibration.camera;
   const Eigen::MatrixXd covariance = lens_covariance(camera, 0.2, 6);
@@ -148,12 +148,12 @@ TEST(Adjustment, CorrectsTheLensWithinItsCovarianceAndNamesAnotherLens) {
   EXPECT_TRUE(wrong.lens_contradicted) << wrong.lens_chi_squared << " of " << wrong.lens_freedom;
 }
 
-TEST(StatedLensCovariance, IsOfWhatMovesTheImageBySoMuch) {
+TEST(MakeLensCovariance, MatchesImageDisplacement) {
   const Camera camera{"", {800, 600}, LensModel::pinhole, {500, 400, 399.5, 299.5}, {}, {}, {}};
   const MatrixX covariance = stated_lens_covariance(camera, 3);
   // Rays evenly over the image: (u - cx) / fx has the mean square (800^2 - 50^2) / 12 / 500^2.
   const double x = (640000 - 2500) / 12.0 / 250000, y = (360000 - 37.5 * 37.5) / 12.0 / 160000;
-  // Per axis: what moves one of them alone moves both by half as much, in squares.
+  // An error that displaces one axis alone has half the mean square over both axes.
   EXPECT_NEAR(covariance(0, 0), 9 / (x / 2), 1e-6);
   EXPECT_NEAR(covariance(1, 1), 9 / (y / 2), 1e-6);
   EXPECT_NEAR(covariance(2, 2), 18, 1e-9);
@@ -161,8 +161,8 @@ TEST(StatedLensCovariance, IsOfWhatMovesTheImageBySoMuch) {
   EXPECT_EQ(covariance(0, 1), 0);
 }
 
-/// A lens from elsewhere, its focal lengths 4 % too small and its distortion another's.
-TEST(Adjustment, FindsALensOfWhichNothingIsStated) {
+/// Lens of another camera: focal lengths 4 % too small, different distortion.
+TEST(AdjustCaptures, EstimatesLensOfUnknownUncertainty) {
   Random random(8);
   Survey survey(0.002);
   Camera& camera = survey.input.calibration.camera;
@@ -188,7 +188,7 @@ TEST(Adjustment, FindsALensOfWhichNothingIsStated) {
   EXPECT_THAT(*found.center.lever_arm_m, IsNear(survey.lever_arm_m, 2e-4));
 }
 
-TEST(Adjustment, LeavesOutDetectionsOfAnotherLamp) {
+TEST(AdjustCaptures, RejectsMisidentifiedDetections) {
   Survey survey;
   survey.five_places(1e-4);
   std::swap(survey.input.captures[7].detections[0].lamp,
@@ -199,7 +199,7 @@ TEST(Adjustment, LeavesOutDetectionsOfAnotherLamp) {
   EXPECT_THAT(*found.center.lever_arm_m, IsNear(survey.lever_arm_m, 1e-7));
 }
 
-TEST(Adjustment, IsTheSameToTheLastBit) {
+TEST(AdjustCaptures, ReturnsIdenticalResultWhenRepeated) {
   Random random(5);
   Survey survey(0.002);
   survey.five_places(1e-4);
@@ -211,7 +211,7 @@ TEST(Adjustment, IsTheSameToTheLastBit) {
   EXPECT_EQ(once.center.zenith_in_camera, again.center.zenith_in_camera);
 }
 
-TEST(Adjustment, SaysWhenNoCaptureCanBeUsed) {
+TEST(AdjustCaptures, ReportsNoUsableCapture) {
   Survey survey;
   survey.input.captures.push_back({"alone", {{1, {400, 300}, 0.1}}});
   const AdjustmentResult found = adjust_captures(survey.input);

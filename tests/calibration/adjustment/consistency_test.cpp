@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// What fixes say of their error, over whole recalibrations: lens, survey, places, turns and check
-/// with their noise, each time anew. Boards are represented by a lens drawn from its covariance.
+/// Consistency of the covariances of fixes, over whole recalibrations. Lens, survey, positions,
+/// rotations and check captures have new noise each time. Boards are represented by a lens drawn
+/// from its covariance.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -17,14 +18,14 @@ struct Case {
   const char* name;
   double map_sd_m;
   int places;
-  /// What the lens is known from.
+  /// Source of the lens: exact, calibrated with boards, or of another camera.
   enum { exact, boards, elsewhere } lens;
   bool refined;
 };
 
-class Consistency : public testing::TestWithParam<Case> {};
+class AdjustCapturesCovariance : public testing::TestWithParam<Case> {};
 
-/// A calibration and the map that goes with it, from one survey.
+/// Calibration and the map that belongs to it, from one survey.
 struct Unit {
   Calibration calibration;
   LampMap map;
@@ -53,7 +54,7 @@ Unit calibrated(Survey& survey, const Case& the, Random& random) {
   return {with_adjustment(result, found.center, adjustment, {}), map};
 }
 
-TEST_P(Consistency, OfWhatFixesSayOfTheirError) {
+TEST_P(AdjustCapturesCovariance, YieldsConsistentFixCovariances) {
   const Case& the = GetParam();
   constexpr int trials = 200;
   Random random(20 + static_cast<std::uint64_t>(the.places));
@@ -92,7 +93,7 @@ TEST_P(Consistency, OfWhatFixesSayOfTheirError) {
 }
 
 INSTANTIATE_TEST_SUITE_P(
-    Adjustment, Consistency,
+    Adjustment, AdjustCapturesCovariance,
     testing::Values(Case{"GoodMapOnePlace", 1e-4, 1, Case::exact, true},
                     Case{"TapedMapThreePlaces", 2e-3, 3, Case::exact, true},
                     Case{"TapedMapOnePlaceAndLens", 2e-3, 1, Case::boards, true},

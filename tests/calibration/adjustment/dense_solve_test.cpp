@@ -1,7 +1,8 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// The adjustment against one written again from its equations: derivatives by differences, one
-/// dense matrix, QR, Eigen alone; and its own derivatives against differences.
+/// Compares the adjustment with an independent implementation of its equations: numeric
+/// derivatives, one dense matrix, QR, Eigen only. Compares its analytic derivatives with finite
+/// differences.
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
@@ -17,8 +18,8 @@
 namespace vlp {
 namespace {
 
-/// Two turns on spots, one with a place of its axis, a camera that stands at a known place, and one
-/// that leans with its robot.
+/// Returns two rotations in place, one about a known axis, a capture at a known position, and a
+/// capture of a tilted robot.
 Survey small_survey(double map_sd_m, bool lens, Random& random) {
   Survey survey(map_sd_m);
   survey.turn({-0.4, -0.2, 0}, 4, 2e-4);
@@ -31,15 +32,15 @@ Survey small_survey(double map_sd_m, bool lens, Random& random) {
   Calibration& calibration = survey.input.calibration;
   if (lens) draw_lens(calibration, lens_covariance(calibration.camera, 0.1, 8), random);
   survey.add_noise(random, true, map_sd_m > 0, false);
-  // Stated larger than it is, so that the residuals do not raise it.
+  // Larger than the noise, so that the residuals do not increase it.
   for (AdjustmentCapture& capture : survey.input.captures) {
     for (Detection& detection : capture.detections) *detection.sigma_px *= 1.5;
   }
   return survey;
 }
 
-/// All unknowns in a row: lens (whitened), zenith, lever arm, lamps, a spot's axis and the height
-/// of its camera, and of each capture the yaw, with its place before it where it stands by itself.
+/// Reference solution. Unknowns: lens (whitened), zenith, lever arm, lamps; per spot the axis and
+/// the height of its camera; per capture the yaw, preceded by its position if it is on no spot.
 class DenseAdjustment {
  public:
   explicit DenseAdjustment(const Survey& survey) : input_(survey.input) {
@@ -56,7 +57,7 @@ class DenseAdjustment {
       start.insert(start.end(), lamp.position_m.begin(), lamp.position_m.end());
     }
     std::map<std::string, Eigen::Index> spots;
-    // Near the truth, which the test knows.
+    // Initial values near the ground truth.
     const std::map<std::string, Eigen::Vector3d> axes{{"spot-0", {-0.4, -0.2, 0}},
                                                       {"spot-4", {0.4, 0.2, 0.2}}};
     int k = 0;
@@ -107,7 +108,7 @@ class DenseAdjustment {
     }
   }
 
-  /// Intrinsics, zenith, lever arm, lamps; and their covariance.
+  /// Returns intrinsics, zenith, lever arm and lamps.
   Eigen::VectorXd shared() const {
     Eigen::VectorXd values(intrinsics_.size() + 4 + 3 * lamp_count());
     values << intrinsics_ + lens_root_ * state_.head(zenith_),
@@ -130,20 +131,20 @@ class DenseAdjustment {
   };
   Eigen::Index lamp_count() const { return std::ssize(input_.lamps.lamps); }
   bool map_is_exact() const { return *input_.lamps.lamps.front().sd_m == 0; }
-  /// Of the unknowns that are estimated.
+  /// Returns the state index of estimated unknown i.
   Eigen::Index free(Eigen::Index i) const {
     return map_is_exact() && i >= lamps_ ? i + 3 * lamp_count() : i;
   }
 
   Eigen::VectorXd residuals(const Eigen::VectorXd& state) const {
-    std::vector<double> all(state.data(), state.data() + zenith_);  // the lens' prior
+    std::vector<double> all(state.data(), state.data() + zenith_);  // prior of the lens
     const auto add = [&all](const auto& values) {
       for (const double value : values) all.push_back(value);
     };
     const Eigen::VectorXd intrinsics = intrinsics_ + lens_root_ * state.head(zenith_);
     const Lens lens(input_.calibration.camera.lens_model,
                     std::vector<double>(intrinsics.begin(), intrinsics.end()));
-    // The shortest turn from Z; Eigen's own costs the compiler a decomposition.
+    // Smallest rotation of Z to the zenith; that of Eigen costs the compiler a decomposition.
     const Eigen::Vector3d zenith =
         Eigen::Vector3d(state[zenith_], state[zenith_ + 1], 1).normalized();
     const Eigen::Quaterniond camera_from_base =
@@ -210,9 +211,9 @@ struct Known {
   double map_sd_m;
   bool lens;
 };
-class DenseSolve : public testing::TestWithParam<Known> {};
+class AdjustCapturesReference : public testing::TestWithParam<Known> {};
 
-TEST_P(DenseSolve, IsTheAdjustmentsSolution) {
+TEST_P(AdjustCapturesReference, MatchesDenseLeastSquares) {
   Random random(31);
   const Survey survey = small_survey(GetParam().map_sd_m, GetParam().lens, random);
   const AdjustmentResult found = adjust_captures(survey.input);
@@ -235,7 +236,7 @@ TEST_P(DenseSolve, IsTheAdjustmentsSolution) {
   }
   const Eigen::MatrixXd covariance = dense.covariance();
   const Eigen::VectorXd sd = covariance.diagonal().cwiseSqrt();
-  // In standard deviations: where Ceres stops, and what differences leave.
+  // In standard deviations: stop tolerance of Ceres, and error of finite differences.
   constexpr double stopped = 1e-5, least = 1e-13;
   for (Eigen::Index i = 0; i < values.size(); ++i) {
     EXPECT_NEAR(values[i], expected[i], stopped * sd[i] + least * (1 + std::abs(expected[i]))) << i;
@@ -248,22 +249,22 @@ TEST_P(DenseSolve, IsTheAdjustmentsSolution) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Adjustment, DenseSolve,
+INSTANTIATE_TEST_SUITE_P(Adjustment, AdjustCapturesReference,
                          testing::Values(Known{"ExactMap", 0, false},
                                          Known{"RefinedMap", 2e-3, false},
                                          Known{"ExactMapAndLens", 0, true},
                                          Known{"RefinedMapAndLens", 2e-3, true}),
                          [](const auto& one) { return one.param.name; });
 
-/// A lens that may move, a lamp, a capture that turns on a spot and one that leans and drives by
-/// itself.
-class Derivatives : public testing::Test {
+/// Problem with a free lens, two lamps, a capture on a spot, and a moving capture of a tilted
+/// robot.
+class AdjustmentDerivatives : public testing::Test {
  protected:
   Camera camera = synthetic_camera();
   AdjustmentProblem problem{camera.lens_model, LensFreedom(camera, lens_covariance(camera, 0.1, 6)),
                             2, 1};
 
-  Derivatives() {
+  AdjustmentDerivatives() {
     const AdjustmentLayout& at = problem.layout();
     problem.lamps = {{{0.4, 0.3, 1.6}, 0.001}, {{-0.5, 0.2, 1.5}, 0.001}};
     KnownMotion motion;
@@ -282,8 +283,9 @@ class Derivatives : public testing::Test {
     state.segment<3>(at.spot(0)) << -0.1, 0.1, 0.05;
   }
 
-  /// Of what `value` gives, by these unknowns.
+  /// Differentiates `value` numerically with respect to the unknowns [first, first + size).
   template <typename Value>
+  /// Differentiates `value` numerically with respect to the unknowns [first, first + size).
   Eigen::MatrixXd differences(Eigen::Index first, Eigen::Index size, const Value& value) {
     Eigen::MatrixXd result(value().size(), size);
     for (Eigen::Index i = 0; i < size; ++i) {
@@ -300,7 +302,7 @@ class Derivatives : public testing::Test {
   }
 };
 
-TEST_F(Derivatives, OfSightingsAreThoseOfDifferences) {
+TEST_F(AdjustmentDerivatives, LinearizeMatchesFiniteDifferences) {
   const AdjustmentLayout& at = problem.layout();
   for (const std::size_t capture : {0U, 1U}) {
     for (const std::size_t lamp : {0U, 1U}) {
@@ -328,7 +330,7 @@ TEST_F(Derivatives, OfSightingsAreThoseOfDifferences) {
   }
 }
 
-TEST_F(Derivatives, OfTheZenithsTurnAreThoseOfDifferences) {
+TEST_F(AdjustmentDerivatives, RotateByZenithMatchesFiniteDifferences) {
   const Eigen::Vector3d x(0.3, -0.5, 1.2);
   Eigen::Vector2d zenith(0.2, -0.1);
   const ZenithTurn turn = turn_by_zenith(zenith, x);

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// The adjustment of captures of a camera that drives and turns while its shutter reads.
+/// Adjustment of captures of a camera that moves and rotates during readout.
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
@@ -17,7 +17,7 @@ namespace {
 const Eigen::Vector2d kArm_m(0.009, -0.004);
 constexpr double kPlaceSd_m = 1e-4;
 
-/// A drive of which a tracker knows where the axis is.
+/// Returns captures of a moving camera with known positions of the axis.
 AdjustmentInput tracked_drive(const BodyRig& rig, const MovingCaptures& captures,
                               const std::vector<KnownMotion>& motions) {
   AdjustmentInput input{{}, rig.map, rig.calibration};
@@ -35,7 +35,7 @@ AdjustmentInput tracked_drive(const BodyRig& rig, const MovingCaptures& captures
   return input;
 }
 
-/// Of zenith point and lever arm.
+/// Returns the errors of zenith point and lever arm.
 Eigen::Vector4d error_of(const AdjustmentResult& found, const BodyRig& rig) {
   Eigen::Vector4d error;
   error << zenith_point(found.center) - zenith_point(*rig.calibration.rotation_center),
@@ -43,7 +43,7 @@ Eigen::Vector4d error_of(const AdjustmentResult& found, const BodyRig& rig) {
   return error;
 }
 
-TEST(MovingAdjustment, IsExactWithoutNoise) {
+TEST(AdjustCaptures, ReturnsExactResultForMovingCamera) {
   Random random(1);
   const BodyRig rig = leaning_body();
   const MovingCaptures captures = moving_captures(rig, 16, 2, random, 1e-3);
@@ -58,8 +58,8 @@ TEST(MovingAdjustment, IsExactWithoutNoise) {
   EXPECT_THAT(error_of(found, rig), IsNear(Eigen::Vector4d(0, 0, 0, 0), 1e-8));
 }
 
-/// A turn on the spot that does not stop for its captures.
-TEST(MovingAdjustment, IsExactOfACameraThatTurnsOnItsSpots) {
+/// Rotation in place without stops.
+TEST(AdjustCaptures, ReturnsAccurateResultForRotatingCamera) {
   BodyRig rig = leaning_body();
   const double rate_rad_per_s = 2;
   const auto turned = [&](double stated_rad_per_s) {
@@ -70,7 +70,8 @@ TEST(MovingAdjustment, IsExactOfACameraThatTurnsOnItsSpots) {
         const double yaw_rad = 0.3 + k * M_PI / 6;
         const Eigen::Vector3d arm_m(kArm_m.x(), kArm_m.y(), 0);
         rig.body.pose = {axis_m + rotation_about_z(yaw_rad) * arm_m, yaw_rad};
-        // The camera moves on its arm; what BodyRig lacks, its way's curve, is w^2 t^2 / 2 of it.
+        // The camera moves on its arm. The curvature of its path, w^2 t^2 / 2 of it, is not in
+        // BodyRig.
         rig.body.motion = {
             rate_rad_per_s * Eigen::Vector2d(-kArm_m.y(), kArm_m.x()), rate_rad_per_s, {0, 0}};
         AdjustmentCapture capture{std::to_string(input.captures.size()), seen_from(rig, 0.03)};
@@ -89,8 +90,7 @@ TEST(MovingAdjustment, IsExactOfACameraThatTurnsOnItsSpots) {
   EXPECT_GT(turned(0).residual_px, 1) << "two degrees from the first row to the last";
 }
 
-/// Left out, it shows in the residuals.
-TEST(MovingAdjustment, CountsResidualsOfAMotionThatIsLeftOutAsNoise) {
+TEST(AdjustCaptures, CountsIgnoredMotionAsNoise) {
   Random random(2);
   const BodyRig rig = leaning_body();
   MovingCaptures captures = moving_captures(rig, 16, 1, random, 0.05);
@@ -104,8 +104,9 @@ TEST(MovingAdjustment, CountsResidualsOfAMotionThatIsLeftOutAsNoise) {
   EXPECT_GT(error_of(left_out, rig).norm(), 3 * error_of(known, rig).norm());
 }
 
-/// e' cov^-1 e of zenith and lever arm over drives, per state; 60 of them know it within 10 %.
-TEST(MovingAdjustment, StatesWhatMotionsLeaveOpen) {
+/// Mean normalized squared error e' cov^-1 e of zenith and lever arm per unknown; 60 draws
+/// determine it to 10 %.
+TEST(AdjustCaptures, ReportsConsistentCovarianceForMovingCamera) {
   constexpr int draws = 60;
   const BodyRig rig = leaning_body();
   for (const bool odometry : {true, false}) {

@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Monte Carlo: the noise that the adjustment estimates from residuals, whatever known places add.
+/// Monte Carlo test of the noise that the adjustment estimates from residuals, for various known
+/// positions.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -19,12 +20,12 @@ constexpr double kNoise_px = 0.3;
 
 struct PlaceCase {
   const char* name;
-  /// 0: no place is known.
+  /// Standard deviation of the known positions; 0: no position is known.
   double place_sd_m;
   bool has_height;
-  /// Captures turn on spots, three on each; otherwise each stands by itself.
+  /// Captures rotate in place, three per spot; otherwise each has a position of its own.
   bool on_spots;
-  /// Places of the turning axis instead of the camera; on spots only.
+  /// Known positions are those of the rotation axis instead of the camera; on spots only.
   PlaceOf of;
   std::optional<double> reported_sigma_px;
 };
@@ -33,9 +34,10 @@ std::ostream& operator<<(std::ostream& out, const PlaceCase& variant) {
   return out << variant.name;
 }
 
-class AdjustmentNoise : public testing::TestWithParam<PlaceCase> {};
+class AdjustCapturesNoise : public testing::TestWithParam<PlaceCase> {};
 
-/// 30 captures that see four lamps each: residuals have few degrees of freedom, and places many.
+/// Returns 30 captures of four lamps each: residuals have few degrees of freedom, and known
+/// positions many.
 Survey make_survey(const PlaceCase& variant, Random& random) {
   constexpr int captures = 30, captures_per_spot = 3;
   Survey survey;
@@ -60,7 +62,7 @@ Survey make_survey(const PlaceCase& variant, Random& random) {
                 capture.detections.end());
     capture.detections.resize(4);
   }
-  // Each capture has a place error of its own if it stands by itself, each spot one if on spots.
+  // The position error is independent per capture, or per spot for captures on spots.
   survey.add_noise(random, true, true, true);
   for (auto& capture : survey.input.captures) {
     if (capture.place && !variant.has_height) capture.place->z_m.reset();
@@ -71,7 +73,7 @@ Survey make_survey(const PlaceCase& variant, Random& random) {
 
 /// 150 runs determine the rms of 2 x 150 zenith coordinates to 4 %; the noise of one run is
 /// determined to 9 % by 60 degrees of freedom, its mean to 0.7 %.
-TEST_P(AdjustmentNoise, IsTheTrueNoiseWhateverPlacesAreKnown) {
+TEST_P(AdjustCapturesNoise, MatchesTrueNoiseForAnyKnownPositions) {
   const PlaceCase& variant = GetParam();
   constexpr int runs = 150;
   Random random(61);
@@ -97,7 +99,7 @@ TEST_P(AdjustmentNoise, IsTheTrueNoiseWhateverPlacesAreKnown) {
 }
 
 INSTANTIATE_TEST_SUITE_P(
-    Places, AdjustmentNoise,
+    Places, AdjustCapturesNoise,
     testing::Values(PlaceCase{"None", 0, false, false, PlaceOf::camera, {}},
                     PlaceCase{"Coarse", 0.05, false, false, PlaceOf::camera, {}},
                     PlaceCase{"CoarseWithHeight", 0.05, true, false, PlaceOf::camera, {}},
@@ -108,7 +110,7 @@ INSTANTIATE_TEST_SUITE_P(
                     PlaceCase{"ExactOfCameraOnSpots", 1e-4, true, true, PlaceOf::camera, {}},
                     PlaceCase{"CoarseWithReportedSigmaTooSmall", 0.05, true, false, PlaceOf::camera,
                               0.15},
-                    // Too little to be beyond chance in one run.
+                    // The difference is not significant in one run.
                     PlaceCase{"CoarseWithReportedSigmaSlightlyTooSmall", 0.05, true, false,
                               PlaceOf::camera, 0.24}),
     [](const auto& variant) { return variant.param.name; });

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Tilt and lever arm from rendered images of a drive, found and solved as users do, against those
-/// from the same places of a camera that stands.
+/// Tilt and lever arm from rendered images of a moving camera, detected and solved as in the
+/// programs. Compared with those from a stationary camera at the same positions.
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
@@ -19,8 +19,8 @@
 namespace vlp {
 namespace {
 
-/// Captures under the lamps of datasets/paper-rig, in rows of 55 us.
-class RenderedDrive : public testing::Test {
+/// Captures under the lamps of datasets/paper-rig, with a row time of 55 us.
+class RenderedDriveCalibration : public testing::Test {
  protected:
   static constexpr int kCaptures = 32;
   static constexpr double kPlaceSd_m = 1e-4, kMapSd_m = 1e-4;
@@ -36,7 +36,7 @@ class RenderedDrive : public testing::Test {
   struct Drive {
     std::vector<Frame> frames;
     std::vector<KnownMotion> motions;
-    /// Of the axis.
+    /// Position of the axis in each capture.
     std::vector<Eigen::Vector3d> places_m;
   };
 
@@ -124,10 +124,10 @@ class RenderedDrive : public testing::Test {
   }
 };
 
-/// Two angles: more than three standard deviations of both together are one in a hundred.
+/// Number of standard deviations, of two angles together, that one error in a hundred exceeds.
 constexpr double kFar = 3;
 
-TEST_F(RenderedDrive, TellsTheTiltAsStandingDoes) {
+TEST_F(RenderedDriveCalibration, EstimatesTiltOfMovingCamera) {
   const Drive standing = drive(0), driving = drive(1);
   const Found of_standing = level(standing, {});
   const Found with_odometry = level(driving, odometry_of(driving, 0.01));
@@ -145,7 +145,7 @@ TEST_F(RenderedDrive, TellsTheTiltAsStandingDoes) {
   EXPECT_GT(left_out.zenith_rad, 5 * with_odometry.zenith_rad);
 }
 
-TEST_F(RenderedDrive, TellsTiltAndLeverArmByKnownPlacesAsStandingDoes) {
+TEST_F(RenderedDriveCalibration, EstimatesTiltAndLeverArmFromKnownPositions) {
   const Drive standing = drive(0), driving = drive(1);
   const Found of_standing = adjust(standing, {});
   const Found with_odometry = adjust(driving, odometry_of(driving, 0.01));

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// How good fixes and map get in a room whose map is a tape measure's or paces, over whole
-/// recalibrations, at other places than those that it was calibrated at.
+/// Accuracy of fixes and map over whole recalibrations in a room whose map was measured by tape or
+/// by paces. Fixes are at other positions than the calibration captures.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -15,11 +15,12 @@ namespace {
 
 struct Means {
   double fix_xy_m = 0, fix_z_m = 0, map_xy_m = 0, map_z_m = 0;
-  /// e' cov^-1 e per coordinate, of all lamps of the map together.
+  /// Mean squared normalized error e' cov^-1 e per coordinate, for all lamps of the map together.
   double map_squared = 0;
 };
 
-/// Means over trials: of fixes' distances, heights' errors, and the same of the lamps of the map.
+/// Returns means over trials: horizontal and vertical errors of the fixes, and of the lamps of the
+/// map.
 Means over_trials(double map_sd_m, bool places_are_wrong, int trials) {
   Random random(41);
   Means sums;
@@ -62,12 +63,12 @@ struct Room {
   const char* name;
   double map_sd_m;
   bool places_are_wrong;
-  /// What the means stay below.
+  /// Upper limits of the means.
   Means limits;
 };
-class RoomAccuracy : public testing::TestWithParam<Room> {};
+class AdjustCapturesAccuracy : public testing::TestWithParam<Room> {};
 
-TEST_P(RoomAccuracy, OfFixesAtOtherPlacesAndOfTheRefinedMap) {
+TEST_P(AdjustCapturesAccuracy, KeepsFixAndMapErrorsBelowLimits) {
   const Room& the = GetParam();
   const Means found = over_trials(the.map_sd_m, the.places_are_wrong, 10);
   std::printf("%s: fixes %.4f mm, height %.4f mm; map %.4f mm, height %.4f mm, squared %.3f\n",
@@ -77,14 +78,14 @@ TEST_P(RoomAccuracy, OfFixesAtOtherPlacesAndOfTheRefinedMap) {
   EXPECT_LT(found.fix_z_m, the.limits.fix_z_m);
   EXPECT_LT(found.map_xy_m, the.limits.map_xy_m);
   EXPECT_LT(found.map_z_m, the.limits.map_z_m);
-  if (the.places_are_wrong) {  // as wrong as they are said to be
+  if (the.places_are_wrong) {  // with errors of the given size
     EXPECT_NEAR(found.map_squared, 1, 0.25);
   }
 }
 
-// Places that are right, with 0.1 mm stated, and places that are wrong by that.
+// Limits for exact positions with a standard deviation of 0.1 mm, and for errors of this size.
 constexpr Means kRight{6.5e-5, 8e-5, 5e-5, 1.5e-4}, kWrong{1.1e-4, 1e-4, 1.2e-4, 1.5e-4};
-INSTANTIATE_TEST_SUITE_P(Adjustment, RoomAccuracy,
+INSTANTIATE_TEST_SUITE_P(Adjustment, AdjustCapturesAccuracy,
                          testing::Values(Room{"Taped", 0.002, false, kRight},
                                          Room{"TapedAndPlacesWrong", 0.002, true, kWrong},
                                          Room{"Paced", 0.02, false, kRight},

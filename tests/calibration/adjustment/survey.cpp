@@ -79,7 +79,8 @@ void Survey::add_noise(Random& random, bool pixels, bool map, bool axes) {
 Eigen::MatrixXd lens_covariance(const Camera& camera, double sigma_px, int rays_across) {
   const Lens lens(camera.lens_model, camera.intrinsics);
   const Eigen::Index n = std::ssize(camera.intrinsics);
-  // Boards are seen from where nobody knows: a turn of the camera is taken off.
+  // The orientation of the camera relative to the boards is unknown, so that a rotation is
+  // marginalized.
   Eigen::MatrixXd information = Eigen::MatrixXd::Zero(n + 3, n + 3);
   for (int i = 0; i < rays_across; ++i) {
     for (int j = 0; j < rays_across; ++j) {
@@ -97,7 +98,7 @@ Eigen::MatrixXd lens_covariance(const Camera& camera, double sigma_px, int rays_
       information += row.transpose() * row / (sigma_px * sigma_px);
     }
   }
-  // Regularized, as mrcal does it: coefficients of which boards tell nothing stay small.
+  // Regularization as in mrcal: coefficients that boards do not determine stay small.
   constexpr double coefficient_sd = 0.01;
   information.diagonal().segment(4, n - 4).array() += 1 / (coefficient_sd * coefficient_sd);
   return information.inverse().topLeftCorner(n, n);

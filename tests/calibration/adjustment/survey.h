@@ -9,8 +9,8 @@
 
 namespace vlp {
 
-/// A room with eight lamps at several heights, a camera that leans and sits beside its axis, and
-/// captures of it: truth, and what the adjustment gets to know.
+/// Simulated room with eight lamps at several heights and captures of a tilted camera beside its
+/// axis: ground truth, and the input of the adjustment.
 struct Survey {
   SyntheticRig truth;
   Eigen::Vector2d lever_arm_m{0.009, -0.004};
@@ -18,16 +18,17 @@ struct Survey {
 
   explicit Survey(double map_sd_m = 0.002);
 
-  /// Turns on a spot about the axis: `captures` yaws all round. With a place where `place_sd_m` is
-  /// positive, of the axis or of the camera.
+  /// Adds a rotation in place about the axis: `captures` yaws over the full circle. If `place_sd_m`
+  /// is positive, the position of the axis or of the camera is known.
   void turn(const Eigen::Vector3d& axis_m, int captures, double place_sd_m = 0,
             PlaceOf of = PlaceOf::axis);
-  /// A capture by itself, without a place.
+  /// Adds a capture with a position of its own that is not known.
   void stand(const Pose& camera);
-  /// Five known places of the axis, twelve captures each.
+  /// Adds five rotations about known axes, twelve captures each.
   void five_places(double place_sd_m);
 
-  /// Of every pixel, place, and lamp of the map, as their standard deviations say.
+  /// Adds noise to pixels, known positions and lamps of the map, according to their standard
+  /// deviations.
   void add_noise(Random& random, bool pixels, bool map, bool axes);
 
   Eigen::Vector3d misplaced(std::size_t lamp, const LampMap& map) const {
@@ -36,11 +37,13 @@ struct Survey {
   double sigma_px = 0.03;
 };
 
-/// The covariance of a lens of which boards showed the whole image: parameters correlated as those
-/// of a board are, from projections of a grid of rays with noise of this size.
+/// Returns the covariance of a lens calibrated with boards over the whole image. The parameters are
+/// correlated like those of a board calibration: it uses projections of a grid of rays with noise
+/// `sigma_px`.
 Eigen::MatrixXd lens_covariance(const Camera& camera, double sigma_px, int rays_across);
 
-/// Adds to the intrinsics an error of this covariance, which the calibration then states.
+/// Adds an error with this covariance to the intrinsics, and stores the covariance in the
+/// calibration.
 void draw_lens(Calibration& calibration, const Eigen::MatrixXd& covariance, Random& random);
 
 }  // namespace vlp

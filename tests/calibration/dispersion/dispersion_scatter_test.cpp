@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Monte Carlo: what the dispersion reports of itself is its scatter. 600 draws know a standard
-/// deviation within 2.9 %: 9 % is three of those.
+/// Monte Carlo test: the reported covariance of the dispersion matches its scatter. 600 draws
+/// determine a standard deviation to 2.9 %; the tolerance of 9 % is three times as large.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -51,44 +51,46 @@ void expect_consistent(const Station& station, const std::vector<StationCapture>
   }
 }
 
-TEST(DispersionScatter, IsTheReportedCovariance) {
+TEST(FitDispersion, CovarianceMatchesScatter) {
   Station station(0.01);
   const auto exact = station.captures(16, true, {0.003, 0.001}, 0.1);
   expect_consistent(station, exact, DispersionMethod::camera, true);
 }
 
-TEST(DispersionScatter, IsTheReportedCovarianceWhenTheFixesTellTheNoise) {
+TEST(FitDispersion, CovarianceMatchesScatterWithoutGivenNoise) {
   Station station(0.01);
   const auto exact = station.captures(16, true, {0.003, 0.001}, 0.1);
   expect_consistent(station, exact, DispersionMethod::camera, false);
 }
 
-TEST(DispersionScatter, OfHalfATurnIsTheReportedCovariance) {
+TEST(FitDispersion, CovarianceMatchesScatterForHalfRotation) {
   Station station(0.01);
   auto exact = station.captures(24, true, {0.003, 0.001}, 0.1);
   exact.resize(10);
   expect_consistent(station, exact, DispersionMethod::camera, true);
 }
 
-TEST(DispersionScatter, ByThePaperIsTheReportedCovariance) {
+TEST(FitDispersion, PaperMethodCovarianceMatchesScatter) {
   Station station(0.01);
   expect_consistent(station, station.captures_at(0.7, 30), DispersionMethod::paper, true);
 }
 
-/// How the fixes of a few captures at one yaw scatter.
+/// Few captures at one yaw, and the scatter of their fixes.
 struct FewCaptures {
   const char* name;
   int count;
   bool noise_is_stated;
-  /// Scatter of where the camera stood at the station, which no fix knows of.
+  /// Standard deviation of the true position about the reference point, which fixes cannot
+  /// determine.
   double placement_sd_m;
 };
 
-class DispersionOfFew : public testing::TestWithParam<FewCaptures> {};
+class FitDispersionWithFewCaptures : public testing::TestWithParam<FewCaptures> {};
 
-/// 600 draws of two axes know an rms to 3 % and the fraction of 5 % to 0.6 %. Few captures do not
-/// determine their scatter, so that the interval of 95 % is asserted, and sds that are larger.
-TEST_P(DispersionOfFew, ByThePaperCoversTheErrorAsStated) {
+/// 600 draws of two axes determine an RMS to 3 % and the fraction of 5 % to 0.6 %. Few captures do
+/// not determine their scatter. The test therefore checks the 95 % interval, and that standard
+/// deviations are not too small.
+TEST_P(FitDispersionWithFewCaptures, PaperMethodCoversErrorAtReportedRate) {
   const FewCaptures& few = GetParam();
   Station station(0.01);
   const auto exact = station.captures_at(0.7, few.count);
@@ -129,7 +131,7 @@ TEST_P(DispersionOfFew, ByThePaperCoversTheErrorAsStated) {
   EXPECT_LT(fraction, 0.07);
 }
 
-INSTANTIATE_TEST_SUITE_P(Paper, DispersionOfFew,
+INSTANTIATE_TEST_SUITE_P(Paper, FitDispersionWithFewCaptures,
                          testing::Values(FewCaptures{"Two", 2, true, 0},
                                          FewCaptures{"Three", 3, true, 0},
                                          FewCaptures{"Eight", 8, true, 0},
@@ -140,15 +142,15 @@ INSTANTIATE_TEST_SUITE_P(Paper, DispersionOfFew,
                                          FewCaptures{"EightPlacedBadly", 8, true, 2e-3}),
                          [](const auto& few) { return few.param.name; });
 
-/// Captures by a station under a map with errors of its sd_m, and how noise is stated.
+/// Captures at a reference point under a map with errors of its sd_m, and their given noise.
 struct Captures {
   const char* name;
   DispersionMethod method;
   int count;
   double map_sd_m;
-  /// Stated noise over the noise; std::nullopt if it is not stated.
+  /// Given noise divided by the true noise; std::nullopt if no noise is given.
   std::optional<double> stated_ratio;
-  /// Whether the captures are at two opposite yaws, each at a height of its own.
+  /// True for captures at two opposite yaws, each at a different height.
   bool has_tied_heights = false;
 };
 
@@ -168,10 +170,10 @@ std::vector<StationCapture> make_captures(Station& station, const Captures& capt
   return made;
 }
 
-class DispersionSd : public testing::TestWithParam<Captures> {};
+class FitDispersionUncertainty : public testing::TestWithParam<Captures> {};
 
-/// 600 draws of two axes know an rms to 3 % and the fraction of 5 % to 0.6 %.
-TEST_P(DispersionSd, CoversTheErrorAsStated) {
+/// 600 draws of two axes determine an RMS to 3 % and the fraction of 5 % to 0.6 %.
+TEST_P(FitDispersionUncertainty, CoversErrorAtReportedRate) {
   const Captures& cell = GetParam();
   Station station(0.01);
   const auto exact = make_captures(station, cell);
@@ -212,17 +214,17 @@ TEST_P(DispersionSd, CoversTheErrorAsStated) {
   }
   const double ratio = std::sqrt(squares), fraction = beyond / (2.0 * kStations);
   std::printf("%s: e/sd %.2f, beyond 95 %%: %.1f %%\n", cell.name, ratio, 100 * fraction);
-  // Three captures whose noise is not stated have two degrees of freedom: t^2 has no mean.
+  // Three captures without given noise have two degrees of freedom: t^2 has no mean.
   if (cell.count > 3 || cell.stated_ratio) {
     EXPECT_LT(ratio, 1.2);
     EXPECT_GT(ratio, 0.8);
   }
-  // What is fixed in the world rests on the map alone: its noise is far below the map's errors.
+  // The world offset depends mainly on the map: its noise is far below the errors of the map.
   if (cell.method == DispersionMethod::camera && cell.map_sd_m > 0) {
     EXPECT_NEAR(std::sqrt(world_squares / (2 * kStations)), 1, kStationTolerance);
   }
-  // Three captures whose noise is stated 1.4 times too small cover 93.2 % on average
-  // (VarianceFactor below), which 600 draws of two axes know to 0.7 %.
+  // Three captures whose given noise is 1.4 times too small cover 93.2 % on average
+  // (ComputeVarianceFactor below). 600 draws of two axes determine this to 0.7 %.
   const bool is_understated = cell.stated_ratio.value_or(1) < 1;
   EXPECT_LT(fraction, is_understated ? 0.068 + 2 * 0.007 : 0.05 + 3 * 0.0063);
   EXPECT_GT(fraction, 0.01);
@@ -230,7 +232,7 @@ TEST_P(DispersionSd, CoversTheErrorAsStated) {
 
 constexpr DispersionMethod kCamera = DispersionMethod::camera, kPaper = DispersionMethod::paper;
 INSTANTIATE_TEST_SUITE_P(
-    Captures, DispersionSd,
+    Captures, FitDispersionUncertainty,
     testing::Values(Captures{"PaperThreeUnderMapErrors", kPaper, 3, 2e-3, 1},
                     Captures{"PaperTwelveUnderMapErrors", kPaper, 12, 2e-3, 1},
                     Captures{"PaperTwelveUnderMapErrorsNoiseNotStated", kPaper, 12, 2e-3, {}},
@@ -247,7 +249,8 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& captures) { return captures.param.name; });
 
 constexpr double kPixelNoise_px = 0.1, kMapSd_m = 2e-3;
-/// Distance of the second group of lamps from the first, which the station does not see.
+/// Distance of the second group of lamps from the first, which is not visible from the reference
+/// point.
 constexpr double kFar_m = 3.5;
 
 std::vector<Detection> detect_in_image(const SyntheticRig& rig) {
@@ -260,7 +263,7 @@ std::vector<Detection> detect_in_image(const SyntheticRig& rig) {
   return detections;
 }
 
-/// Station under eight lamps, with eight more at kFar_m.
+/// Returns a reference point under eight lamps, with eight more at kFar_m.
 Station make_station_with_far_lamps() {
   Station station(0);
   LampMap& map = station.rig.map;
@@ -296,7 +299,7 @@ std::vector<StationCapture> draw_captures(SyntheticRig& rig, DispersionMethod me
   return drawn;
 }
 
-/// Squared errors over variances of x and y, summed.
+/// Sum of the squared errors of x and y divided by their variances.
 struct PlaceConsistency {
   const char* place;
   Pose camera;
@@ -304,10 +307,10 @@ struct PlaceConsistency {
   int count = 0;
 };
 
-class FixesAfterDispersion : public testing::TestWithParam<DispersionMethod> {};
+class PositionerAfterDispersion : public testing::TestWithParam<DispersionMethod> {};
 
-/// 600 draws of two axes know an rms to 2.1 % to 2.9 %, as the axes are correlated.
-TEST_P(FixesAfterDispersion, HaveTheErrorsThatTheyState) {
+/// 600 draws of two axes determine an RMS to 2.1 % to 2.9 %, as the axes are correlated.
+TEST_P(PositionerAfterDispersion, ReportsConsistentCovariance) {
   constexpr int draws = 600;
   Station station = make_station_with_far_lamps();
   SyntheticRig& rig = station.rig;
@@ -324,7 +327,7 @@ TEST_P(FixesAfterDispersion, HaveTheErrorsThatTheyState) {
     Calibration calibration = station.believed;
     calibration.dispersion = fit.dispersion;
     const Positioner positioner(surveyed, calibration);
-    // As if the errors of offset and map were independent.
+    // Simulates independent errors of offset and map.
     for (auto& lamp : calibration.dispersion->by_lamps) lamp.position_m.z() += 1;
     const Positioner independent(surveyed, calibration);
     for (PlaceConsistency& place : places) {
@@ -349,31 +352,31 @@ TEST_P(FixesAfterDispersion, HaveTheErrorsThatTheyState) {
                 1e3 * std::sqrt(place.variance_without_lamps / place.count));
     EXPECT_NEAR(ratio, 1, 0.1) << place.place;
   }
-  // The offset compensates the error of the map only where it was found with it.
+  // The offset compensates errors of the map only under the lamps that were used for it.
   EXPECT_NEAR(places[2].variance, places[2].variance_without_lamps, 0.01 * places[2].variance);
 }
 
-INSTANTIATE_TEST_SUITE_P(Methods, FixesAfterDispersion,
+INSTANTIATE_TEST_SUITE_P(Methods, PositionerAfterDispersion,
                          testing::Values(DispersionMethod::camera, DispersionMethod::paper),
                          [](const auto& method) {
                            return method.param == DispersionMethod::camera ? "Camera" : "Paper";
                          });
 
-TEST(VarianceFactor, IsContinuousAndRisesWithTheResiduals) {
+TEST(ComputeVarianceFactor, IncreasesContinuouslyWithResiduals) {
   for (const double freedom : {2.0, 4.0, 8.0, 40.0}) {
     constexpr double step = 1.01;
     double former = compute_variance_factor(0.1, freedom, true);
     for (double ratio = 0.1 * step; ratio < 20; ratio *= step) {
       const double factor = compute_variance_factor(ratio, freedom, true);
       EXPECT_GE(factor, former);
-      // The steepest part is a power of some six of the ratio.
+      // At its steepest, the factor grows about with the sixth power of the ratio.
       EXPECT_LT(factor, 1.08 * former) << ratio;
       former = factor;
     }
   }
 }
 
-TEST(VarianceFactor, IsThatOfTheResidualsOrOfTheNoiseForManyDegreesOfFreedom) {
+TEST(ComputeVarianceFactor, ReturnsResidualOrGivenVarianceForManyDegreesOfFreedom) {
   constexpr double many = 1e5;
   EXPECT_NEAR(compute_variance_factor(0.5, many, false), 0.5, 1e-3);
   EXPECT_NEAR(compute_variance_factor(2, many, false), 2, 1e-3);
@@ -381,8 +384,9 @@ TEST(VarianceFactor, IsThatOfTheResidualsOrOfTheNoiseForManyDegreesOfFreedom) {
   EXPECT_NEAR(compute_variance_factor(2, many, true), 2, 1e-3);
 }
 
-/// Noise as stated, 1.4 times as large, and not stated. 20,000 draws know the coverage to 0.15 %.
-TEST(VarianceFactor, CoversTheErrorsAsStated) {
+/// Given noise equal to the true noise, 1.4 times too small, and absent. 20,000 draws determine the
+/// coverage to 0.15 %.
+TEST(ComputeVarianceFactor, CoversErrorsAtNominalRate) {
   struct FactorCase {
     double freedom, noise_ratio;
     bool is_stated;

@@ -14,7 +14,7 @@
 namespace vlp {
 namespace {
 
-TEST(Dispersion, SeparatesCameraFromWorldExactly) {
+TEST(FitDispersion, SeparatesCameraAndWorldErrorsExactly) {
   Random random(1);
   for (const double error_rad : {0.0, 0.005, 0.05}) {
     Station station(error_rad);
@@ -32,7 +32,7 @@ TEST(Dispersion, SeparatesCameraFromWorldExactly) {
     Calibration corrected = station.believed;
     corrected.dispersion = fit.dispersion;
     const Positioner positioner(station.rig.map, corrected);
-    for (int i = 0; i < 20; ++i) {  // elsewhere, at other heights and yaws
+    for (int i = 0; i < 20; ++i) {  // other positions, heights and yaws
       station.rig.camera = {{random.uniform(-0.4, 0.4), random.uniform(-0.3, 0.3), 0.02 * i},
                             random.uniform(-3, 3)};
       const Fix fix = positioner.locate(seen_from(station.rig));
@@ -42,7 +42,7 @@ TEST(Dispersion, SeparatesCameraFromWorldExactly) {
   }
 }
 
-TEST(Dispersion, OfAShiftedCentreIsThatShift) {
+TEST(FitDispersion, ReturnsOffsetOfShiftedCenter) {
   Station station(0);
   station.believed.rotation_center.reset();
   station.rig.calibration.rotation_center.reset();
@@ -56,8 +56,8 @@ TEST(Dispersion, OfAShiftedCentreIsThatShift) {
   EXPECT_NEAR(fit.before.radius, radius_m, 0.01 * radius_m) << "a full turn draws the circle";
 }
 
-/// The paper's equations hold for a shift under lamps of one height, whatever the yaw is.
-TEST(Dispersion, ByThePaperIsExactForAShiftAtOneYaw) {
+/// The paper's equations are exact for a shift and lamps of one height, at any yaw.
+TEST(FitDispersion, PaperMethodReturnsShiftAtOneYaw) {
   for (const DispersionCircle circle : {DispersionCircle::mean, DispersionCircle::enclosing}) {
     Station station(0);
     station.believed.rotation_center.reset();
@@ -69,16 +69,16 @@ TEST(Dispersion, ByThePaperIsExactForAShiftAtOneYaw) {
                                       DispersionMethod::paper, circle);
       ASSERT_EQ(fit.status, DispersionStatus::ok);
       EXPECT_FALSE(fit.world_offset_m.has_value());
-      // Fixes of many lamps weigh them by the lens, which a shift does not leave alone.
+      // Fixes of many lamps have weights by the lens, which depend on the shift.
       EXPECT_THAT(fit.dispersion.offset_px, IsNear(Eigen::Vector2d(6, -4), 0.01));
       EXPECT_LT(fit.after.center.norm(), 1e-9);
     }
   }
 }
 
-/// After a rotation centre of model `tilt` the offset is applied as a turn: f / H and the yaw alone
-/// would leave a tenth of 16 mm.
-TEST(Dispersion, ByThePaperPutsTheCircleOnTheStationOfACameraThatLeans) {
+/// After a rotation center of model `tilt` the offset is applied as a rotation. The factor f / H
+/// and the yaw alone would leave 10 % of 16 mm.
+TEST(FitDispersion, PaperMethodCentersCircleForTiltedCamera) {
   for (const DispersionCircle circle : {DispersionCircle::mean, DispersionCircle::enclosing}) {
     Station station(0.01);
     Random random(3);
@@ -94,7 +94,7 @@ TEST(Dispersion, ByThePaperPutsTheCircleOnTheStationOfACameraThatLeans) {
   }
 }
 
-TEST(Dispersion, ByThePaperTakesAnErrorOfTheStationForTheCameras) {
+TEST(FitDispersion, PaperMethodAttributesReferencePointErrorToCamera) {
   Station station(0);
   station.believed.rotation_center.reset();
   station.rig.calibration.rotation_center.reset();
@@ -107,7 +107,7 @@ TEST(Dispersion, ByThePaperTakesAnErrorOfTheStationForTheCameras) {
   }
 }
 
-TEST(Dispersion, IsNotMisledByWrongFixes) {
+TEST(FitDispersion, RejectsWrongFixes) {
   Station station(0.01);
   Random random(2);
   for (const auto method : {DispersionMethod::camera, DispersionMethod::paper}) {
@@ -126,7 +126,7 @@ TEST(Dispersion, IsNotMisledByWrongFixes) {
   }
 }
 
-TEST(Dispersion, UsesTheInclinationSensor) {
+TEST(FitDispersion, UsesInclinationSensor) {
   Station station(0.01);
   station.rig.inclination = Inclination{0.04, -0.03};
   auto captures = station.captures(12, true, {0, 0});
@@ -137,7 +137,7 @@ TEST(Dispersion, UsesTheInclinationSensor) {
   EXPECT_LT(fit.after.radius, 1e-9);
 }
 
-TEST(DispersionRefusal, SaysWhatIsWrongOrToAdd) {
+TEST(FitDispersion, ReportsStatusForInsufficientCaptures) {
   Station station(0.01);
   const auto status_of = [&](const std::vector<StationCapture>& captures,
                              DispersionMethod method = DispersionMethod::camera) {
@@ -149,7 +149,7 @@ TEST(DispersionRefusal, SaysWhatIsWrongOrToAdd) {
   EXPECT_EQ(status_of({turned[0]}, DispersionMethod::paper), DispersionStatus::too_few_captures);
   EXPECT_EQ(status_of(turned, DispersionMethod::paper), DispersionStatus::many_yaws);
   EXPECT_EQ(status_of(station.captures_at(1, 20)), DispersionStatus::one_yaw);
-  // One capture at another yaw, and that one wrong, is not to decide.
+  // A single capture at another yaw, with an error, must not decide.
   auto one_other = station.captures_at(1, 12);
   one_other.push_back(station.captures_at(2.5, 1)[0]);
   one_other.back().station_m.x() += 0.05;

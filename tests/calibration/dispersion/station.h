@@ -9,14 +9,14 @@
 
 namespace vlp {
 
-/// A camera at a known place whose calibrated zenith is wrong by an angle.
+/// Camera at a reference point. Its calibrated zenith has an angular error.
 struct Station {
   explicit Station(double error_rad) : believed(rig.calibration) {
     believed.rotation_center = tilted_by(believed.camera, 0.05 - error_rad, 1 + error_rad);
   }
 
-  /// Turning by even angles, maybe with the heights changing; the station is `wrong_m` from where
-  /// it is said to be.
+  /// Returns captures at equally spaced yaws, optionally at two heights. The assumed reference
+  /// point has the error -`wrong_m`.
   std::vector<StationCapture> captures(int count, bool heights, const Eigen::Vector2d& wrong_m,
                                        double sigma_px = 0.1) {
     std::vector<StationCapture> captures;

@@ -15,7 +15,7 @@ namespace {
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-class BoardCheckOf : public testing::TestWithParam<bool> {
+class CheckBoard : public testing::TestWithParam<bool> {
  protected:
   const SyntheticViews views_{synthetic_board(GetParam()), synthetic_lens()};
   std::vector<BoardView> seen_;
@@ -31,20 +31,20 @@ class BoardCheckOf : public testing::TestWithParam<bool> {
   }
 };
 
-TEST_P(BoardCheckOf, TheRightBoardHasNoProblem) {
+TEST_P(CheckBoard, ReportsNoProblemForCorrectBoard) {
   EXPECT_THAT(problem(views_.board), IsEmpty());
   EXPECT_THAT(problem(views_.board, views_.lens), IsEmpty());
   EXPECT_NEAR(*check_board(views_.board, seen_, views_.lens).pitch, 1 + views_.board.tag_spacing,
               0.005);
 }
 
-TEST_P(BoardCheckOf, AnotherTagSizeCannotBeSeen) {
+TEST_P(CheckBoard, IgnoresTagSize) {
   Board board = views_.board;
   board.tag_size_m *= 2;
   EXPECT_THAT(problem(board, views_.lens), IsEmpty());
 }
 
-TEST_P(BoardCheckOf, AnotherSpacingIsNamed) {
+TEST_P(CheckBoard, ReportsOtherTagSpacing) {
   Board board = views_.board;
   board.tag_spacing += 0.2;
   EXPECT_THAT(problem(board), HasSubstr("but the images show gaps of"));
@@ -53,7 +53,7 @@ TEST_P(BoardCheckOf, AnotherSpacingIsNamed) {
   EXPECT_THAT(problem(board, views_.lens), HasSubstr(GetParam() ? "gaps of 0.3 " : "gaps of 1 "));
 }
 
-TEST_P(BoardCheckOf, AnotherOrderIsNamed) {
+TEST_P(CheckBoard, ReportsOtherIdOrder) {
   for (const bool column_major : {false, true}) {
     for (const auto from : {BoardCorner::bottom_right, BoardCorner::top_left}) {
       Board board = views_.board;
@@ -66,7 +66,7 @@ TEST_P(BoardCheckOf, AnotherOrderIsNamed) {
   EXPECT_THAT(problem(board), HasSubstr("cols 6, rows 5"));
 }
 
-TEST_P(BoardCheckOf, AnotherOrderOfASquareBoardIsNamed) {
+TEST_P(CheckBoard, ReportsOtherIdOrderOfSquareBoard) {
   Board truth = views_.board;
   truth.rows = truth.cols;
   const SyntheticViews views{truth, views_.lens};
@@ -86,7 +86,7 @@ TEST_P(BoardCheckOf, AnotherOrderOfASquareBoardIsNamed) {
   }
 }
 
-TEST_P(BoardCheckOf, OtherNumbersOfTagsAreNamed) {
+TEST_P(CheckBoard, ReportsOtherNumberOfTags) {
   for (const int cols : {4, 5, 7}) {
     Board board = views_.board;
     board.cols = cols;
@@ -96,8 +96,8 @@ TEST_P(BoardCheckOf, OtherNumbersOfTagsAreNamed) {
   }
 }
 
-/// As the detector gives them: tags with ids that the board does not have are foreign.
-TEST_P(BoardCheckOf, TagsThatTheBoardLacksCountToo) {
+/// As in the detector: tags with ids that the board does not have are foreign.
+TEST_P(CheckBoard, ReportsLargerBoardFromForeignTags) {
   Board board = views_.board;
   board.rows = 4;
   for (BoardView& view : seen_) {
@@ -113,7 +113,7 @@ TEST_P(BoardCheckOf, TagsThatTheBoardLacksCountToo) {
                                         "first_id 0"));
 }
 
-TEST_P(BoardCheckOf, TagsOfTheSurroundingsDoNotMatter) {
+TEST_P(CheckBoard, IgnoresSingleForeignTags) {
   for (const int id : {100, 31}) {
     auto views = seen_;
     for (BoardView& view : views) {
@@ -126,7 +126,7 @@ TEST_P(BoardCheckOf, TagsOfTheSurroundingsDoNotMatter) {
   }
 }
 
-TEST_P(BoardCheckOf, ABoardBesideItDoesNotMatter) {
+TEST_P(CheckBoard, IgnoresAdjacentBoard) {
   for (BoardView& view : seen_) {
     Eigen::Vector2d low(1e9, 1e9), high(-1e9, -1e9);
     for (const SeenTag& tag : view.seen.tags) {
@@ -144,14 +144,14 @@ TEST_P(BoardCheckOf, ABoardBesideItDoesNotMatter) {
   EXPECT_THAT(problem(views_.board), IsEmpty());
 }
 
-TEST_P(BoardCheckOf, AnotherBoardIsCalledSo) {
+TEST_P(CheckBoard, ReportsOtherBoardForPermutedIds) {
   for (BoardView& view : seen_) {
     for (SeenTag& tag : view.seen.tags) tag.id = tag.id * 7 % 30;
   }
   EXPECT_THAT(problem(views_.board), HasSubstr("is it another board?"));
 }
 
-INSTANTIATE_TEST_SUITE_P(Boards, BoardCheckOf, testing::Bool(),
+INSTANTIATE_TEST_SUITE_P(Boards, CheckBoard, testing::Bool(),
                          [](const auto& board) { return board.param ? "Kalibr" : "Plain"; });
 
 }  // namespace

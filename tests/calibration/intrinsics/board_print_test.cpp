@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kPrintSd = 5e-4;
 
-class PrintEffects : public testing::TestWithParam<bool> {};
+class ComputePrintEffect : public testing::TestWithParam<bool> {};
 
 /// Returns the solution from views of a board that is wider than stated by this factor, with
 /// exact corners.
@@ -28,8 +28,8 @@ IntrinsicsSolution solve_stretched(bool kalibr, double factor) {
   return solve_intrinsics(views.input(20, random, 0));
 }
 
-/// The lens of a board that is wider, against the lens of the board as stated, by full solves.
-TEST_P(PrintEffects, HasTheEffectOfABoardThatIsWider) {
+/// Compares full solves with a wider board and with the board as stated.
+TEST_P(ComputePrintEffect, MatchesSolveOfWiderBoard) {
   const IntrinsicsSolution stated = solve_stretched(GetParam(), 1);
   const IntrinsicsSolution wider = solve_stretched(GetParam(), 1 + std::sqrt(2) * kPrintSd);
   ASSERT_TRUE(stated.ok() && wider.ok());
@@ -40,7 +40,7 @@ TEST_P(PrintEffects, HasTheEffectOfABoardThatIsWider) {
   EXPECT_GT(expected->rms_px, 0.01);
   // A full solve also estimates the shift of the edges, which a board that is wider changes.
   EXPECT_NEAR(effect->rms_px / expected->rms_px, 1, 0.2);
-  // The lens of a wider board has the opposite change: its points are stated too near.
+  // The lens of a wider board changes in the opposite direction: its stated points are too close.
   const auto& a = stated.problem.intrinsics;
   const auto& b = wider.problem.intrinsics;
   const Eigen::Vector2d change(a[0] - b[0], a[1] - b[1]);
@@ -48,7 +48,7 @@ TEST_P(PrintEffects, HasTheEffectOfABoardThatIsWider) {
   EXPECT_LT((effect->intrinsics.head<2>() - change).norm(), 0.2 * change.norm());
 }
 
-TEST_P(PrintEffects, IsInProportionToTheStandardDeviation) {
+TEST_P(ComputePrintEffect, IsProportionalToStandardDeviation) {
   const IntrinsicsSolution stated = solve_stretched(GetParam(), 1);
   ASSERT_TRUE(stated.ok());
   const auto one = compute_print_effect(stated, kPrintSd);
@@ -57,7 +57,7 @@ TEST_P(PrintEffects, IsInProportionToTheStandardDeviation) {
   EXPECT_NEAR(two->rms_px / one->rms_px, 2, 0.05);
 }
 
-TEST(PrintEffect, IsSmallForAnExactBoardAndALensWithoutDistortion) {
+TEST(PrintEffect, IsNegligibleForExactBoardAndPinholeLens) {
   const std::array parameters{520.0, 521.0, 402.0, 297.0};
   const SyntheticViews views{synthetic_board(false), Lens(LensModel::pinhole, parameters)};
   Random random(4);
@@ -72,7 +72,7 @@ TEST(PrintEffect, IsSmallForAnExactBoardAndALensWithoutDistortion) {
 
 /// Monte Carlo: errors of lenses from boards with random print and random noise, against the
 /// uncertainty that one of them states.
-TEST(PrintEffect, IsInTheUncertainty) {
+TEST(EstimateLens, IncludesThePrintInTheUncertainty) {
   constexpr double noise_px = 0.02;
   constexpr int draws = 40;
   SyntheticViews views{synthetic_board(false), synthetic_lens()};
@@ -105,7 +105,7 @@ TEST(PrintEffect, IsInTheUncertainty) {
   EXPECT_GT(with_print.report.uncertainty_mean_px, exact.report.uncertainty_mean_px);
 }
 
-INSTANTIATE_TEST_SUITE_P(Boards, PrintEffects, testing::Bool(),
+INSTANTIATE_TEST_SUITE_P(Boards, ComputePrintEffect, testing::Bool(),
                          [](const auto& board) { return board.param ? "Kalibr" : "Plain"; });
 
 }  // namespace

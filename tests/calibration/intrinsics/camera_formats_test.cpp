@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Cameras in the files of other tools, as these tools read them and write them: OpenCV and mrcal
-/// themselves, ROS and Kalibr by the formulas that they publish.
+/// Cameras in the formats of other tools, compared with these tools: OpenCV and mrcal themselves,
+/// ROS and Kalibr by their published formulas.
 #include <gmock/gmock.h>
 #include <yaml-cpp/yaml.h>
 
@@ -30,12 +30,12 @@ namespace vlp {
 namespace {
 
 constexpr std::size_t kPoints = 1000;
-/// Of pixels up to 1000 and their rounding.
+/// Tolerance of pixels up to 1000, for their rounding.
 constexpr double kExact_px = 1e-9;
 
 Lens lens_of(const Camera& camera) { return {camera.lens_model, camera.intrinsics}; }
 
-/// In view, one to five metres away, and no farther off the axis.
+/// Returns points in the field of view, one to five meters away, up to `off_axis_deg` off the axis.
 std::vector<Eigen::Vector3d> points_before(const Camera& camera, double off_axis_deg = 180) {
   const double least_cosine = std::cos(off_axis_deg * std::numbers::pi / 180);
   const Lens lens = lens_of(camera);
@@ -54,7 +54,7 @@ std::vector<Eigen::Vector3d> points_before(const Camera& camera, double off_axis
 
 using Project = std::function<Eigen::Vector2d(const Eigen::Vector3d& point)>;
 
-/// How far off the lens another projects the points, at worst.
+/// Returns the largest distance between the projections of the points by the lens and by `project`.
 double worst_px(const Camera& camera, const std::vector<Eigen::Vector3d>& points,
                 const Project& project) {
   const Lens lens = lens_of(camera);
@@ -80,7 +80,7 @@ CvCamera read_by_opencv(const std::string& text) {
   return camera;
 }
 
-/// As OpenCV's calibration example does.
+/// Writes a camera as OpenCV's calibration example does.
 std::string written_by_opencv(const CvCamera& camera, bool fisheye = false) {
   cv::FileStorage file("camera.yaml", cv::FileStorage::WRITE | cv::FileStorage::MEMORY);
   file << "calibration_time"
@@ -123,7 +123,7 @@ constexpr LensModel kOfOpencv[] = {LensModel::pinhole, LensModel::opencv4,  Lens
 /// cv::fisheye divides by the depth.
 constexpr double kOpencvsWidest_deg = 89.9;
 
-TEST(CameraFormats, OfOpencvAreProjectedByOpencv) {
+TEST(OpencvCamera, MatchesProjectionOfOpencv) {
   for (const LensModel model : kOfOpencv) {
     const Camera camera = camera_of(model);
     const auto points = points_before(camera, kOpencvsWidest_deg);
@@ -133,7 +133,7 @@ TEST(CameraFormats, OfOpencvAreProjectedByOpencv) {
   }
 }
 
-class CameraFormatFiles : public testing::Test {
+class ReadCameraFormats : public testing::Test {
  protected:
   AnyCamera read(const std::string& text) const {
     return read_any_camera(folder_.file("camera.txt", text));
@@ -145,7 +145,7 @@ class CameraFormatFiles : public testing::Test {
   const TemporaryFolder folder_;
 };
 
-TEST_F(CameraFormatFiles, WrittenByOpencvAreProjectedAsByOpencv) {
+TEST_F(ReadCameraFormats, MatchesOpencvForFilesOfOpencv) {
   for (const LensModel model : kOfOpencv) {
     const bool fisheye = model == LensModel::fisheye;
     const Camera camera = camera_of(model);
@@ -168,7 +168,7 @@ TEST_F(CameraFormatFiles, WrittenByOpencvAreProjectedAsByOpencv) {
   }
 }
 
-TEST_F(CameraFormatFiles, WrittenByOpencvWithATiltedSensorAreRefused) {
+TEST_F(ReadCameraFormats, RejectsTiltedSensor) {
   CvCamera cv{cv::Mat(cv::Mat_<double>::eye(3, 3) * 500), cv::Mat(cv::Mat_<double>::zeros(14, 1))};
   cv.distortions.at<double>(12) = 0.01;
   EXPECT_THAT(refusal(written_by_opencv(cv)), testing::HasSubstr("the sensor not tilted"));
@@ -231,7 +231,7 @@ Eigen::Vector2d kalibr_pixel(const YAML::Node& cam, const Eigen::Vector3d& point
   return {in[0] * plane.x + in[2], in[1] * plane.y + in[3]};
 }
 
-TEST_F(CameraFormatFiles, OfRosAreProjectedByItsFormulas) {
+TEST_F(ReadCameraFormats, MatchesRosFormulasForExportedFiles) {
   for (const LensModel model : {LensModel::pinhole, LensModel::opencv4, LensModel::opencv5,
                                 LensModel::opencv8, LensModel::fisheye}) {
     const Camera camera = camera_of(model);
@@ -244,8 +244,8 @@ TEST_F(CameraFormatFiles, OfRosAreProjectedByItsFormulas) {
   }
 }
 
-/// As camera_calibration of ROS writes them.
-TEST_F(CameraFormatFiles, WrittenByRosAreProjectedByItsFormulas) {
+/// Files as written by camera_calibration of ROS.
+TEST_F(ReadCameraFormats, MatchesRosFormulasForFilesOfRos) {
   constexpr const char* head =
       "image_width: 640\nimage_height: 480\ncamera_name: narrow_stereo\n"
       "camera_matrix:\n  rows: 3\n  cols: 3\n"
@@ -278,7 +278,7 @@ TEST_F(CameraFormatFiles, WrittenByRosAreProjectedByItsFormulas) {
   }
 }
 
-TEST_F(CameraFormatFiles, OfKalibrAreProjectedByItsFormulas) {
+TEST_F(ReadCameraFormats, MatchesKalibrFormulasForExportedFiles) {
   for (const LensModel model : {LensModel::pinhole, LensModel::opencv4, LensModel::fisheye}) {
     const Camera camera = camera_of(model);
     const std::string text = kalibr_camchain(camera);
@@ -290,8 +290,9 @@ TEST_F(CameraFormatFiles, OfKalibrAreProjectedByItsFormulas) {
   }
 }
 
-/// As kalibr_calibrate_cameras and kalibr_calibrate_imu_camera write them, the first of several.
-TEST_F(CameraFormatFiles, WrittenByKalibrAreProjectedByItsFormulas) {
+/// Files as written by kalibr_calibrate_cameras and kalibr_calibrate_imu_camera; the first camera
+/// of several.
+TEST_F(ReadCameraFormats, MatchesKalibrFormulasForFilesOfKalibr) {
   const std::pair<LensModel, const char*> models[] = {
       {LensModel::opencv4,
        "  distortion_coeffs: [-0.2847798, 0.0755440, -1.0444e-05, 2.3727e-05]\n"
@@ -321,15 +322,16 @@ TEST_F(CameraFormatFiles, WrittenByKalibrAreProjectedByItsFormulas) {
 
 // mrcal
 
-/// mrcal for Python, with files of a folder.
-class CameraFormatsOfMrcal : public CameraFormatFiles {
+/// Runs mrcal for Python with files of a folder.
+class MrcalCameramodel : public ReadCameraFormats {
  protected:
   void SetUp() override {
     if (run_program("/usr/bin/python3 -c 'import mrcal'").exit_code != 0) {
       GTEST_SKIP() << "mrcal for Python is not installed";
     }
   }
-  /// What a script prints that knows the file's model as m and the folder's names by at().
+  /// Returns the output of a script that has the model of the file as m and the names of the folder
+  /// by at().
   std::string printed(const std::filesystem::path& file, const std::string& script) const {
     const auto program =
         folder_.file("script.py",
@@ -363,7 +365,7 @@ class CameraFormatsOfMrcal : public CameraFormatFiles {
   }
 };
 
-TEST_F(CameraFormatsOfMrcal, AreProjectedByMrcalAndComeBackFromIt) {
+TEST_F(MrcalCameramodel, MatchesMrcalAfterRoundTrip) {
   std::vector<Camera> cameras{splined_camera(), splined_camera({2, 20, 16, 170})};
   for (const LensModel model : {LensModel::pinhole, LensModel::stereographic, LensModel::opencv4,
                                 LensModel::opencv5, LensModel::opencv8, LensModel::opencv12}) {
@@ -386,7 +388,7 @@ TEST_F(CameraFormatsOfMrcal, AreProjectedByMrcalAndComeBackFromIt) {
   }
 }
 
-TEST_F(CameraFormatsOfMrcal, HaveTheRegionOfTheCalibration) {
+TEST_F(MrcalCameramodel, ContainsRegionOfCalibration) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   Random random(5);
   IntrinsicsInput input = views.input(12, random, 0.05);
@@ -420,7 +422,7 @@ TEST_F(CameraFormatsOfMrcal, HaveTheRegionOfTheCalibration) {
   }
 }
 
-TEST_F(CameraFormatFiles, OfMrcalSayWhereTheLensIsKnown) {
+TEST_F(ReadCameraFormats, ReturnsValidRegionOfCameramodel) {
   const Camera camera = camera_of(LensModel::opencv8);
   const ImageRegion bent{{10, 20}, {700, 15.5}, {420, 300}, {700, 590}, {12, 580}};
   const std::string text = mrcal_cameramodel(camera, bent);
@@ -436,8 +438,8 @@ TEST_F(CameraFormatFiles, OfMrcalSayWhereTheLensIsKnown) {
   EXPECT_EQ(read(with("((1, 2), (300, 4), (30, 400))")).region.size(), 3U);
 }
 
-/// 130,000 numbers.
-TEST_F(CameraFormatFiles, OfTheLargestSplinedLensesAreRead) {
+/// The lens has 130,000 parameters.
+TEST_F(ReadCameraFormats, ReturnsLargestSplinedLens) {
   const LensModel model = splined_lens({3, 255, 255, 150});
   Camera camera = camera_of(LensModel::stereographic);
   camera.lens_model = model;
@@ -450,7 +452,7 @@ TEST_F(CameraFormatFiles, OfTheLargestSplinedLensesAreRead) {
 
 // Fits
 
-TEST(CameraFits, AreNoFartherOffThanTheyState) {
+TEST(FitLensModel, ReportsLargestDifference) {
   struct Fit {
     Camera from;
     LensModel to;
@@ -469,7 +471,7 @@ TEST(CameraFits, AreNoFartherOffThanTheyState) {
     double worst = 0;
     std::size_t both = 0;
     for (std::size_t i = 0; i < kPoints; ++i) {
-      // Some on the image's edges and in its corners.
+      // Clamped: some are on the edges of the image and in its corners.
       const double v = std::clamp(random.uniform(-30, 629), 0.0, 599.0),
                    u = std::clamp(random.uniform(-40, 839), 0.0, 799.0);
       const auto ray = was.unproject({u, v});

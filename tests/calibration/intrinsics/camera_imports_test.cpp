@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Cameras in the files of other tools, there and back.
+/// Export and import of cameras in the formats of other tools.
 #include "calibration/intrinsics/camera_imports.h"
 
 #include <gmock/gmock.h>
@@ -14,7 +14,7 @@
 namespace vlp {
 namespace {
 
-class CameraFiles : public testing::Test {
+class ReadAnyCamera : public testing::Test {
  protected:
   const TemporaryFolder folder_;
 
@@ -36,7 +36,7 @@ class CameraFiles : public testing::Test {
   }
 };
 
-TEST_F(CameraFiles, ComeBackToTheLastDigit) {
+TEST_F(ReadAnyCamera, ReturnsExportedCameraExactly) {
   for (const LensModel model : {LensModel::pinhole, LensModel::opencv4, LensModel::opencv5,
                                 LensModel::opencv8, LensModel::opencv12, LensModel::fisheye}) {
     const Camera camera = camera_of(model);
@@ -50,7 +50,7 @@ TEST_F(CameraFiles, ComeBackToTheLastDigit) {
   }
 }
 
-TEST_F(CameraFiles, OfSplinedLensesComeBackToTheLastDigit) {
+TEST_F(ReadAnyCamera, ReturnsExportedSplinedLensExactly) {
   const Camera camera = splined_camera();
   comes_back(camera, mrcal_cameramodel(camera), camera.lens_model);
   for (const auto& text_of : {ros_camera_info, kalibr_camchain, opencv_camera}) {
@@ -61,11 +61,11 @@ TEST_F(CameraFiles, OfSplinedLensesComeBackToTheLastDigit) {
   EXPECT_THAT(refusal(short_one), testing::HasSubstr("takes 312 parameters, not 290"));
 }
 
-TEST_F(CameraFiles, AreFittedToSplinedLensesAndBack) {
+TEST(FitLensModel, ConvertsToSplinedLensAndBack) {
   const auto wide = with_lens_model(camera_of(LensModel::fisheye), splined_lens({3, 20, 16, 190}));
   EXPECT_LT(wide.worst_px, 0.002);
   EXPECT_EQ(wide.share, 1);
-  // What is beyond the grid is left out.
+  // The rays outside the grid do not count.
   const auto part = with_lens_model(camera_of(LensModel::fisheye), splined_lens({3, 14, 12, 100}));
   EXPECT_LT(part.worst_px, 0.01);
   EXPECT_LT(part.share, 0.8);
@@ -78,9 +78,9 @@ TEST_F(CameraFiles, AreFittedToSplinedLensesAndBack) {
   EXPECT_LT(near.worst_px, 0.2);  // quadratic pieces
 }
 
-/// Of 10 degrees: none, one or a few of the rays of a piece fall into the image. Or of a strip,
-/// with one row of pieces. What is said to take instead is what fits.
-TEST_F(CameraFiles, OfNarrowLensesAreNotFittedToGridsThatAreTooWide) {
+/// Lenses of 10 degrees, with no, one or a few rays of a piece in the image, and of a strip with
+/// one row of pieces. The recommended model has to fit.
+TEST(FitLensModel, RecommendsFinerGridWhenGridIsTooWide) {
   const auto expect_other = [](const Camera& camera, const SplineGrid& grid) {
     const std::string words =
         "the control points of " + name_of(grid) + " are too few where the lens sees, ";
@@ -109,7 +109,7 @@ TEST_F(CameraFiles, OfNarrowLensesAreNotFittedToGridsThatAreTooWide) {
   expect_other(strip, {3, 4, 4, 30});
 }
 
-TEST_F(CameraFiles, ThatAreNotKnownAreRefused) {
+TEST_F(ReadAnyCamera, RejectsUnknownFormatsAndModels) {
   EXPECT_THAT(refusal("a: 1\n"), testing::HasSubstr("camera.txt: "));
   EXPECT_THAT(refusal("[1, 2]\n"), testing::HasSubstr("holds no camera"));
   EXPECT_THAT(refusal("{ 'lensmodel': 'LENSMODEL_CAHVOR', 'imagersize': [1, 2] }"),
@@ -123,8 +123,8 @@ TEST_F(CameraFiles, ThatAreNotKnownAreRefused) {
   EXPECT_THAT(refusal(skewed), testing::HasSubstr("camera_matrix is skewed"));
 }
 
-/// As of Python: to the end of the line, from a # that is in no string.
-TEST_F(CameraFiles, OfMrcalAreReadWithoutTheirComments) {
+/// Comments as in Python: from a # outside strings to the end of the line.
+TEST_F(ReadAnyCamera, IgnoresCommentsInCameramodel) {
   const std::string text =
       "# 'lensmodel': 'LENSMODEL_OPENCV4'\n"
       "{ 'made_by': 'camera #3, \\'left\\'', 'lensmodel': 'LENSMODEL_PINHOLE', # isn't \"wide\"\n"
@@ -136,8 +136,8 @@ TEST_F(CameraFiles, OfMrcalAreReadWithoutTheirComments) {
              text, LensModel::pinhole);
 }
 
-TEST_F(CameraFiles, AreFittedWhereTheModelsDiffer) {
-  // A model that holds the other is met exactly, another one as well as it can.
+TEST(FitLensModel, ReportsDifferenceAndCommonFraction) {
+  // A model that includes the other fits exactly, another one approximately.
   const auto exact = with_lens_model(camera_of(LensModel::opencv4), LensModel::opencv8);
   EXPECT_LT(exact.worst_px, 1e-6);
   EXPECT_EQ(exact.share, 1);
@@ -146,7 +146,7 @@ TEST_F(CameraFiles, AreFittedWhereTheModelsDiffer) {
   EXPECT_GT(near.worst_px, 1e-6);
   const auto same = with_lens_model(camera_of(LensModel::opencv8), LensModel::opencv8);
   EXPECT_EQ(same.camera.intrinsics, camera_of(LensModel::opencv8).intrinsics);
-  // Beyond 90 degrees no perspective model goes.
+  // Perspective models have no rays beyond 90 degrees.
   const auto half = with_lens_model(camera_of(LensModel::fisheye), LensModel::opencv4);
   EXPECT_LT(half.share, 1);
 }

@@ -21,10 +21,10 @@ namespace {
 
 constexpr double kCornerNoise_px = 0.02;
 
-/// A camera with a tone curve whose levels call for another one.
+/// Camera with a tone curve whose grey values indicate another one.
 struct CodedCamera {
   double gamma, levels_gamma;
-  /// How much more the edges of some tags shift than those of others.
+  /// Relative difference of the edge shifts between tags.
   double uneven = 0.5;
 
   double shift_px(int id, double behind_gamma) const {
@@ -32,7 +32,7 @@ struct CodedCamera {
     return 0.3 * share * std::log(gamma / behind_gamma);
   }
 
-  /// As they are behind no curve.
+  /// Returns the views without a tone curve.
   std::vector<BoardView> uncoded(int count, std::uint64_t seed) const {
     const SyntheticViews boards{synthetic_board(false), synthetic_lens()};
     Random random(seed);
@@ -80,8 +80,8 @@ double worst_px(const std::vector<BoardView>& views, const std::vector<BoardView
   return worst_px;
 }
 
-/// Of more views than are looked at, too.
-TEST(CommonCurve, IsThatBehindWhichTheCornersLieOnABoard) {
+/// Also with more views than are used.
+TEST(EstimateToneCurve, MatchesTrueGammaDespiteBiasedLevels) {
   for (const auto& [gamma, levels_gamma, count] : {std::tuple{2.0, 1.5, 40}, {1.5, 2.2, 16}}) {
     const CodedCamera camera{gamma, levels_gamma};
     auto views = camera.views(count, 1);
@@ -94,21 +94,21 @@ TEST(CommonCurve, IsThatBehindWhichTheCornersLieOnABoard) {
 }
 
 /// Images without the board do not count.
-TEST(CommonCurve, IsLookedForWhereTheBoardIsOftenOutOfView) {
+TEST(EstimateToneCurve, IgnoresViewsWithoutBoard) {
   auto views = CodedCamera{2, 1.5}.views(12, 1);
   views.resize(30, {"none", {800, 600}, {}});
   EXPECT_NEAR(std::log(take_common_curve(views, synthetic_board(false)) / 2), 0, 0.04);
 }
 
-TEST(CommonCurve, IsNoneWhereOnlyTheLevelsCallForOne) {
+TEST(EstimateToneCurve, ReturnsOneWhenOnlyLevelsShowCurve) {
   auto views = CodedCamera{1, 1.46}.views(16, 2);
   const auto before = views;
   EXPECT_EQ(take_common_curve(views, synthetic_board(false)), 1);
   EXPECT_EQ(views[5].seen.tags[3].corners_px, before[5].seen.tags[3].corners_px);
 }
 
-/// Behind any curve the corners lie on a board then, once the shift is taken out.
-TEST(CommonCurve, IsThatOfTheLevelsWhereAllEdgesShiftAlike) {
+/// With any curve the corners then lie on a board, once the shift is corrected.
+TEST(EstimateToneCurve, MatchesLevelsWhenAllEdgesShiftEqually) {
   for (const double levels_gamma : {1.4, 2.2}) {
     auto views = CodedCamera{1.8, levels_gamma, 0}.views(16, 3);
     const double gamma = take_common_curve(views, synthetic_board(false));
@@ -116,7 +116,7 @@ TEST(CommonCurve, IsThatOfTheLevelsWhereAllEdgesShiftAlike) {
   }
 }
 
-TEST(CommonCurve, IsThatOfTheLevelsWithoutALensOrWhatNoiseMakes) {
+TEST(EstimateToneCurve, MatchesLevelsWithoutLensOrCornerNoise) {
   const Board board = synthetic_board(false);
   auto untold = CodedCamera{2, 1.5}.views(8, 4), of_another = untold;
   for (BoardView& view : untold) {
@@ -135,7 +135,7 @@ TEST(CommonCurve, IsThatOfTheLevelsWithoutALensOrWhatNoiseMakes) {
   EXPECT_EQ(take_common_curve(none, board), 1);
 }
 
-TEST(CommonCurve, IsNotLookedForInImagesThatHaveNoneForSure) {
+TEST(EstimateToneCurve, MatchesLevelsWhenHalfOfViewsHaveNoCurve) {
   auto views = CodedCamera{1, 1.5}.views(4, 5);
   for (const BoardView& view : CodedCamera{1, 1}.views(4, 6)) {
     views.push_back(view);
@@ -147,7 +147,7 @@ TEST(CommonCurve, IsNotLookedForInImagesThatHaveNoneForSure) {
   EXPECT_NEAR(take_common_curve(views, synthetic_board(false)), by_levels, 1e-9);
 }
 
-TEST(CommonCurve, IsTakenOnce) {
+TEST(EstimateToneCurve, ReturnsOneForCorrectedViews) {
   auto views = CodedCamera{2, 2}.views(8, 7);
   take_common_curve(views, synthetic_board(false));
   const auto once = views[0].seen.tags[0].corners_px;
@@ -155,7 +155,7 @@ TEST(CommonCurve, IsTakenOnce) {
   EXPECT_EQ(views[0].seen.tags[0].corners_px, once);
 }
 
-TEST(EstimateLens, AppliesTheCurveOfAllViews) {
+TEST(EstimateLens, AppliesToneCurveToAllViews) {
   const Board board = synthetic_board(false);
   const std::vector<BoardView> views = CodedCamera{1.8, 1.8}.views(12, 3);
   std::vector<BoardView> expected = views;

@@ -12,8 +12,8 @@ namespace {
 using testing::ElementsAre;
 using testing::IsEmpty;
 
-/// In strongly distorted views none is found that is not one, and one that is, alone.
-TEST(CornerBlunders, AreFoundWhereverTheyLie) {
+/// In strongly distorted views exactly the displaced corner is found.
+TEST(FindCornerOutliers, ReturnsSingleDisplacedCorner) {
   constexpr double noise_px = 0.05, apart_px = 20;
   for (const bool kalibr : {false, true}) {
     const SyntheticViews views{synthetic_board(kalibr), synthetic_lens()};
@@ -32,8 +32,8 @@ TEST(CornerBlunders, AreFoundWhereverTheyLie) {
   }
 }
 
-/// A view that is wrong as a whole is none of slips.
-TEST(CornerBlunders, AreFew) {
+/// A view that is wrong as a whole has no outliers.
+TEST(FindCornerOutliers, ReturnsNoneForRandomCorners) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   Random random(12);
   auto corners = BoardLattice(views.board).corners(views.random_view(random, 0));

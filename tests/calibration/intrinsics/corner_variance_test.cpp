@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// What corners are good for, by their residuals, and lenses from corners that are not all as good.
+/// Variances of corners from their residuals, and lenses from corners of different variances.
 #include "calibration/intrinsics/corner_variance.h"
 
 #include <gtest/gtest.h>
@@ -14,7 +14,7 @@
 namespace vlp {
 namespace {
 
-/// Corners known to 0.01 to 0.1 px by their pixels.
+/// Returns errors of corners with standard deviations from pixel noise of 0.01 to 0.1 px.
 std::vector<CornerError> errors_of(const CornerVariance& truth, Random& random) {
   std::vector<CornerError> errors;
   for (int i = 0; i < 4000; ++i) {
@@ -26,7 +26,7 @@ std::vector<CornerError> errors_of(const CornerVariance& truth, Random& random) 
   return errors;
 }
 
-TEST(CornerVariances, AreOfTheNoiseAndOfTheRest) {
+TEST(EstimateCornerVariance, MatchesSimulatedVariance) {
   Random random(1);
   for (const auto& [rest_px, scale] :
        {std::pair{0.02, 1.2}, {0.0, 1.0}, {0.05, 0.0}, {0.2, 1.0}, {0.005, 2.0}}) {
@@ -39,7 +39,7 @@ TEST(CornerVariances, AreOfTheNoiseAndOfTheRest) {
   }
 }
 
-TEST(CornerVariances, AreNotThoseOfAFewOutliers) {
+TEST(EstimateCornerVariance, IsRobustToOutliers) {
   Random random(2);
   const CornerVariance truth{1e-4, 1};
   auto errors = errors_of(truth, random);
@@ -50,7 +50,7 @@ TEST(CornerVariances, AreNotThoseOfAFewOutliers) {
   }
 }
 
-TEST(CornerVariances, AreNotThoseOfOneDeviationThatIsNone) {
+TEST(EstimateCornerVariance, IsRobustToOneWrongDeviation) {
   Random random(2);
   const CornerVariance truth{1e-4, 1};
   for (const double sd_px : {0.5, 1.0, 1e9}) {
@@ -63,13 +63,13 @@ TEST(CornerVariances, AreNotThoseOfOneDeviationThatIsNone) {
   }
 }
 
-TEST(CornerVariances, OfCornersThatAreAllAsGoodAreOne) {
+TEST(EstimateCornerVariance, ReturnsMeanSquareForEqualDeviations) {
   const std::vector<CornerError> errors{{4e-4, 0.01}, {1e-4, 0.01}, {1e-4, 0.01}};
   EXPECT_NEAR(corner_variance(errors).of(0.01), 2e-4, 1e-9);
 }
 
-/// Corners of 16 views, those at the rim of the image ten times as far off as those in its middle,
-/// which know it. Their edges stay, lest what is known of shifts beforehand is tested with it.
+/// Returns corners of 16 views with known standard deviations, ten times as large at the rim of the
+/// image as in its middle. Edges do not shift, so that the priors of shifts are not tested as well.
 IntrinsicsInput uneven_input(const SyntheticViews& views, Random& random) {
   IntrinsicsInput input = views.input(16, random, 0);
   input.warp = WarpChoice::off;
@@ -84,7 +84,7 @@ IntrinsicsInput uneven_input(const SyntheticViews& views, Random& random) {
   return input;
 }
 
-/// Per axis, of the corners that are no outliers, each counting alike.
+/// Returns the unweighted RMS residual per axis of the corners that are not outliers.
 double off_px(const IntrinsicsSolution& solution) {
   double squares = 0, count = 0;
   const auto residuals = residuals_of(solution.problem);
@@ -96,8 +96,8 @@ double off_px(const IntrinsicsSolution& solution) {
   return std::sqrt(squares / count);
 }
 
-/// Least squares of corners that know how good they are, or do not.
-TEST(CornerWeighting, MakesTheBestOfCorners) {
+/// Compares solves with and without known standard deviations.
+TEST(CornerWeights, ReducesProjectionErrorOfSolve) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   double told_px2 = 0, untold_px2 = 0;
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
@@ -120,7 +120,7 @@ TEST(CornerWeighting, MakesTheBestOfCorners) {
   RecordProperty("told_over_untold", std::to_string(std::sqrt(told_px2 / untold_px2)));
 }
 
-TEST(CornerWeighting, LeavesResidualsInPixels) {
+TEST(CornerWeights, KeepsRmsOfSolveInPixels) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   Random random(3);
   const IntrinsicsSolution solution = solve_intrinsics(uneven_input(views, random));
@@ -128,8 +128,8 @@ TEST(CornerWeighting, LeavesResidualsInPixels) {
   EXPECT_NEAR(solution.rms_px, off_px(solution), 0.05 * off_px(solution));
 }
 
-/// Some corners have no deviation, and are far worse than the others.
-TEST(CornerWeighting, IsNotSpoiltByCornersOfWhichNobodyKnows) {
+/// Some corners have no standard deviation and much larger errors than the others.
+TEST(CornerWeights, LimitsEffectOfCornersWithoutDeviation) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   Random random(4);
   IntrinsicsInput input = uneven_input(views, random);
@@ -148,7 +148,7 @@ TEST(CornerWeighting, IsNotSpoiltByCornersOfWhichNobodyKnows) {
   EXPECT_LT(apart->rms_px, 0.02);
 }
 
-TEST(CornerWeights, AreOfTheVariancesAndTheMeanSquare) {
+TEST(CornerWeights, MatchesVariancesAndMeanSquare) {
   Random random(5);
   const CornerVariance truth{1e-4, 1};
   const auto told = errors_of(truth, random);
@@ -160,7 +160,7 @@ TEST(CornerWeights, AreOfTheVariancesAndTheMeanSquare) {
     weighted += std::pow(weights.of(sd_px), 2) * square_px2;
   }
   EXPECT_NEAR(std::sqrt(weighted / squares), 1, 0.03);
-  // Few corners without a deviation that happen to fit are no better than the others.
+  // A few corners without a deviation that fit by chance get no larger weight than the others.
   const std::vector<CornerError> untold{{1e-8, 0}, {2e-8, 0}};
   EXPECT_LT(CornerWeights(told, untold).of(0), weights.of(0.01));
 }

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Corners of tags whose edges bow otherwise than the lens has it.
+/// Corners of tags whose edges are detected with a wrong curvature.
 #include "calibration/intrinsics/edge_bow.h"
 
 #include <gtest/gtest.h>
@@ -21,8 +21,8 @@ namespace {
 
 constexpr double kReach = 0.8;
 
-/// The parabola by least squares through what the lens makes of the straight line between two
-/// pixels, all along it to kReach: a, b and c of a + b w + c w^2, off the chord.
+/// Fits the parabola a + b w + c w^2 off the chord, by least squares, to the image of the straight
+/// line between two pixels, up to kReach along it.
 Eigen::Vector3d parabola_of(const Lens& lens, const Eigen::Vector2d& from,
                             const Eigen::Vector2d& to, const Eigen::Vector2d& outwards) {
   constexpr int steps = 2000;
@@ -50,9 +50,9 @@ struct Tag {
   std::vector<BoardLattice::Corner> seen;
 };
 
-/// A tag in the corner of the image, of which a fit of parabolas has found edges that bow by
-/// error_px more than they do: outwards by error_px (reach^2 / 3 - w^2), which no straight line
-/// would show.
+/// Returns a tag in the corner of the image, with edges whose fitted parabolas have curvature
+/// errors. The fit displaces an edge outwards by error_px (reach^2 / 3 - w^2), which a straight
+/// line would not show.
 Tag tag_with_errors(const std::array<double, 4>& error_px) {
   const Lens lens = synthetic_lens();
   Tag tag;
@@ -82,21 +82,21 @@ Tag tag_with_errors(const std::array<double, 4>& error_px) {
   return tag;
 }
 
-TEST(EdgeBows, OfTheLensPutCornersWhereTheyAre) {
+TEST(ApplyLensEdgeCurvature, MovesCornersToTruePositions) {
   for (const std::array<double, 4> errors_px :
        {std::array{0.0, 0.0, 0.0, 0.0}, {0.1, 0.0, 0.0, 0.0}, {0.06, -0.1, 0.03, 0.08}}) {
     Tag tag = tag_with_errors(errors_px);
     take_bows_of_lens(tag.seen, synthetic_lens());
     for (std::size_t k = 0; k < 4; ++k) {
-      // The errors turn the chords.
+      // The errors rotate the chords.
       EXPECT_LT((tag.seen[k].pixel - tag.truth[k]).norm(), 1e-3);
     }
-    // They have them now.
+    // The corners now have the curvature of the lens.
     EXPECT_LT(take_bows_of_lens(tag.seen, synthetic_lens()), 1e-3);
   }
 }
 
-TEST(EdgeBows, AreNotTakenWhereNobodyKnowsThem) {
+TEST(ApplyLensEdgeCurvature, KeepsTagsWithoutMeasuredCurvature) {
   Tag tag = tag_with_errors({0.1, 0.1, 0.1, 0.1});
   tag.seen[2].bow.reach = 0;
   const auto before = tag.seen;
@@ -104,8 +104,8 @@ TEST(EdgeBows, AreNotTakenWhereNobodyKnowsThem) {
   for (std::size_t k = 0; k < 4; ++k) EXPECT_EQ(tag.seen[k].pixel, before[k].pixel);
 }
 
-/// Most of what noise does to a tag as a whole.
-TEST(EdgeBows, LeaveLessOfTheNoise) {
+/// Above all the noise of the position of a tag as a whole.
+TEST(ApplyLensEdgeCurvature, ReducesCornerNoise) {
   const Scene scene = read_scene(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml");
   const CaptureSet views = *std::ranges::find(scene.sets, "boards", &CaptureSet::folder);
   const FrameRenderer renderer(scene);
@@ -143,7 +143,7 @@ TEST(EdgeBows, LeaveLessOfTheNoise) {
   const auto px = [&](double sum) { return std::sqrt(sum / (2 * double(corners))); };
   EXPECT_LT(px(squares[1]), 0.75 * px(squares[0]));
   EXPECT_LT(px(4 * of_tags[1]), 0.62 * px(4 * of_tags[0]));
-  // What the noise of their pixels leaves, which is most of it.
+  // Pixel noise explains most of the remaining error.
   EXPECT_NEAR(px(stated) / px(squares[1]), 1, 0.2);
   RecordProperty("stated_px", std::to_string(px(stated)));
   RecordProperty("seen_px", std::to_string(px(squares[0])));

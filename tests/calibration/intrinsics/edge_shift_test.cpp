@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Tags that a tone curve has shrunk.
+/// Tags shrunk by a tone curve.
 #include "calibration/intrinsics/edge_shift.h"
 
 #include <gtest/gtest.h>
@@ -13,8 +13,8 @@
 namespace vlp {
 namespace {
 
-/// A board of separate tags, with gaps as wide as a tag, or narrower.
-class ShrunkTags : public testing::TestWithParam<double> {
+/// Board of separate tags, with gaps as wide as a tag or narrower.
+class EstimateEdgeShifts : public testing::TestWithParam<double> {
  protected:
   Board board() const {
     Board board = synthetic_board(false);
@@ -41,7 +41,7 @@ class ShrunkTags : public testing::TestWithParam<double> {
   }
 };
 
-TEST_P(ShrunkTags, IsFoundInEachView) {
+TEST_P(EstimateEdgeShifts, ReturnsShiftOfEachView) {
   const auto input = input_of(shrunk_views(6, 0, 0.3));
   for (const EdgeShift& shift : edge_shifts(input.views, synthetic_lens())) {
     EXPECT_NEAR(shift.at(shift.middle), 0.3, 0.005);
@@ -52,7 +52,7 @@ TEST_P(ShrunkTags, IsFoundInEachView) {
   }
 }
 
-TEST_P(ShrunkTags, IsTakenOutOfTheLens) {
+TEST_P(EstimateEdgeShifts, CorrectsLensOfSolve) {
   const auto input = input_of(shrunk_views(16, 0.03, 0.35));
   const IntrinsicsSolution solution = solve_intrinsics(input);
   ASSERT_TRUE(solution.ok());
@@ -65,7 +65,7 @@ TEST_P(ShrunkTags, IsTakenOutOfTheLens) {
   EXPECT_LT(difference->mean_px, 0.03);
 }
 
-TEST_P(ShrunkTags, MoreOnOneSideIsNoBentBoard) {
+TEST_P(EstimateEdgeShifts, DistinguishesVaryingShiftFromWarp) {
   auto seen = shrunk_views(16, 0.03, 0);
   for (BoardView& view : seen) {
     for (SeenTag& tag : view.seen.tags) {
@@ -82,7 +82,7 @@ TEST_P(ShrunkTags, MoreOnOneSideIsNoBentBoard) {
   EXPECT_LT(difference->mean_px, 0.03);
 }
 
-TEST_P(ShrunkTags, IsNoOtherSpacing) {
+TEST_P(EstimateEdgeShifts, KeepsSpacingAcceptedByCheckBoard) {
   const auto seen = shrunk_views(10, 0.03, 0.4);
   EXPECT_EQ(check_board(board(), seen, {}).problem, "");
   EXPECT_EQ(check_board(board(), seen, synthetic_lens()).problem, "");
@@ -91,11 +91,11 @@ TEST_P(ShrunkTags, IsNoOtherSpacing) {
   EXPECT_NE(check_board(other, seen, synthetic_lens()).problem, "");
 }
 
-INSTANTIATE_TEST_SUITE_P(Spacings, ShrunkTags, testing::Values(1.0, 0.4),
+INSTANTIATE_TEST_SUITE_P(Spacings, EstimateEdgeShifts, testing::Values(1.0, 0.4),
                          [](const auto& gap) { return gap.param == 1 ? "OneTag" : "Narrow"; });
 
-// A flat board in place of one that is bent looks as if its edges went in here and out there.
-TEST(EdgeShifts, AreNotWhatABentBoardShows) {
+/// A warped board that is assumed flat looks as if edges shifted inwards here and outwards there.
+TEST(EdgeShift, DoesNotAbsorbBoardWarp) {
   constexpr double noise_px = 0.017;
   Random random(12);
   const WideBoards boards{0.1, 0.2};
@@ -109,7 +109,7 @@ TEST(EdgeShifts, AreNotWhatABentBoardShows) {
   EXPECT_LT(difference->rms_px, 0.006);  // 0.0144
 }
 
-TEST(EdgeShifts, OfTouchingSquaresAreNone) {
+TEST(EdgeShift, IsZeroForTouchingSquares) {
   const SyntheticViews views{synthetic_board(true), synthetic_lens()};
   Random random(3);
   const auto input = views.input(4, random, 0.1);

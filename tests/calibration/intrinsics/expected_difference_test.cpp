@@ -15,13 +15,13 @@ namespace {
 constexpr int kSeeds = 20;
 constexpr double kNoise = 0.1;
 
-/// Mean squares, over the seeds, of what lenses are apart from the truth and of what is expected.
+/// Mean squares, over the seeds, of the differences from the truth and of the expected differences.
 struct Scatter {
   double found = 0, by_noise = 0, by_views = 0, freedoms = 0;
   double worst_found = 0, worst_by_noise = 0;
 };
 
-/// Each view's board may be bent otherwise, which no model of the solver knows.
+/// The board of each view may have another warp, which no model of the solver includes.
 Scatter scatter(double bent_m) {
   Scatter sum;
   for (int seed = 0; seed < kSeeds; ++seed) {
@@ -52,21 +52,22 @@ Scatter scatter(double bent_m) {
   return sum;
 }
 
-// The mean square of so many terms scatters by sqrt(2 / freedoms); three times that.
-TEST(ExpectedDifference, IsWhatLensesAreApartFromTheTruth) {
+// A mean square of n terms has the relative standard deviation sqrt(2 / n); the limit is three
+// times that.
+TEST(ExpectedDifference, MatchesDifferenceFromTruth) {
   const Scatter of = scatter(0);
   const double sd = std::sqrt(2 / of.freedoms);
   EXPECT_LT(sd, 0.3);
   EXPECT_NEAR(of.found / of.by_noise, 1, 3 * sd);
-  // One place tells less than all of them: of as few terms as there are lenses.
+  // A single pixel has fewer independent terms: as many as there are lenses.
   EXPECT_NEAR(of.worst_found / of.worst_by_noise, 1, 3 * std::sqrt(2.0 / kSeeds));
-  // Views carry independent noise here, so that leaving them out tells the same; the jackknife is
-  // somewhat too large.
+  // Views have independent noise here, so that the jackknife estimates the same, with a positive
+  // bias.
   EXPECT_GT(of.by_views / of.by_noise, 0.7);
   EXPECT_LT(of.by_views / of.by_noise, 2.5);
 }
 
-TEST(ExpectedDifference, ByViewsCountsWhatAViewsCornersHaveInCommon) {
+TEST(EstimateCovarianceByViews, IncludesErrorsCommonToView) {
   const Scatter of = scatter(0.0005);
   const double sd = std::sqrt(2 / of.freedoms);
   EXPECT_GT(of.found / of.by_noise, 1 + 3 * sd);  // noise alone does not explain it

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Lenses of 190 degrees from the corners of boards.
+/// Lenses of 190 degrees, estimated from the corners of boards.
 #include <gtest/gtest.h>
 
 #include <map>
@@ -12,15 +12,15 @@
 namespace vlp {
 namespace {
 
-class WideLens : public testing::TestWithParam<bool> {};
+class SolveWideLens : public testing::TestWithParam<bool> {};
 
-TEST_P(WideLens, OfExactCornersIsExact) {
+TEST_P(SolveWideLens, MatchesTruthForExactCorners) {
   Random random(17);
   const auto input = wide_input(GetParam(), 20, random, 0, {0.0004, -0.0003});
   const IntrinsicsSolution solution = solve_intrinsics(input);
   ASSERT_TRUE(solution.ok()) << explanation_of(solution.status);
   EXPECT_EQ(solution.views.size(), 20U);
-  // The shift of the edges is looked for on a flat board.
+  // The shift of the edges is estimated on a flat board.
   EXPECT_LT(solution.rms_px, GetParam() ? 1e-3 : 0.02);
   EXPECT_LT(up_to(94, solution.lens()).worst_px, GetParam() ? 1e-3 : 0.03);
   const Eigen::Vector2d warp_m =
@@ -28,7 +28,7 @@ TEST_P(WideLens, OfExactCornersIsExact) {
   EXPECT_LT((warp_m - Eigen::Vector2d(0.0004, -0.0003)).norm(), 1e-5);
 }
 
-TEST_P(WideLens, IsKnownBeyondNinetyDegrees) {
+TEST_P(SolveWideLens, MatchesTruthBeyondNinetyDegrees) {
   Random random(18);
   const auto input = wide_input(GetParam(), 40, random, 0.05);
   const IntrinsicsSolution solution = solve_intrinsics(input);
@@ -42,11 +42,11 @@ TEST_P(WideLens, IsKnownBeyondNinetyDegrees) {
   EXPECT_LT(report.halves->rms_px, 0.1);
 }
 
-INSTANTIATE_TEST_SUITE_P(Boards, WideLens, testing::Bool(),
+INSTANTIATE_TEST_SUITE_P(Boards, SolveWideLens, testing::Bool(),
                          [](const auto& board) { return board.param ? "Kalibr" : "Plain"; });
 
-// Twenty seeds: the parameters scatter as their covariance says.
-TEST(WideLensScatter, IsThatOfTheCovariance) {
+// Compares the parameters of twenty seeds with their covariance.
+TEST(ProjectionUncertainty, MatchesScatterOfWideLens) {
   constexpr int seeds = 20;
   double focal = 0, center = 0;
   for (int seed = 0; seed < seeds; ++seed) {
@@ -69,8 +69,8 @@ TEST(WideLensScatter, IsThatOfTheCovariance) {
   EXPECT_LT(center, 2.0);
 }
 
-// The same when a tag's corners err together.
-TEST(WideLensScatter, IsThatOfTheCovarianceByTags) {
+// The same with correlated errors of the corners of a tag.
+TEST(ProjectionUncertainty, MatchesScatterWithCorrelatedTagErrors) {
   constexpr int seeds = 20;
   double by_tags = 0, by_corners = 0;
   for (int seed = 0; seed < seeds; ++seed) {

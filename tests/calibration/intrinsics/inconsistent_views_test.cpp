@@ -20,7 +20,7 @@ using testing::IsEmpty;
 constexpr int kViews = 36;
 constexpr double kNoise_px = 0.02;
 
-/// A lens of the type of synthetic_lens(): 2 % shorter, and decentred by 9 px.
+/// Returns a lens similar to synthetic_lens(): focal length 2 % shorter, principal point 9 px away.
 Lens other_lens() {
   const std::array parameters{509.0,  510.0,   407.0,  304.0, -0.25, 0.08,
                               0.0002, -0.0001, -0.012, 0.01,  0.002, 0.0001};
@@ -33,7 +33,7 @@ std::vector<std::string> image_names() {
   return names;
 }
 
-TEST(FindInconsistentViews, ReturnsTheViewsOfAnotherCamera) {
+TEST(FindInconsistentViews, ReturnsViewsOfOtherCamera) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   const SyntheticViews others{synthetic_board(false), other_lens()};
   Random random(3);
@@ -54,7 +54,7 @@ TEST(FindInconsistentViews, ReturnsTheViewsOfAnotherCamera) {
   }
 }
 
-TEST(FindInconsistentViews, ReturnsNoneOfOneCamera) {
+TEST(FindInconsistentViews, ReturnsNoneForOneCamera) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   Random random(4);
   for (int set = 0; set < 10; ++set) {
@@ -66,7 +66,7 @@ TEST(FindInconsistentViews, ReturnsNoneOfOneCamera) {
   }
 }
 
-TEST(FindInconsistentViews, ReturnsViewsWithoutAPoseUnlessThereIsOne) {
+TEST(FindInconsistentViews, ReturnsViewsWithoutPoseIfSeveral) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   Random random(5);
   IntrinsicsInput input = views.input(12, random, 0.05);

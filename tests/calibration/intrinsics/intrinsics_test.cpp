@@ -14,14 +14,14 @@ ProjectionDifference difference(const IntrinsicsSolution& solution, const Synthe
   return *projection_difference(views.lens, solution.lens(), views.imager_px, even);
 }
 
-class Intrinsics : public testing::TestWithParam<bool> {
+class SolveIntrinsics : public testing::TestWithParam<bool> {
  protected:
   SyntheticViews views_{synthetic_board(GetParam()), synthetic_lens()};
   Random random_{7};
 };
 
-// What is left is the regularization: a worst of 0.003 to 0.03 px, in corners that no view covers.
-TEST_P(Intrinsics, OfExactCornersAreExact) {
+// The regularization causes errors up to 0.003 to 0.03 px, in image corners that no view covers.
+TEST_P(SolveIntrinsics, MatchesTruthForExactCorners) {
   views_.warp_m = {0.0004, -0.0003};
   const IntrinsicsInput input = views_.input(20, random_, 0);
   const IntrinsicsSolution solution = solve_intrinsics(input);
@@ -35,7 +35,7 @@ TEST_P(Intrinsics, OfExactCornersAreExact) {
   EXPECT_LT((warp_m - views_.warp_m).norm(), 2e-6);
 }
 
-TEST_P(Intrinsics, NeedNoGuessOfTheFocalLength) {
+TEST_P(SolveIntrinsics, ConvergesForAnyFocalLength) {
   for (const double focal_px : {250.0, 600.0, 1500.0, 4000.0}) {
     const std::array parameters{focal_px, focal_px, 390.0, 310.0};
     SyntheticViews views{synthetic_board(GetParam()), Lens(LensModel::pinhole, parameters)};
@@ -46,7 +46,7 @@ TEST_P(Intrinsics, NeedNoGuessOfTheFocalLength) {
   }
 }
 
-TEST_P(Intrinsics, AreTheSameAgain) {
+TEST_P(SolveIntrinsics, IsDeterministic) {
   const IntrinsicsInput input = views_.input(10, random_, 0.1);
   const IntrinsicsSolution one = solve_intrinsics(input), two = solve_intrinsics(input);
   ASSERT_TRUE(one.ok());
@@ -54,7 +54,7 @@ TEST_P(Intrinsics, AreTheSameAgain) {
   EXPECT_EQ(one.rms_px, two.rms_px);
 }
 
-TEST_P(Intrinsics, DropAHopelessViewAndNameIt) {
+TEST_P(SolveIntrinsics, ReportsDroppedView) {
   IntrinsicsInput input = views_.input(12, random_, 0.05);
   auto& bad = input.views[4];
   for (auto& corner : bad) corner.pixel.x() += 60 * std::sin(corner.pixel.y() / 15);
@@ -67,7 +67,7 @@ TEST_P(Intrinsics, DropAHopelessViewAndNameIt) {
   EXPECT_LT(difference(solution, views_).mean_px, 0.15);
 }
 
-TEST_P(Intrinsics, LeaveOutliersOut) {
+TEST_P(SolveIntrinsics, RejectsOutliers) {
   IntrinsicsInput input = views_.input(15, random_, 0.05);
   for (std::size_t i = 0; i < 10; ++i) input.views[i][3 * i].pixel.y() += 1.5;
   const IntrinsicsSolution solution = solve_intrinsics(input);
@@ -77,22 +77,22 @@ TEST_P(Intrinsics, LeaveOutliersOut) {
   EXPECT_NEAR(solution.rms_px, 0.05, 0.006);
 }
 
-TEST_P(Intrinsics, NeedThreeViews) {
+TEST_P(SolveIntrinsics, ReportsTooFewViews) {
   const auto solution = solve_intrinsics(views_.input(2, random_, 0.05));
   EXPECT_EQ(solution.status, IntrinsicsStatus::too_few_views);
 }
 
-TEST_P(Intrinsics, NeedViewsThatDiffer) {
+TEST_P(SolveIntrinsics, ReportsIdenticalViews) {
   IntrinsicsInput input = views_.input(1, random_, 0);
   input.views.resize(8, input.views[0]);
   EXPECT_EQ(solve_intrinsics(input).status, IntrinsicsStatus::all_alike);
 }
 
-INSTANTIATE_TEST_SUITE_P(Boards, Intrinsics, testing::Bool(),
+INSTANTIATE_TEST_SUITE_P(Boards, SolveIntrinsics, testing::Bool(),
                          [](const auto& board) { return board.param ? "Kalibr" : "Plain"; });
 
-// Boards tilted by up to 60 degrees and partly out of the image, where seeds flip.
-TEST(IntrinsicsOfPartialBoards, AreNeverWrong) {
+// Boards tilted by up to 60 degrees and partly outside the image, where initial poses may flip.
+TEST(SolvePartialBoards, MatchesTruthForStronglyTiltedBoards) {
   SyntheticViews views{synthetic_board(false), synthetic_lens()};
   views.tilt_rad = 1.05;
   Random random(11);

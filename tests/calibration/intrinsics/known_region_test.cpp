@@ -12,7 +12,7 @@ namespace {
 constexpr std::array kImager{801, 601};
 constexpr double kMargin = 40;  // 4 % of 1000 px
 
-TEST(KnownRegion, IsTheHullWithAMargin) {
+TEST(KnownRegion, IsConvexHullWithMargin) {
   const ImageRegion region = known_region(
       {{200, 100}, {600, 100}, {400, 250}, {600, 500}, {200, 500}}, kImager, LensModel::opencv8);
   EXPECT_EQ(region.size(), 4U);
@@ -24,7 +24,7 @@ TEST(KnownRegion, IsTheHullWithAMargin) {
   EXPECT_FALSE(polygon_contains(region, {400, 541}));
 }
 
-TEST(KnownRegion, EndsWithTheImage) {
+TEST(KnownRegion, IsClippedToImage) {
   const ImageRegion region =
       known_region({{5, 5}, {790, 5}, {790, 590}, {5, 590}}, kImager, LensModel::opencv8);
   EXPECT_NEAR(share_of_image(region, kImager), 1, 1e-12);
@@ -35,7 +35,7 @@ TEST(KnownRegion, EndsWithTheImage) {
   EXPECT_TRUE(polygon_contains(region, {800, 600}));
 }
 
-TEST(KnownRegion, OfASlantedSetIsSlanted) {
+TEST(KnownRegion, FollowsSlantedHull) {
   const ImageRegion region =
       known_region({{100, 100}, {700, 500}, {690, 510}, {90, 110}}, kImager, LensModel::opencv8);
   EXPECT_TRUE(polygon_contains(region, {400, 300}));
@@ -43,7 +43,7 @@ TEST(KnownRegion, OfASlantedSetIsSlanted) {
   EXPECT_LT(share_of_image(region, kImager), 0.3);
 }
 
-TEST(KnownRegion, NeedsThreeCornersThatAreNotOnALine) {
+TEST(KnownRegion, IsEmptyForCollinearCorners) {
   EXPECT_TRUE(known_region({}, kImager, LensModel::opencv8).empty());
   EXPECT_TRUE(known_region({{1, 1}, {2, 2}, {3, 3}, {9, 9}}, kImager, LensModel::opencv8).empty());
   EXPECT_EQ(share_of_image({}, kImager), 0);

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Which lens model views of a board call for, by cross-validation.
+/// Selection of a lens model by cross-validation.
 #include "calibration/intrinsics/lens_choice.h"
 
 #include <gtest/gtest.h>
@@ -28,7 +28,7 @@ Lens radial_lens() {
   return {LensModel::opencv4, std::array{520.0, 521.0, 402.0, 297.0, -0.25, 0.08, 0.0002, -0.0001}};
 }
 
-/// With a denominator that no polynomial of OPENCV5 stands in for.
+/// Returns a lens with a denominator that no polynomial of OPENCV5 approximates.
 Lens rational_lens() {
   return {LensModel::opencv8, std::array{420.0, 421.0, 402.0, 297.0, 0.9, 0.25, 0.0002, -0.0001,
                                          0.01, 1.25, 0.5, 0.06}};
@@ -49,19 +49,19 @@ void expect_chosen(const Lens& lens) {
   const auto choice = choose_lens(seen_through(lens, count));
   ASSERT_TRUE(choice);
   EXPECT_EQ(name_of(choice->model), name_of(lens.model())) << words_of(*choice);
-  // Noise, and what lies beyond the other views.
+  // Noise, and errors outside the region of the other views.
   EXPECT_NEAR(rms_of(*choice, choice->model), kNoise_px, 0.25 * kNoise_px);
   EXPECT_EQ(choice->tried.size(), 5U);
   EXPECT_TRUE(words_of(*choice).starts_with(name_of(lens.model()))) << words_of(*choice);
 }
 
-TEST(ChooseLens, TakesARadialLens) { expect_chosen(radial_lens()); }
+TEST(ChooseLens, ReturnsOpencv4ForRadialLens) { expect_chosen(radial_lens()); }
 
-TEST(ChooseLens, TakesARationalLens) { expect_chosen(rational_lens()); }
+TEST(ChooseLens, ReturnsOpencv8ForRationalLens) { expect_chosen(rational_lens()); }
 
-TEST(ChooseLens, TakesAFisheye) { expect_chosen(fisheye_lens()); }
+TEST(ChooseLens, ReturnsFisheyeForFisheyeLens) { expect_chosen(fisheye_lens()); }
 
-TEST(ChooseLens, IsNotMovedByABadView) {
+TEST(ChooseLens, IgnoresBadView) {
   constexpr int count = 24;
   IntrinsicsInput input = seen_through(rational_lens(), count);
   for (auto& corner : input.views[5]) {
@@ -73,7 +73,7 @@ TEST(ChooseLens, IsNotMovedByABadView) {
   EXPECT_NEAR(rms_of(*choice, choice->model), kNoise_px, 0.4 * kNoise_px);
 }
 
-TEST(ChooseLens, HeedsTheFewViewsThatShowTheDifference) {
+TEST(ChooseLens, UsesFewViewsFarFromCenter) {
   constexpr std::size_t all = 30, far = 6;
   constexpr double inner_px = 220;
   SyntheticViews views{synthetic_board(false), rational_lens()};
@@ -88,7 +88,7 @@ TEST(ChooseLens, HeedsTheFewViewsThatShowTheDifference) {
     const bool inner = std::all_of(corners.begin(), corners.end(), [&](const auto& corner) {
       return (corner.pixel - middle).norm() < inner_px;
     });
-    // Every fifth view shows the board further out.
+    // Every fifth view shows the board farther from the center.
     if (inner == (input.views.size() % (all / far) != 0)) input.views.push_back(std::move(corners));
   }
   const auto choice = choose_lens(input);
@@ -97,12 +97,12 @@ TEST(ChooseLens, HeedsTheFewViewsThatShowTheDifference) {
   EXPECT_LT(rms_of(*choice, choice->model), 2 * kNoise_px);
 }
 
-TEST(ChooseLens, NeedsSixViews) {
+TEST(ChooseLens, ReturnsNulloptForFewerThanSixViews) {
   EXPECT_FALSE(choose_lens(seen_through(radial_lens(), 5)));
   EXPECT_TRUE(choose_lens(seen_through(radial_lens(), 6)));
 }
 
-TEST(ChooseLens, GivesUpModelsWithoutRaysBeyondARightAngle) {
+TEST(ChooseLens, SkipsOpencvModelsBeyondRightAngle) {
   Random random(44);
   const auto choice = choose_lens(wide_input(false, 24, random, kNoise_px));
   ASSERT_TRUE(choice);
@@ -115,7 +115,7 @@ TEST(ChooseLens, GivesUpModelsWithoutRaysBeyondARightAngle) {
   EXPECT_EQ(choose_lens(seen_through(fisheye_lens(), 8))->beyond_rad, 0);
 }
 
-TEST(ChooseLens, SaysWhyOnlyAFisheyeCanBe) {
+TEST(DescribeLensChoice, ExplainsFisheyeBeyondRightAngle) {
   const LensChoice choice{
       LensModel::fisheye, {{LensModel::opencv4}, {LensModel::fisheye, 0.0512}}, 1.7};
   EXPECT_EQ(words_of(choice),
@@ -123,7 +123,7 @@ TEST(ChooseLens, SaysWhyOnlyAFisheyeCanBe) {
             "off the axis, where no LENSMODEL_OPENCVn has rays");
 }
 
-TEST(ChooseLens, SaysWhichModelsCannotBe) {
+TEST(DescribeLensChoice, ListsModelsWithoutLens) {
   const LensChoice choice{LensModel::fisheye, {{LensModel::opencv4}, {LensModel::fisheye, 0.0512}}};
   EXPECT_EQ(words_of(choice),
             "OPENCV_FISHEYE, 0.051 px rms in views left out; LENSMODEL_OPENCV4 no lens");

@@ -76,7 +76,7 @@ TEST(MeasureSharpness, ReportsAsymmetryOfTiltedFocalPlane) {
   EXPECT_LT(tilted.worst_ratio, 0.9);
 }
 
-TEST(MeasureSharpness, HasNoAsymmetryOfRotationallySymmetricLens) {
+TEST(MeasureSharpness, ReportsNoAsymmetryOfSymmetricLens) {
   const LensSharpness symmetric = measured([](const Eigen::Vector2d& at_px, int view) {
     EdgeStep step = even_step(at_px, view);
     step.blur_px *= 1 + 0.5 * (at_px - Eigen::Vector2d(400, 300)).squaredNorm() / 250000;
@@ -113,8 +113,8 @@ TEST(MeasureSharpness, ReportsLossOfSmear) {
   EXPECT_LT(smeared.local_shadow, 0.01);
 }
 
-/// A part of the image that few views show is no sharper than the rest.
-TEST(MeasureSharpness, DoesNotDependOnTheNumberOfViews) {
+/// A part of the image with few views is not sharper than the others.
+TEST(MeasureSharpness, IsIndependentOfNumberOfViews) {
   std::mt19937 random(3);
   std::normal_distribution<double> of_view(0, 0.1);
   std::vector<double> ratios;
@@ -137,7 +137,7 @@ TEST(MeasureSharpness, DoesNotDependOnTheNumberOfViews) {
   EXPECT_NEAR(mean, 1, 0.03);
 }
 
-TEST(MeasureSharpness, LeavesTheShadowUnknownWithFewTagsInAView) {
+TEST(MeasureSharpness, ReportsUnknownShadowForFewTagsPerView) {
   // Seven tags in a view are 28 edges, too few for a field of the light; all views cover the image.
   const auto dense = make_views(even_step, 140);
   std::vector<BoardView> views;

@@ -13,8 +13,8 @@
 namespace vlp {
 namespace {
 
-/// mrcal tells stderr of outliers. What others say there meanwhile is all that is to be seen.
-TEST(Mrcal, IsSilentAndSilencesNobodyElse) {
+/// mrcal reports outliers on stderr. Only the messages of other threads may appear there.
+TEST(SolveByMrcal, SuppressesOnlyMessagesOfMrcal) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   Random random(7);
   IntrinsicsInput input = views.input(15, random, 0.05);

@@ -19,14 +19,14 @@ IntrinsicsInput input_of(const Board& board, const std::vector<BoardView>& views
   return input;
 }
 
-class MrcalCorners : public testing::TestWithParam<bool> {
+class WriteCorners : public testing::TestWithParam<bool> {
  protected:
   const TemporaryFolder folder;
   const SyntheticViews views{synthetic_board(GetParam()), synthetic_lens()};
 };
 
-/// Of a plain board, and of a Kalibr board, which is four lattices to mrcal.
-TEST_P(MrcalCorners, ComeBackAsTheyWereSolvedFor) {
+/// Tests a plain board, and a Kalibr board, which is four lattices for mrcal.
+TEST_P(WriteCorners, KeepsSolutionAfterRoundTrip) {
   constexpr int count = 12;
   Random random(3);
   const IntrinsicsSolution solution = solve_intrinsics(views.input(count, random, 0.05));
@@ -49,8 +49,8 @@ TEST_P(MrcalCorners, ComeBackAsTheyWereSolvedFor) {
   EXPECT_NEAR(again.rms_px, solution.rms_px, 1e-5);
 }
 
-/// Images of two folders, which number theirs alike.
-TEST_P(MrcalCorners, OfImagesOfOneNameStayApart) {
+/// Images of two folders with the same names.
+TEST_P(WriteCorners, MakesImageNamesUnique) {
   constexpr std::size_t count = 8;
   Random random(3);
   const IntrinsicsSolution solution = solve_intrinsics(views.input(count, random, 0.05));
@@ -68,7 +68,7 @@ TEST_P(MrcalCorners, OfImagesOfOneNameStayApart) {
                                              "a_b", "a_b-2", "0.png-3"}));
 }
 
-INSTANTIATE_TEST_SUITE_P(Boards, MrcalCorners, testing::Values(false, true));
+INSTANTIATE_TEST_SUITE_P(Boards, WriteCorners, testing::Values(false, true));
 
 Board chessboard() {
   Board board{"", 4, 5, 0, 1, 1, false, 0, {false, BoardCorner::top_left}};
@@ -81,7 +81,7 @@ std::string row(const std::string& x_and_y, const std::string& fourth) {
   return "0.png " + x_and_y + " " + fourth + "\n";
 }
 
-TEST(MrcalTable, WeighsCornersByTheirLevels) {
+TEST(ReadCorners, ComputesWeightsFromLevels) {
   const TemporaryFolder folder;
   std::string rows;
   for (int i = 0; i < 12; ++i) {
@@ -107,15 +107,15 @@ TEST(MrcalTable, WeighsCornersByTheirLevels) {
   EXPECT_EQ(by_weight[0].seen.points[1].weight, 1);
 }
 
-TEST(MrcalTable, RefusesAWeightWithoutMeasure) {
+TEST(ReadCorners, ThrowsForExcessiveWeight) {
   const TemporaryFolder folder;
   const auto file = folder.file("corners.vnl", "# filename x y weight\n" + row("100 100", "1e7"));
   EXPECT_EQ(refusal_of([&] { read_corners(file, chessboard(), kImager_px); }),
             file.string() + ":2: a weight of 1e+07: weights go up to 1000");
 }
 
-/// Levels are from 0 on, so that weights beyond 1 are written as weights, powers of two as well.
-TEST(MrcalTable, ComesBackWithItsWeights) {
+/// Levels start at 0, so that weights above 1 are written as weights, also powers of two.
+TEST(ReadCorners, ReturnsWrittenWeights) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   Random random(6);
   IntrinsicsInput input = views.input(6, random, 0.05);
@@ -140,8 +140,8 @@ TEST(MrcalTable, ComesBackWithItsWeights) {
   }
 }
 
-/// With either solver: corners of large errors that weigh little spoil little.
-TEST(WeightedCorners, CountByTheirWeights) {
+/// With either solver, corners with large errors and small weights have little influence.
+TEST(CornerWeight, ScalesInfluenceOnSolve) {
   const std::array fisheye{450.0, 451.0, 402.0, 297.0, 0.02, -0.01, 0.003, -0.0004};
   for (const Lens& lens : {synthetic_lens(), Lens(LensModel::fisheye, fisheye)}) {
     SCOPED_TRACE(name_of(lens.model()));
@@ -160,7 +160,7 @@ TEST(WeightedCorners, CountByTheirWeights) {
     const IntrinsicsSolution half = solve_intrinsics(weighted);
     ASSERT_TRUE(whole.ok() && half.ok());
     EXPECT_NEAR(half.rms_px, whole.rms_px / 2, 0.02 * whole.rms_px);
-    // Every other corner is off by a pixel, at a fiftieth of the weight.
+    // Every second corner has errors of a pixel, with a fiftieth of the weight.
     for (auto& view : input.views) {
       for (std::size_t i = 0; i < view.size(); i += 2) {
         view[i].pixel += Eigen::Vector2d(random.normal(), random.normal());

@@ -12,16 +12,15 @@
 namespace vlp {
 namespace {
 
-TEST(Base85, IsPythons) {
+TEST(Base85, MatchesPython) {
   EXPECT_EQ(base85(""), "");
   EXPECT_EQ(base85("hello"), "Xk~0{Zv");
   EXPECT_EQ(base85(std::string("\0\0\0\0", 4)), "00000");
   EXPECT_EQ(base85("abcd"), "VPa!s");
 }
 
-// Read by an unzip that knows nothing of this project: its check of the archive fails for a wrong
-// CRC.
-TEST(NumpyArchive, IsAZipArchive) {
+// Checked by the program unzip, which fails for a wrong CRC.
+TEST(NumpyArchive, IsValidZipArchive) {
   if (run_program("command -v unzip").exit_code != 0) GTEST_SKIP() << "no unzip here";
   const TemporaryFolder folder;
   NumpyArchive archive;

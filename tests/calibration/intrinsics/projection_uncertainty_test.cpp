@@ -14,7 +14,7 @@
 namespace vlp {
 namespace {
 
-TEST(ProjectionUncertainty, IsLargeForViewsFromTheFront) {
+TEST(ProjectionUncertainty, IsLargeForFrontalViews) {
   SyntheticViews views{synthetic_board(false), synthetic_lens()};
   Random random(3);
   const auto tilted = solve_intrinsics(views.input(12, random, 0.1));
@@ -27,9 +27,9 @@ TEST(ProjectionUncertainty, IsLargeForViewsFromTheFront) {
             5 * ProjectionUncertainty(tilted).worst_px(place));
 }
 
-TEST(ProjectionUncertainty, KnowsHowFarTheRegularizationDrawsALens) {
-  // 110 degrees: the coefficients are far from zero, and the corners known to a fiftieth of the
-  // noise for which mrcal regularizes.
+TEST(ProjectionUncertainty, ReportsRegularizationBias) {
+  // 110 degrees: the coefficients are far from zero, and the corner noise is a fiftieth of that for
+  // which mrcal scales the regularization.
   const std::array wide{416.7,  416.9,  398.2,     302.1,   0.733348, 0.0897113,
                         0.0001, 0.0002, 0.0009234, 1.06639, 0.246743, 0.00924612};
   const SyntheticViews views{synthetic_board(false), Lens(LensModel::opencv8, wide)};
@@ -44,7 +44,7 @@ TEST(ProjectionUncertainty, KnowsHowFarTheRegularizationDrawsALens) {
   EXPECT_NEAR(focal_off_px, -pull[0], 0.4 * std::abs(focal_off_px));
 }
 
-TEST(ProjectionUncertainty, IsWithoutAPullWhereNothingDraws) {
+TEST(ProjectionUncertainty, ReportsNoBiasWithoutRegularization) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   Random random(3);
   IntrinsicsInput input = views.input(12, random, 0.1);
@@ -54,7 +54,7 @@ TEST(ProjectionUncertainty, IsWithoutAPullWhereNothingDraws) {
   EXPECT_EQ(ProjectionUncertainty(solution).intrinsics_pull(), Eigen::VectorXd::Zero(8));
 }
 
-TEST(ProjectionUncertainty, OfCornersByThemselvesIsMrcals) {
+TEST(ProjectionUncertainty, MatchesMrcalForIndependentCorners) {
   if (run_program("/usr/bin/python3 -c 'import mrcal'").exit_code != 0) {
     GTEST_SKIP() << "mrcal for Python is not installed";
   }
@@ -77,7 +77,7 @@ TEST(ProjectionUncertainty, OfCornersByThemselvesIsMrcals) {
   }
 }
 
-TEST(ProjectionUncertainty, IsTheSameByTagsWhereCornersErrByThemselves) {
+TEST(ProjectionUncertainty, ByTagsMatchesByCornersForIndependentErrors) {
   for (const bool kalibr : {false, true}) {
     const SyntheticViews views{synthetic_board(kalibr), synthetic_lens()};
     Random random(4);
@@ -91,7 +91,7 @@ TEST(ProjectionUncertainty, IsTheSameByTagsWhereCornersErrByThemselves) {
   }
 }
 
-TEST(CalibrationReport, HalvesAgreeAsTheUncertaintySays) {
+TEST(CalibrationReport, HalvesAgreeWithReportedUncertainty) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   Random random(5);
   const IntrinsicsInput input = views.input(24, random, 0.1);
@@ -99,12 +99,12 @@ TEST(CalibrationReport, HalvesAgreeAsTheUncertaintySays) {
   ASSERT_TRUE(solution.ok());
   const CalibrationReport report = report_on(solution, input);
   ASSERT_TRUE(report.halves);
-  // Twice as far apart as a lens from the truth, by a factor that a few freedoms leave open.
+  // Twice the difference from the truth, within a factor for the few degrees of freedom.
   EXPECT_LT(report.halves->rms_px, 2.5 * 2 * report.expected_rms_px);
   EXPECT_GT(report.halves->rms_px, 0.3 * 2 * report.expected_rms_px);
 }
 
-TEST(CalibrationReport, HeldOutViewsFitAsWellAsTheOthers) {
+TEST(ComputeHeldOutFit, MatchesNoiseOfSolvedViews) {
   SyntheticViews views{synthetic_board(true), synthetic_lens()};
   views.warp_m = {0.0006, 0.0004};
   Random random(6);
@@ -115,7 +115,7 @@ TEST(CalibrationReport, HeldOutViewsFitAsWellAsTheOthers) {
   EXPECT_NEAR(held_out.rms_px, 0.05, 0.006);
 }
 
-TEST(ViewCoverage, NamesWhatIsMissing) {
+TEST(RecommendNextView, ReturnsEmptiestPartAndLeastTiltedSide) {
   ViewCoverage coverage;
   coverage.corners = {9, 9, 9, 9, 9, 2, 9, 9, 9};
   coverage.tilts_rad = {0.5, 0.6, 0.1, 0.5};
@@ -124,7 +124,7 @@ TEST(ViewCoverage, NamesWhatIsMissing) {
             "the camera");
 }
 
-TEST(ViewCoverage, KnowsWhichSideIsNearer) {
+TEST(ComputeViewCoverage, ReportsTiltOfNearerSide) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   Random random(9);
   const IntrinsicsInput input = views.input(12, random, 0);

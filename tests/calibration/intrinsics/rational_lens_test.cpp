@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// OPENCV8 and OPENCV12 of boards that a wide lens sees far off its axis: their quotient can have
-/// poles between the corners.
+/// OPENCV8 and OPENCV12 for boards far off the axis of a wide lens: their rational functions can
+/// have poles between the corners.
 #include <gtest/gtest.h>
 
 #include "calibration/intrinsics/wide_views.h"
@@ -10,9 +10,9 @@
 namespace vlp {
 namespace {
 
-class RationalLens : public testing::TestWithParam<LensModel> {};
+class SolveRationalLens : public testing::TestWithParam<LensModel> {};
 
-TEST_P(RationalLens, SeesAllCornersOfBoardsFarOffTheAxis) {
+TEST_P(SolveRationalLens, MatchesTruthForBoardsFarOffAxis) {
   constexpr int views = 36;
   constexpr double noise_px = 0.05;
   for (const double reach_deg : {69, 80}) {
@@ -31,7 +31,7 @@ TEST_P(RationalLens, SeesAllCornersOfBoardsFarOffTheAxis) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Models, RationalLens,
+INSTANTIATE_TEST_SUITE_P(Models, SolveRationalLens,
                          testing::Values(LensModel::opencv8, LensModel::opencv12),
                          [](const auto& instance) {
                            return instance.param == LensModel::opencv8 ? "Opencv8" : "Opencv12";

@@ -9,7 +9,7 @@
 
 namespace vlp {
 
-/// 800 x 600, of any model but the splined ones.
+/// Returns a camera of 800 x 600 px with any model that is not splined.
 inline Camera camera_of(LensModel model) {
   const std::vector<double> distortions{-0.2,   0.05,  1e-4, -2e-4, 0.01,  0.02,
                                         -0.003, 0.001, 1e-4, 2e-5,  -1e-4, 3e-5};
@@ -24,7 +24,7 @@ inline Camera camera_of(LensModel model) {
   return camera;
 }
 
-/// As of a lens of 150 degrees.
+/// Returns a camera with a splined lens like one of 150 degrees.
 inline Camera splined_camera(const SplineGrid& grid = {3, 13, 11, 150}) {
   return with_lens_model(camera_of(LensModel::fisheye), splined_lens(grid)).camera;
 }

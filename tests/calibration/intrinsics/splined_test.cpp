@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Splined lenses from the corners of boards, of a lens of 190 degrees that is none of them.
+/// Splined lenses, estimated from the corners of boards seen through a fisheye of 190 degrees.
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
@@ -19,7 +19,7 @@ namespace {
 
 constexpr LensModel kSplined = splined_lens({3, 14, 14, 205});
 
-/// Boards all over the image of a lens that sees to 100 degrees off its axis.
+/// Returns boards all over the image of a lens with rays up to 100 degrees off its axis.
 IntrinsicsInput splined_input(int count, Random& random, double noise_px) {
   const WideBoards boards{0.1, 0.2, 100 * std::numbers::pi / 180, true};
   IntrinsicsInput input = wide_input(false, count, random, noise_px, {0, 0}, boards);
@@ -27,8 +27,8 @@ IntrinsicsInput splined_input(int count, Random& random, double noise_px) {
   return input;
 }
 
-TEST(SplinedWideLens, IsKnownBeyondNinetyDegrees) {
-  constexpr double noise_px = 0.02;  // as of rendered boards
+TEST(SolveSplinedLens, MatchesTruthBeyondNinetyDegrees) {
+  constexpr double noise_px = 0.02;  // as in rendered boards
   Random random(18);
   const auto input = splined_input(40, random, noise_px);
   const IntrinsicsSolution solution = solve_intrinsics(input);
@@ -53,9 +53,9 @@ TEST(SplinedWideLens, IsKnownBeyondNinetyDegrees) {
   EXPECT_EQ(uncertainty.intrinsics_covariance().topRows<4>().norm(), 0);
 }
 
-// Of tags seen at a slant an edge may be another one; near the rim, where corners are few, a
-// splined lens would bend to it.
-TEST(SplinedWideLens, DoesNotBendToSlips) {
+// The edge of a tag at a slant may be misdetected. Near the rim, where corners are sparse, a
+// splined lens would overfit it.
+TEST(SolveSplinedLens, RejectsTagsWithDisplacedEdge) {
   constexpr double noise_px = 0.02, slip_px = 2.5;
   constexpr std::size_t count = 40, of_tag = 4;
   Random random(18);
@@ -80,7 +80,7 @@ TEST(SplinedWideLens, DoesNotBendToSlips) {
   EXPECT_LT(up_to(94, solution.lens()).worst_px, 0.15);
 }
 
-TEST(SplinedWideLens, OfTooNarrowAGridHasOnlyTheViewsWithinIt) {
+TEST(SolveSplinedLens, FailsWhenGridIsTooNarrow) {
   Random random(19);
   IntrinsicsInput input = splined_input(12, random, 0.05);
   input.lens_model = splined_lens({3, 10, 10, 120});
@@ -88,9 +88,9 @@ TEST(SplinedWideLens, OfTooNarrowAGridHasOnlyTheViewsWithinIt) {
   EXPECT_FALSE(solution.ok());
 }
 
-// Slips are told behind OPENCV_FISHEYE, which does not quite fit this lens: no tag is left out for
-// that. Those of which an edge slipped are, by that or as outliers of mrcal's, which suffice here.
-TEST(SplinedNarrowLens, DoesNotTakeItsOwnShapeForSlips) {
+// Outliers are found with OPENCV_FISHEYE, which does not quite fit this lens. That alone rejects no
+// tag. Tags with a displaced edge are rejected, by that test or as outliers of mrcal.
+TEST(SolveSplinedLens, KeepsTagsThatFisheyeFitsPoorly) {
   constexpr double noise_px = 0.02, slip_px = 2.5;
   constexpr std::size_t count = 40, of_tag = 4;
   Random random(18);
@@ -126,7 +126,7 @@ TEST(SplinedNarrowLens, DoesNotTakeItsOwnShapeForSlips) {
   EXPECT_LT(difference->worst_px, 0.15);
 }
 
-/// How much the boards turned from one solution to another in the mean, in the camera.
+/// Returns the mean rotation of the boards from one solution to another, in the camera frame.
 Eigen::Vector3d mean_turn(const IntrinsicsSolution& from, const IntrinsicsSolution& to) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < from.problem.poses.size(); ++i) {
@@ -137,8 +137,8 @@ Eigen::Vector3d mean_turn(const IntrinsicsSolution& from, const IntrinsicsSoluti
   return sum / static_cast<double>(from.problem.poses.size());
 }
 
-// Twenty seeds of noise on the same boards: projections scatter as the uncertainty says.
-TEST(SplinedScatter, IsThatOfTheUncertainty) {
+// Compares projections of twenty seeds of noise on the same boards with the reported uncertainty.
+TEST(ProjectionUncertainty, MatchesScatterOfSplinedLens) {
   constexpr int seeds = 20;
   constexpr double noise_px = 0.1;
   Random of_boards(41);
@@ -161,7 +161,7 @@ TEST(SplinedScatter, IsThatOfTheUncertainty) {
     solutions.push_back(solved(300 + static_cast<std::uint64_t>(seed)));
     ASSERT_TRUE(solutions.back().ok());
   }
-  // About their own mean: what draws all of them alike is no scatter.
+  // Relative to their mean, because a common bias is not part of the uncertainty.
   const IntrinsicsSolution& first = solutions.front();
   const ProjectionUncertainty uncertainty(first);
   const Lens lens = first.lens();

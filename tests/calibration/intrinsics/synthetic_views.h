@@ -11,7 +11,7 @@
 
 namespace vlp {
 
-/// A plain board, or a Kalibr board, of 6 x 5 tags of 20 mm.
+/// Returns a plain board, or a Kalibr board, of 6 x 5 tags of 20 mm.
 inline Board synthetic_board(bool kalibr) {
   return {"tag36h11",
           6,
@@ -24,18 +24,18 @@ inline Board synthetic_board(bool kalibr) {
           {false, BoardCorner::bottom_left}};
 }
 
-/// The weight of a point in a difference of lenses, where all weigh the same.
+/// Uniform standard deviation for projection_difference().
 inline double even(const Eigen::Vector2d&) { return 1; }
 
-/// 800 x 600, with a lens that distorts strongly.
+/// Returns a lens with strong distortion, for 800 x 600 px.
 inline Lens synthetic_lens() {
   const std::array parameters{520.0,  521.0,   402.0,  297.0, -0.25, 0.08,
                               0.0002, -0.0001, -0.012, 0.01,  0.002, 0.0001};
   return Lens(LensModel::opencv8, parameters);
 }
 
-/// The tag with its edges moved inwards, as tone curves do: each corner where the moved lines
-/// cross.
+/// Returns a tag with its edges moved inwards, as by tone curves; its corners are the intersections
+/// of the moved lines.
 inline SeenTag shrunk(const SeenTag& tag, double shift_px) {
   SeenTag result = tag;
   Eigen::Vector2d middle = Eigen::Vector2d::Zero();
@@ -60,15 +60,15 @@ struct SyntheticViews {
   Board board;
   Lens lens;
   std::array<int, 2> imager_px{800, 600};
-  /// At the middle of the whole board, as board_warp_m of a report.
+  /// Warp at the middle of the whole board, as board_warp_m of a report.
   Eigen::Vector2d warp_m{0, 0};
   double tilt_rad = 0.7;
-  /// Distance over what fills the image with the board.
+  /// Distance divided by that at which the board fills the image.
   double farthest = 1.8;
-  /// Printed width and height over those stated.
+  /// Printed width and height divided by the stated ones.
   Eigen::Vector2d stretch{1, 1};
 
-  /// The tags wholly in the image, of a board somewhere in front of the camera.
+  /// Returns the tags completely in the image of a board at a random pose in front of the camera.
   SeenBoard random_view(Random& random, double noise_px) const {
     const Eigen::Vector2d field_m = tag_field_m(board);
     const double fill_m = lens.focal_px().x() * field_m.x() / imager_px[0];
@@ -85,7 +85,7 @@ struct SyntheticViews {
     }
   }
 
-  /// rotation: camera from board; middle_m: the board's middle in the camera.
+  /// `rotation`: camera from board; `middle_m`: middle of the board in the camera frame.
   SeenBoard view(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& middle_m, Random& random,
                  double noise_px) const {
     const Eigen::Vector2d field_m = tag_field_m(board);
@@ -102,7 +102,7 @@ struct SyntheticViews {
         whole = whole && pixel && (pixel->array() > 3).all() && pixel->x() < imager_px[0] - 3 &&
                 pixel->y() < imager_px[1] - 3;
         if (!whole) break;
-        // One after the other: compilers take arguments in orders of their own.
+        // Sequential: the order of evaluation of arguments depends on the compiler.
         const double v = random.normal(), u = random.normal();
         tag.corners_px[k] = *pixel + noise_px * Eigen::Vector2d(u, v);
       }

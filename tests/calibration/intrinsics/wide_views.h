@@ -11,17 +11,17 @@
 
 namespace vlp {
 
-/// As of a lens of 190 degrees.
+/// Image size of wide_lens(), a lens of 190 degrees, px.
 inline constexpr std::array kWideImager{1000, 1000};
 
 inline Lens wide_lens() {
   return {LensModel::fisheye, std::array{290.0, 291.0, 501.0, 498.0, 0.03, -0.012, 0.004, -0.0006}};
 }
 
-/// Where the boards are, and how far off the axis the lens sees.
+/// Positions of the boards, and largest angle off the axis of the lens.
 struct WideBoards {
   double nearest_m = 0.12, farthest_m = 0.3, reach_rad = std::numbers::pi;
-  /// As many in every part of the image, or of the angle off the axis.
+  /// Distributes the boards evenly over the image instead of over the angle off the axis.
   bool all_over = false;
 };
 
@@ -31,8 +31,8 @@ inline SyntheticViews wide_views(bool kalibr, const Eigen::Vector2d& warp_m = {0
   return views;
 }
 
-/// The board anywhere up to 85 degrees off the axis, its far tags beyond 90; often too little of
-/// it.
+/// Returns the board at a random position up to 85 degrees off the axis, its outer tags beyond 90;
+/// often with too few tags.
 inline SeenBoard wide_view(const SyntheticViews& views, Random& random, double noise_px,
                            const WideBoards& boards = {}) {
   const double share = random.uniform(0, 1);
@@ -74,7 +74,7 @@ inline IntrinsicsInput wide_input(bool kalibr, int count, Random& random, double
   return input;
 }
 
-/// Over the pixels up to so far off the axis.
+/// Computes the difference from wide_lens() over the pixels up to `degrees` off the axis.
 inline ProjectionDifference up_to(double degrees, const Lens& found) {
   return *projection_difference(wide_lens(), found, kWideImager, [&](const auto& pixel) {
     const auto ray = wide_lens().unproject(pixel);

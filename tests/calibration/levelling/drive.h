@@ -10,10 +10,10 @@
 
 namespace vlp {
 
-/// Eight lamps and a camera that leans.
+/// Returns eight lamps and a tilted camera.
 SyntheticRig leaning_rig(double tilt_rad, double azimuth_rad);
 
-/// Captures from places and yaws at random under the lamps, at two heights.
+/// Returns captures at random positions and yaws under the lamps, at two heights.
 std::vector<Frame> drive(SyntheticRig rig, int captures, Random& random, double sigma_px = 1);
 
 }  // namespace vlp

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// What captures cannot determine is refused, with what to add.
+/// Captures that do not determine the tilt, and the reported reasons.
 #include <gmock/gmock.h>
 
 #include "calibration/levelling/drive.h"
@@ -11,7 +11,7 @@ namespace {
 
 using testing::HasSubstr;
 
-class LevellingRefusal : public testing::Test {
+class EstimateTiltFromLampsFailure : public testing::Test {
  protected:
   Random random{31};
   SyntheticRig rig = leaning_rig(0.05, 1);
@@ -28,12 +28,12 @@ class LevellingRefusal : public testing::Test {
   }
 };
 
-TEST_F(LevellingRefusal, OfCapturesThatAreTooFew) {
+TEST_F(EstimateTiltFromLampsFailure, ReportsTooFewCaptures) {
   EXPECT_THAT(refusal_of({}), HasSubstr("there is none"));
   EXPECT_THAT(refusal_of(drive(rig, 1, random, 0.1)), HasSubstr("there is one"));
 }
 
-TEST_F(LevellingRefusal, OfLampsThatAreTooFewOrOfAnotherMap) {
+TEST_F(EstimateTiltFromLampsFailure, ReportsTooFewOrUnknownLamps) {
   auto frames = drive(rig, 20, random, 0.1);
   for (Frame& frame : frames) frame.detections.resize(2);
   EXPECT_THAT(refusal_of(frames), HasSubstr("there is none"));
@@ -45,19 +45,19 @@ TEST_F(LevellingRefusal, OfLampsThatAreTooFewOrOfAnotherMap) {
   EXPECT_THAT(refusal_of(frames), HasSubstr("there is none")) << "mirrored";
 }
 
-TEST_F(LevellingRefusal, OfLampsInALineFromOneYaw) {
+TEST_F(EstimateTiltFromLampsFailure, ReportsCollinearLampsAtOneYaw) {
   rig.map = lamp_map_of({{-0.8, 0, 1.6}, {0, 0, 1.6}, {0.8, 0, 1.6}, {0.3, 0, 1.6}});
   std::vector<Frame> along;
   for (int i = 0; i < 12; ++i) along.push_back(seen_at({-0.5 + 0.1 * i, 0.05 * i - 0.3, 0}, 1));
   EXPECT_THAT(refusal_of(along), HasSubstr("add captures"));
 }
 
-TEST_F(LevellingRefusal, OfCapturesThatAreAlike) {
+TEST_F(EstimateTiltFromLampsFailure, ReportsIdenticalCaptures) {
   const Frame frame = seen_at({0.1, 0.1, 0}, 1);
   EXPECT_THAT(refusal_of({20, frame}), HasSubstr("turn the camera"));
 }
 
-TEST_F(LevellingRefusal, OfAMapFromCapturesAtOneYawOrFromOnePlace) {
+TEST_F(EstimateTiltFromLampsFailure, ReportsOneYawOrOnePositionWhenRefiningMap) {
   std::vector<Frame> along, around;
   for (int i = 0; i < 12; ++i) {
     along.push_back(seen_at({-0.5 + 0.1 * i, 0.05 * i - 0.3, 0.02 * i}, 1));
@@ -69,7 +69,7 @@ TEST_F(LevellingRefusal, OfAMapFromCapturesAtOneYawOrFromOnePlace) {
   EXPECT_THAT(refusal_of(around, true), HasSubstr("from one place"));
 }
 
-TEST_F(LevellingRefusal, OfWhatWouldBeKnownTooBadly) {
+TEST_F(EstimateTiltFromLampsFailure, ReportsTooLargeStandardDeviations) {
   auto frames = drive(rig, 3, random, 8);
   EXPECT_THAT(refusal_of(frames), HasSubstr("degrees only"));
   frames = drive(rig, 12, random, 0.9);
@@ -82,7 +82,7 @@ TEST_F(LevellingRefusal, OfWhatWouldBeKnownTooBadly) {
   EXPECT_THAT(refusal_of(frames, true), HasSubstr("lamp 3 is in one capture only"));
 }
 
-TEST_F(LevellingRefusal, IsOfCapturesWithALampTwiceAlone) {
+TEST_F(EstimateTiltFromLampsFailure, RejectsOnlyCaptureWithDuplicateLamp) {
   auto frames = drive(rig, 10, random, 0.1);
   frames[3].detections.push_back(frames[3].detections.front());
   const auto result = level_by_lamps(frames, rig.map, rig.calibration.camera);

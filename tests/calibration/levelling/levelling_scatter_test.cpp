@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Monte Carlo: what levelling reports of itself is its scatter. 1000 draws know a standard
-/// deviation within 2.3 %: 8 % is more than three of those.
+/// Monte Carlo test: the reported covariance of the tilt matches its scatter. 1000 draws determine
+/// a standard deviation to 2.3 %; the tolerance of 8 % is more than three times as large.
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
@@ -59,13 +59,13 @@ void expect_consistent(const std::vector<Frame>& exact, const SyntheticRig& rig,
   EXPECT_LT((lamp_ratio - 1).abs().maxCoeff(), kDriveTolerance + 0.02) << lamp_ratio.transpose();
 }
 
-TEST(LevellingScatter, IsTheReportedCovariance) {
+TEST(EstimateTiltFromLamps, CovarianceMatchesScatter) {
   Random random(22);
   const auto rig = leaning_rig(0.05, 1);
   expect_consistent(drive(rig, 12, random, 0.1), rig, rig.map, false, true);
 }
 
-TEST(LevellingScatter, IsTheReportedCovarianceOfThreeLamps) {
+TEST(EstimateTiltFromLamps, CovarianceMatchesScatterForThreeLamps) {
   Random random(23);
   const auto rig = leaning_rig(0.05, 1);
   auto exact = drive(rig, 30, random, 0.1);
@@ -73,15 +73,15 @@ TEST(LevellingScatter, IsTheReportedCovarianceOfThreeLamps) {
   expect_consistent(exact, rig, rig.map, false, true);
 }
 
-TEST(LevellingScatter, IsTheReportedCovarianceWhenTheResidualsTellTheNoise) {
+TEST(EstimateTiltFromLamps, CovarianceMatchesScatterWithoutGivenNoise) {
   Random random(24);
   auto rig = leaning_rig(0.05, 1);
-  rig.calibration.camera.lens_model = LensModel::pinhole;  // noise alike in the undistorted image
+  rig.calibration.camera.lens_model = LensModel::pinhole;  // equal noise in the undistorted image
   rig.calibration.camera.intrinsics = {520, 520, 400, 300};
   expect_consistent(drive(rig, 12, random, 0.1), rig, rig.map, false, false);
 }
 
-TEST(LevellingScatter, OfARefinedMapIsTheReportedCovariance) {
+TEST(EstimateTiltFromLamps, CovarianceMatchesScatterWhenRefiningMap) {
   Random random(25);
   auto rig = leaning_rig(0.05, 1);
   const LampMap surveyed = rig.map;
@@ -89,20 +89,20 @@ TEST(LevellingScatter, OfARefinedMapIsTheReportedCovariance) {
   expect_consistent(drive(rig, 16, random, 0.1), rig, surveyed, true, true);
 }
 
-/// A drive under a map with errors of its sd_m.
+/// Drive under a map with errors of its sd_m.
 struct LampErrors {
   const char* name;
   double map_sd_m;
-  /// Yaws are within this of one heading.
+  /// Largest difference of a yaw from a common heading.
   double yaw_rad;
   bool noise_is_stated;
   int captures;
 };
 
-class LevellingUnderMapErrors : public testing::TestWithParam<LampErrors> {};
+class EstimateTiltFromLampsWithMapErrors : public testing::TestWithParam<LampErrors> {};
 
-/// 300 maps of two axes know a standard deviation within 4 %.
-TEST_P(LevellingUnderMapErrors, ReportsTheErrorOfTheZenith) {
+/// 300 maps of two axes determine a standard deviation to 4 %.
+TEST_P(EstimateTiltFromLampsWithMapErrors, ReportsConsistentZenithCovariance) {
   const LampErrors& errors = GetParam();
   constexpr int maps = 300;
   Random random(26);
@@ -141,7 +141,7 @@ TEST_P(LevellingUnderMapErrors, ReportsTheErrorOfTheZenith) {
   EXPECT_NEAR(std::sqrt(squares), 1, 0.15);
 }
 
-INSTANTIATE_TEST_SUITE_P(Drives, LevellingUnderMapErrors,
+INSTANTIATE_TEST_SUITE_P(Drives, EstimateTiltFromLampsWithMapErrors,
                          testing::Values(LampErrors{"NoMapErrors", 0, 3, true, 60},
                                          LampErrors{"OneWay", 2e-3, rad_from_deg(10), true, 60},
                                          LampErrors{"OneWayNoiseNotStated", 2e-3, rad_from_deg(10),

@@ -15,7 +15,7 @@
 namespace vlp {
 namespace {
 
-/// The map with each lamp moved by up to `size_m` along each axis.
+/// Returns the map with each lamp moved by up to `size_m` along each axis.
 LampMap shaken(LampMap map, double size_m, Random& random) {
   for (Lamp& lamp : map.lamps) {
     lamp.position_m +=
@@ -25,8 +25,8 @@ LampMap shaken(LampMap map, double size_m, Random& random) {
   return map;
 }
 
-/// The largest distance of a lamp from where it is, the map as a whole being moved, turned about
-/// the vertical and scaled to fit.
+/// Returns the largest distance of a lamp from its true position, after the best fit of
+/// translation, yaw and scale.
 double misshape_m(const LampMap& found, const LampMap& truth) {
   const auto lamp = [](const LampMap& map, std::size_t i) { return map.lamps[i].position_m; };
   const auto fit = fit_similarity(
@@ -46,7 +46,7 @@ double misshape_m(const LampMap& found, const LampMap& truth) {
   return worst_m;
 }
 
-TEST(Levelling, IsExactWithoutNoise) {
+TEST(EstimateTiltFromLamps, ReturnsExactTiltWithoutNoise) {
   Random random(1);
   for (const double tilt_deg : {0.0, 0.5, 3.0, 6.0, 10.0}) {
     for (const bool stated : {true, false}) {
@@ -71,7 +71,7 @@ TEST(Levelling, IsExactWithoutNoise) {
   }
 }
 
-TEST(Levelling, NeedsNoMoreThanThreeLampsACapture) {
+TEST(EstimateTiltFromLamps, ReturnsExactTiltFromThreeLampsPerCapture) {
   Random random(2);
   const auto rig = leaning_rig(0.05, 1);
   auto frames = drive(rig, 10, random);
@@ -86,7 +86,7 @@ TEST(Levelling, NeedsNoMoreThanThreeLampsACapture) {
   EXPECT_EQ(result.captures, 9);
 }
 
-TEST(Levelling, FindsTheShapeOfTheMap) {
+TEST(EstimateTiltFromLamps, RecoversMapShapeWhenRefiningMap) {
   Random random(3);
   auto rig = leaning_rig(0.05, 2);
   const LampMap surveyed = rig.map;
@@ -118,7 +118,7 @@ TEST(Levelling, FindsTheShapeOfTheMap) {
   EXPECT_LT(std::abs(scaled), 1e-12);
 }
 
-TEST(Levelling, LeavesLampsAloneThatAreNotSeen) {
+TEST(EstimateTiltFromLamps, KeepsUndetectedLampsWhenRefiningMap) {
   Random random(4);
   const auto rig = leaning_rig(0.03, 2);
   auto frames = drive(rig, 12, random);
@@ -133,7 +133,7 @@ TEST(Levelling, LeavesLampsAloneThatAreNotSeen) {
   EXPECT_EQ(result.map.lamps[2].position_m, rig.map.lamps[2].position_m);
 }
 
-TEST(Levelling, IsNotMisledByWrongDetections) {
+TEST(EstimateTiltFromLamps, RejectsWrongDetections) {
   Random random(5);
   const auto rig = leaning_rig(0.08, -1);
   auto frames = with_noise(drive(rig, 40, random, 0.05), random);

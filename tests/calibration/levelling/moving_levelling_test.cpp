@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Levelling from captures of a camera that drives and turns while its shutter reads.
+/// Tilt from captures of a camera that moves and rotates during readout.
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
@@ -20,7 +20,7 @@ Levelling level(const MovingCaptures& captures, const std::vector<KnownMotion>& 
   return level_by_lamps(captures.frames, rig.map, rig.calibration.camera, options);
 }
 
-TEST(MovingLevelling, IsExactWithoutNoise) {
+TEST(EstimateTiltFromLamps, ReturnsExactTiltForKnownAndUnknownMotion) {
   Random random(1);
   const BodyRig rig = leaning_body();
   const MovingCaptures captures = moving_captures(rig, 12, 2, random, 1e-3);
@@ -30,7 +30,7 @@ TEST(MovingLevelling, IsExactWithoutNoise) {
     ASSERT_EQ(known.undetermined, "");
     EXPECT_THAT(known.center.zenith_in_camera, IsNear(truth, 1e-8));
     EXPECT_EQ(known.detections_rejected, 0);
-    // What is expected of motions weighs a millionth of what the pixels say.
+    // The prior of the motion has a millionth of the weight of the pixels.
     const std::vector<KnownMotion> unknown(captures.frames.size(), KnownMotion::up_to(1e3, 1e3));
     const Levelling found = level(captures, unknown, rig, refine_map);
     ASSERT_EQ(found.undetermined, "");
@@ -39,7 +39,7 @@ TEST(MovingLevelling, IsExactWithoutNoise) {
   }
 }
 
-TEST(MovingLevelling, MisledByAMotionThatIsLeftOut) {
+TEST(EstimateTiltFromLamps, HasLargerErrorWhenMotionIsIgnored) {
   Random random(2);
   const BodyRig rig = leaning_body();
   MovingCaptures captures = moving_captures(rig, 24, 1, random, 0.03);
@@ -55,7 +55,8 @@ TEST(MovingLevelling, MisledByAMotionThatIsLeftOut) {
   EXPECT_NEAR(known.residual_px, 0.035, 0.01) << "of the undistorted image";
 }
 
-/// e' cov^-1 e of the zenith over drives, per state; 200 of them know it within 7 %.
+/// Returns the mean of e' cov^-1 e of the zenith over drives, per unknown; 200 drives determine it
+/// to 7 %.
 double mean_chi_squared(const std::vector<KnownMotion>& stated, double sd_m_per_s,
                         double sd_rad_per_s, double sigma_px) {
   constexpr int draws = 200;
@@ -79,12 +80,12 @@ double mean_chi_squared(const std::vector<KnownMotion>& stated, double sd_m_per_
   return sum / draws;
 }
 
-TEST(MovingLevelling, StatesWhatOdometryLeavesOpen) {
-  // An error of 50 mm/s moves lamps by half a millimetre from the first row to the last.
+TEST(EstimateTiltFromLamps, ReportsConsistentCovarianceWithOdometry) {
+  // An error of 50 mm/s moves lamps by 0.5 mm from the first row to the last.
   EXPECT_NEAR(mean_chi_squared({}, 0.05, 0.03, 0.05), 1, 0.25);
 }
 
-TEST(MovingLevelling, StatesWhatAnUnknownMotionLeavesOpen) {
+TEST(EstimateTiltFromLamps, ReportsConsistentCovarianceWithUnknownMotion) {
   EXPECT_NEAR(mean_chi_squared(std::vector<KnownMotion>(16, KnownMotion::up_to(2, 3)), 0, 0, 0.05),
               1, 0.25);
 }

@@ -19,9 +19,9 @@ std::vector<LampOffset> offsets_of_lamps(const LampMap& map,
   return found ? offsets_from_other_lamps(*found) : std::vector<LampOffset>();
 }
 
-/// Eight lamps of a room, seen from twelve places in it, by fixes that are wrong themselves: by
-/// place, yaw and height. Every third capture lacks two of the lamps.
-class Offsets : public testing::Test {
+/// Captures of eight lamps from twelve positions, with wrong fixes: position, yaw and height have
+/// errors. Every third capture lacks two of the lamps.
+class EstimateLampDisplacements : public testing::Test {
  protected:
   static constexpr int kCaptures = 12;
 
@@ -53,7 +53,7 @@ class Offsets : public testing::Test {
   std::uint64_t seed_ = 1;
 };
 
-TEST_F(Offsets, AreTheMovementOfTheLampThatMovedWhateverTheFixesAre) {
+TEST_F(EstimateLampDisplacements, ReturnsOffsetOfMovedLampForWrongFixes) {
   for (const double by_m : {1e-3, 5e-3, 0.1}) {
     moved_m_[3] = {0.6 * by_m, -0.8 * by_m};
     const auto offsets = found();
@@ -62,8 +62,9 @@ TEST_F(Offsets, AreTheMovementOfTheLampThatMovedWhateverTheFixesAre) {
   }
 }
 
-/// As scripts/reprocess/fleet.py takes off what the other lamps show of one that moved.
-TEST_F(Offsets, OfTheOthersAreAsTheProjectorOfTheMapHasThem) {
+/// Same formula as in scripts/reprocess/fleet.py, which subtracts the effect of a moved lamp on the
+/// other lamps.
+TEST_F(EstimateLampDisplacements, OffsetsOfOtherLampsMatchProjector) {
   moved_m_[3] = {3e-3, -4e-3};
   Eigen::Vector2d middle_m(0, 0);
   for (const Lamp& lamp : lamps_.lamps) middle_m += lamp.position_m.head<2>() / 8;
@@ -83,7 +84,7 @@ TEST_F(Offsets, OfTheOthersAreAsTheProjectorOfTheMapHasThem) {
   }
 }
 
-TEST_F(Offsets, StateHowFarTheyScatter) {
+TEST_F(EstimateLampDisplacements, StandardDeviationMatchesScatter) {
   constexpr int trials = 300;
   Eigen::Array2d squares(0, 0);
   for (int trial = 0; trial < trials; ++trial) {
@@ -92,10 +93,10 @@ TEST_F(Offsets, StateHowFarTheyScatter) {
       squares += (one.offset_m.array() / one.sd_m.array()).square() / (8 * trials);
     }
   }
-  EXPECT_NEAR(std::sqrt(squares.mean()), 1, 0.05);  // of 4,800 that go together
+  EXPECT_NEAR(std::sqrt(squares.mean()), 1, 0.05);  // of 4,800 correlated values
 }
 
-TEST_F(Offsets, AreNotThoseOfALampThatIsTakenForAnother) {
+TEST_F(EstimateLampDisplacements, RejectsMisidentifiedLamps) {
   moved_m_[3] = {1e-3, 0};
   const auto right = found(1e-4);
   misidentified_ = true;
@@ -110,7 +111,7 @@ TEST_F(Offsets, AreNotThoseOfALampThatIsTakenForAnother) {
   EXPECT_LE(captures, 4);
 }
 
-TEST_F(Offsets, AreNoneOfLampsThatNothingTiesToTheOthers) {
+TEST_F(EstimateLampDisplacements, ReturnsNoOffsetsForUnconnectedLamps) {
   CeilingView view{{0, 0}, {}};
   for (int id = 1; id <= 3; ++id) {
     const auto& lamp = lamps_.lamps[static_cast<std::size_t>(id - 1)];

@@ -16,7 +16,7 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::SizeIs;
 
-/// A camera that is tilted by 3 degrees, which its calibration does not contain.
+/// Camera that is tilted by 3 degrees, which its calibration does not contain.
 class FindMapErrors : public testing::Test {
  protected:
   Random random{41};
@@ -53,13 +53,13 @@ class FindMapErrors : public testing::Test {
   Eigen::Vector3d& place(std::size_t lamp) { return map.lamps[lamp].position_m; }
 };
 
-TEST_F(FindMapErrors, ReturnsNoneOfARightMap) {
+TEST_F(FindMapErrors, ReturnsNoneForCorrectMap) {
   EXPECT_EQ(found(), "");
   for (Lamp& lamp : map.lamps) lamp.position_m.x() += random.uniform(-0.005, 0.005);
   EXPECT_EQ(found(), "") << "5 mm are for --refine-map";
 }
 
-TEST_F(FindMapErrors, ReturnsTheOffsetOfOneLampWhateverTheTilt) {
+TEST_F(FindMapErrors, ReturnsOffsetOfOneLampForAnyTilt) {
   for (std::size_t i = 0; i < map.lamps.size(); ++i) {
     map = rig.map;
     place(i).head<2>() += Eigen::Vector2d(-0.03, 0.004);
@@ -76,7 +76,7 @@ TEST_F(FindMapErrors, ReturnsTheOffsetOfOneLampWhateverTheTilt) {
               testing::StartsWith("lamp 8 hangs 30 mm from where the map has it (x +30 mm"));
 }
 
-TEST_F(FindMapErrors, ReturnsThreeOfEightLamps) {
+TEST_F(FindMapErrors, ReturnsThreeDisplacedLampsOfEight) {
   survey(1e-3);
   place(0).x() += 0.05;
   place(3).y() -= 0.07;
@@ -88,8 +88,9 @@ TEST_F(FindMapErrors, ReturnsThreeOfEightLamps) {
   EXPECT_THAT(lamps, testing::UnorderedElementsAre(1, 4, 7));
 }
 
-/// Of three lamps each may be the one; of four the others determine the scatter of the map poorly.
-TEST_F(FindMapErrors, NeedsLargeOffsetsOfFewLamps) {
+/// With three lamps any of them may be displaced. With four, the other lamps determine the scatter
+/// of the map poorly.
+TEST_F(FindMapErrors, RequiresLargerOffsetsForFewLamps) {
   use_lamps(3);
   place(0).x() += 0.05;
   EXPECT_THAT(errors(), IsEmpty());
@@ -104,8 +105,9 @@ TEST_F(FindMapErrors, NeedsLargeOffsetsOfFewLamps) {
   EXPECT_THAT(errors(), IsEmpty());
 }
 
-/// Its detections contradict the others in all directions: they are rejected, the lamp is not lost.
-TEST_F(FindMapErrors, NamesALampOfWrongHeight) {
+/// Its detections contradict the other lamps in all directions. They are rejected, but the lamp is
+/// still reported.
+TEST_F(FindMapErrors, DetectsLampOfWrongHeight) {
   for (std::size_t i = 0; i < map.lamps.size(); ++i) {
     map = rig.map;
     place(i).z() -= 0.1;
@@ -116,7 +118,7 @@ TEST_F(FindMapErrors, NamesALampOfWrongHeight) {
 }
 
 /// In a large room each capture contains few of the lamps.
-TEST_F(FindMapErrors, ReturnsThatTheMapOfALargeRoomIsMirrored) {
+TEST_F(FindMapErrors, DetectsMirroredMapOfLargeRoom) {
   constexpr int rows = 10;
   constexpr double distance_m = 1.2, height_m = 2.5, reach_m = 1.9;
   map.lamps.clear();
@@ -149,8 +151,8 @@ TEST_F(FindMapErrors, ReturnsThatTheMapOfALargeRoomIsMirrored) {
   EXPECT_THAT(found(), HasSubstr("most captures contradict the lamp map"));
 }
 
-TEST_F(FindMapErrors, GivesFewFalseAlarms) {
-  constexpr int maps = 400, max_alarms = 10;  // 4 are to be expected of p = 0.01
+TEST_F(FindMapErrors, KeepsFalseAlarmRateBelowLimit) {
+  constexpr int maps = 400, max_alarms = 10;  // p = 0.01: 4 are expected
   for (const std::size_t lamps : {5U, 8U}) {
     rig = leaning_rig(0.05, 1);
     use_lamps(lamps);
@@ -169,7 +171,7 @@ TEST_F(FindMapErrors, GivesFewFalseAlarms) {
   }
 }
 
-TEST_F(FindMapErrors, StatesTheStandardDeviationOfOffsets) {
+TEST_F(FindMapErrors, ReportsStandardDeviationOfOffsets) {
   constexpr int maps = 200;
   double squares = 0;
   int count = 0;
@@ -189,12 +191,12 @@ TEST_F(FindMapErrors, StatesTheStandardDeviationOfOffsets) {
   EXPECT_NEAR(std::sqrt(squares / count), 1, 0.15);
 }
 
-TEST_F(FindMapErrors, ReturnsAMirroredMap) {
+TEST_F(FindMapErrors, DetectsMirroredMap) {
   for (Lamp& lamp : map.lamps) lamp.position_m.y() *= -1;
   EXPECT_THAT(found(), HasSubstr("looks mirrored"));
 }
 
-TEST_F(FindMapErrors, ReturnsTwoLampsThatAreSwapped) {
+TEST_F(FindMapErrors, DetectsSwappedLamps) {
   for (const auto& [first, second] : {std::pair(2, 4), std::pair(0, 7)}) {
     map = rig.map;
     std::swap(place(static_cast<std::size_t>(first)), place(static_cast<std::size_t>(second)));
@@ -203,7 +205,7 @@ TEST_F(FindMapErrors, ReturnsTwoLampsThatAreSwapped) {
   }
 }
 
-TEST_F(FindMapErrors, ReturnsTwoSwappedLampsOfFour) {
+TEST_F(FindMapErrors, DetectsSwappedLampsOfFour) {
   use_lamps(4);
   rig.map.lamps[1].position_m.x() =
       0.5;  // a rectangle's mirror image is an exchange of its corners
@@ -213,7 +215,7 @@ TEST_F(FindMapErrors, ReturnsTwoSwappedLampsOfFour) {
 }
 
 /// No similarity takes a square to its mirror image.
-TEST_F(FindMapErrors, ReturnsAMirroredSquare) {
+TEST_F(FindMapErrors, DetectsMirroredSquare) {
   for (std::size_t i = 0; i < 4; ++i) {
     Eigen::Vector3d& corner_m = rig.map.lamps[i].position_m;
     corner_m.x() = std::copysign(corner_m.y(), corner_m.x());
@@ -224,7 +226,7 @@ TEST_F(FindMapErrors, ReturnsAMirroredSquare) {
   EXPECT_THAT(found(), HasSubstr("looks mirrored"));
 }
 
-TEST_F(FindMapErrors, NamesALampWithMostOfTheOutliers) {
+TEST_F(FindMapErrors, ReportsLampWithMostOutliers) {
   for (std::size_t i = 0; i < 6; ++i) {
     std::swap(frames[i].detections[0], frames[i].detections.back());
     frames[i].detections.back().pixel += Eigen::Vector2d(i % 2 == 0 ? 60 : -40, 30);
@@ -232,7 +234,7 @@ TEST_F(FindMapErrors, NamesALampWithMostOfTheOutliers) {
   EXPECT_THAT(found(), HasSubstr("lamp 1 contradicts the other lamps in 6 of "));
 }
 
-TEST_F(FindMapErrors, NamesNoLampOfAnotherRoom) {
+TEST_F(FindMapErrors, ReportsOtherRoomWithoutLamps) {
   for (Lamp& lamp : map.lamps) {
     lamp.position_m.head<2>() = Eigen::Vector2d(random.uniform(-1, 1), random.uniform(-1, 1));
   }

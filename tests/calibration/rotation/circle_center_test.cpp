@@ -17,7 +17,7 @@
 namespace vlp {
 namespace {
 
-/// A pinhole camera, so that formulas are in pixels.
+/// Returns a scene with a pinhole camera, so that formulas are in pixels.
 SpotScene pinhole_scene() {
   SpotScene scene;
   scene.camera.lens_model = LensModel::pinhole;
@@ -31,14 +31,14 @@ SpotCaptures captures_of(const SpotScene& scene) {
   return spot;
 }
 
-/// zeta - e/H, where the axis of a level camera is seen.
+/// Returns the image point zeta - e/H of the axis of a level camera.
 Eigen::Vector2d center_of_level_camera(const SpotScene& scene) {
   const auto& f = scene.camera.intrinsics;
   const Eigen::Vector2d z = -scene.lever_arm_m / (1.6 - scene.heights_m[0]);
   return {f[2] + f[0] * z.x(), f[3] + f[1] * z.y()};
 }
 
-TEST(CircleCenter, IsTheLeverArmsOfALevelCamera) {
+TEST(FitCircleCenters, ReturnsLeverArmPointOfLevelCamera) {
   SpotScene scene;
   scene.lever_arm_m = {0.05, -0.02};
   const CircleCenters found = fit_circle_centers(captures_of(scene), scene.camera);
@@ -50,10 +50,10 @@ TEST(CircleCenter, IsTheLeverArmsOfALevelCamera) {
   EXPECT_EQ(found.mean.center.model, RotationModel::shift);
 }
 
-/// A lamp traces a cone about the axis; a tilted camera sees an ellipse, whose centre is at
-/// f sin t cos t / (cos^2 t - sin^2 phi) from the principal point. A circle through many even
-/// points of it has the same centre but for its own fit to the ellipse, of second order in t.
-TEST(CircleCenter, OfATiltedCameraIsTooFarOutByTheFormula) {
+/// The rays to a lamp form a cone about the axis. A tilted camera maps it to an ellipse with its
+/// center at f sin t cos t / (cos^2 t - sin^2 phi) from the principal point. A circle through many
+/// equally spaced points of the ellipse has the same center, up to second order in t.
+TEST(FitCircleCenters, BiasMatchesFormulaForTiltedCamera) {
   for (const double tilt_deg : {0.5, 1.0, 2.0}) {
     SCOPED_TRACE(tilt_deg);
     SpotScene scene = pinhole_scene();
@@ -77,7 +77,7 @@ TEST(CircleCenter, OfATiltedCameraIsTooFarOutByTheFormula) {
   }
 }
 
-TEST(CircleCenter, LeavesOutAPointThatIsWrong) {
+TEST(FitCircleCenters, RejectsOutlier) {
   const SpotScene scene;
   std::vector<Frame> frames = scene.frames();
   frames[3].detections[2].pixel += Eigen::Vector2d(12, -9);
@@ -122,8 +122,8 @@ SpotCaptures captures_at(const std::vector<double>& yaws_rad, bool noise_is_stat
   return spot;
 }
 
-/// The noise of captures at two opposite yaws alone makes a triangle of the places of a lamp.
-TEST(CircleCenter, DoesNotConvergeAtTwoOppositeYaws) {
+/// With captures at two opposite yaws, only noise makes a triangle of the positions of a lamp.
+TEST(FitCircleCenters, DoesNotConvergeAtTwoOppositeYaws) {
   constexpr int draws = 25;
   Random random(31);
   for (const int count : {3, 6, 12, 40}) {
@@ -142,8 +142,8 @@ TEST(CircleCenter, DoesNotConvergeAtTwoOppositeYaws) {
   }
 }
 
-/// Two places of a lamp determine no circle for a tilted camera either.
-TEST(CircleCenter, DoesNotConvergeAtTwoOppositeYawsOfATiltedCamera) {
+/// Two positions of a lamp determine no circle for a tilted camera either.
+TEST(FitCircleCenters, DoesNotConvergeAtTwoOppositeYawsWhenTilted) {
   constexpr int draws = 25;
   Random random(33);
   const SpotScene scene = tilted_scene();
@@ -158,8 +158,8 @@ TEST(CircleCenter, DoesNotConvergeAtTwoOppositeYawsOfATiltedCamera) {
   }
 }
 
-/// Of two heights, one with captures at two opposite yaws alone, the other one is used.
-TEST(CircleCenter, LeavesOutAHeightWithTwoOppositeYaws) {
+/// One of two heights has captures at two opposite yaws only; the other height is used.
+TEST(FitCircleCenters, IgnoresHeightWithTwoOppositeYaws) {
   constexpr int draws = 25;
   Random random(34);
   const SpotScene scene;
@@ -189,7 +189,7 @@ TEST(CircleCenter, LeavesOutAHeightWithTwoOppositeYaws) {
   }
 }
 
-TEST(CircleCenter, ConvergesWithCapturesAtAThirdYaw) {
+TEST(FitCircleCenters, ConvergesWithThirdYaw) {
   constexpr int draws = 25;
   Random random(32);
   for (int i = 0; i < draws; ++i) {
@@ -205,7 +205,7 @@ TEST(CircleCenter, ConvergesWithCapturesAtAThirdYaw) {
   }
 }
 
-TEST(JointCenter, IsTheLeverArmsOfALevelCamera) {
+TEST(FitJointCenter, ReturnsLeverArmPointOfLevelCamera) {
   SpotScene scene;
   scene.lever_arm_m = {0.05, -0.02};
   const RotationFit found = fit_joint_center(captures_of(scene), scene.camera);
@@ -215,7 +215,7 @@ TEST(JointCenter, IsTheLeverArmsOfALevelCamera) {
   EXPECT_EQ(found.center.model, RotationModel::shift);
 }
 
-TEST(JointCenter, OfALevelCameraWithoutALeverArmIsOneAtAnyHeight) {
+TEST(FitJointCenter, ReturnsSameCenterAtAllHeightsWithoutLeverArm) {
   SpotScene scene;
   scene.heights_m = {0, 0.3};
   const RotationFit found = fit_joint_center(captures_of(scene), scene.camera);
@@ -223,7 +223,7 @@ TEST(JointCenter, OfALevelCameraWithoutALeverArmIsOneAtAnyHeight) {
   EXPECT_THAT(found.center.center_px, IsNear(center_of_level_camera(scene), 1e-6));
 }
 
-TEST(JointCenter, LeavesOutAPointThatIsWrong) {
+TEST(FitJointCenter, RejectsOutlier) {
   const SpotScene scene;
   std::vector<Frame> frames = scene.frames();
   frames[3].detections[2].pixel += Eigen::Vector2d(12, -9);

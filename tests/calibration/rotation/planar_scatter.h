@@ -9,10 +9,11 @@
 
 namespace vlp {
 
-/// What many estimates of a point of the plane show, against the covariance that each reports.
+/// Scatter of estimates of a point in the plane, compared with the covariance that each estimate
+/// reports.
 class PlanarScatter {
  public:
-  /// `expected` is where they scatter about.
+  /// @param expected  true value of the estimates
   explicit PlanarScatter(const Eigen::Vector2d& expected) : expected_(expected) {}
 
   void add(const Eigen::Vector2d& estimate, const Eigen::Matrix2d& covariance) {
@@ -25,8 +26,9 @@ class PlanarScatter {
     ++count_;
   }
 
-  /// Standard deviations found over those reported, along the axes in which the latter are one,
-  /// less one: where both are near zero, the covariances agree in size and direction.
+  /// Returns the ratios of observed to reported standard deviations minus one, along the axes in
+  /// which the reported covariance is the unit matrix. If both are near zero, the covariances agree
+  /// in size and direction.
   Eigen::Vector2d excess() const {
     const Eigen::Matrix2d found = squares_ / count_ - mean() * mean().transpose();
     const Eigen::Matrix2d root = Eigen::LLT<Eigen::Matrix2d>(reported_ / count_).matrixL();
@@ -34,10 +36,11 @@ class PlanarScatter {
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(white);
     return axes.eigenvalues().cwiseSqrt() - Eigen::Vector2d::Ones();
   }
-  /// Mean errors over the standard deviations of the mean.
+  /// Returns the mean errors divided by the standard deviations of the mean.
   Eigen::Vector2d bias() const {
     return mean().array() / (reported_.diagonal().array() / count_ / count_).sqrt();
   }
+  /// Returns the fraction of the estimates outside the 95 % region.
   double share_beyond_95() const { return beyond_95_ / count_; }
 
  private:

@@ -11,7 +11,7 @@
 namespace vlp {
 namespace {
 
-/// A point off by a common offset and by its own turn.
+/// Observed point with a common offset and a rotation of its own.
 struct TurnedPoint {
   Eigen::Vector2d point, seen;
 
@@ -23,7 +23,7 @@ struct TurnedPoint {
   }
 };
 
-/// The covariance of the offset, with the turns in memory in some order.
+/// Returns the covariance of the offset, with the rotations in memory in the given order.
 Matrix2 covariance_with(const std::vector<std::size_t>& order) {
   constexpr std::size_t turns = 12;
   std::vector<double> memory(2 * turns + 2, 0.0);
@@ -43,7 +43,7 @@ Matrix2 covariance_with(const std::vector<std::size_t>& order) {
   return covariance.value_or(Matrix2::Zero());
 }
 
-TEST(RobustFit, RoundsAlikeWhereverItsParametersAre) {
+TEST(RobustFit, ReturnsIdenticalCovarianceForAnyMemoryOrder) {
   std::vector<std::size_t> order(13);
   std::iota(order.begin(), order.end(), 0);
   const Matrix2 expected = covariance_with(order);

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// The covariance that each method reports, against the scatter of what it finds.
+/// Compares the reported covariance of each method with the scatter of its results.
 #include <gmock/gmock.h>
 
 #include <Eigen/LU>
@@ -43,7 +43,7 @@ RotationFit drawn(const SpotScene& scene, const std::vector<Frame>& frames, Meth
   return fit;
 }
 
-/// Standard deviations of 300 draws are good to 4 %, the share of 5 % beyond to 1.3 %.
+/// 300 draws determine standard deviations to 4 %, and the fraction of 5 % outside to 1.3 %.
 void expect_consistent(const PlanarScatter& scatter) {
   EXPECT_THAT(scatter.excess(), IsNear(Eigen::Vector2d::Zero(), 0.14));
   EXPECT_NEAR(scatter.share_beyond_95(), 0.05, 0.04);
@@ -71,10 +71,10 @@ SpotScene level_scene() {
   return scene;
 }
 
-/// Through a pinhole, where the undistorted image of `circle` is the image. 300 draws of 24 degrees
-/// of freedom or more know a standard deviation to 1 %.
-TEST(RotationScatter, ResidualsAreTheNoisePerAxis) {
-  SpotScene scene;  // without a lever arm, which `axis` at one height takes for a tilt
+/// Pinhole lens, for which the undistorted image used by `circle` is the image. 300 draws of 24
+/// degrees of freedom or more determine a standard deviation to 1 %.
+TEST(RotationFit, ResidualMatchesNoisePerAxis) {
+  SpotScene scene;  // no lever arm, which `axis` at one height cannot separate from a tilt
   scene.camera.lens_model = LensModel::pinhole;
   scene.camera.intrinsics.resize(4);
   scene.captures = 5;           // few, so that degrees of freedom count
@@ -92,20 +92,21 @@ TEST(RotationScatter, ResidualsAreTheNoisePerAxis) {
   }
 }
 
-/// Turns at two heights, or at one under lamps at several, with a map that has errors of its sd_m.
+/// Rotations at two heights, or at one under lamps at several, with a map that has errors of its
+/// sd_m.
 struct TurnUnderMap {
   const char* name;
   double map_sd_m;
   Eigen::Vector2d lever_arm_m;
   std::vector<double> heights_m;
-  /// Height of every second lamp above the others.
+  /// Height of every second lamp above the remaining lamps.
   double step_m;
 };
 
-class TurnUnderMapErrors : public testing::TestWithParam<TurnUnderMap> {};
+class FitRotationAxisWithMapErrors : public testing::TestWithParam<TurnUnderMap> {};
 
-/// 300 maps of two axes know a standard deviation within 4 %.
-TEST_P(TurnUnderMapErrors, ReportsTheErrorsOfZenithAndLeverArm) {
+/// 300 maps of two axes determine a standard deviation to 4 %.
+TEST_P(FitRotationAxisWithMapErrors, ReportsConsistentCovariances) {
   constexpr int maps = 300;
   const TurnUnderMap& turn = GetParam();
   SpotScene scene = tilted_scene(turn.lever_arm_m, turn.heights_m);
@@ -141,7 +142,7 @@ TEST_P(TurnUnderMapErrors, ReportsTheErrorsOfZenithAndLeverArm) {
 }
 
 INSTANTIATE_TEST_SUITE_P(
-    RotationScatter, TurnUnderMapErrors,
+    RotationScatter, FitRotationAxisWithMapErrors,
     testing::Values(TurnUnderMap{"ExactMap", 0, {0.25, -0.2}, {0, 0.3}, 0},
                     TurnUnderMap{"LongArm", 2e-3, {0.25, -0.2}, {0, 0.3}, 0},
                     TurnUnderMap{"ShortArm", 2e-3, {0.016, -0.012}, {0, 0.3}, 0},
@@ -153,12 +154,12 @@ struct SmallTurn {
   int captures, lamps;
 };
 
-/// Few captures, of which the noise is not stated: the median of few residuals scatters. 400 runs
-/// determine the mean of e' C^-1 e to 5 %; with nu degrees of freedom C scatters, and the mean is 2
-/// nu / (nu - 2).
-class SmallTurnScatter : public testing::TestWithParam<SmallTurn> {};
+/// Few captures without given noise: the median of few residuals scatters. 400 runs determine the
+/// mean of e' C^-1 e to 5 %. With nu degrees of freedom C scatters, and the mean is 2 nu / (nu -
+/// 2).
+class RotationFitWithFewCaptures : public testing::TestWithParam<SmallTurn> {};
 
-TEST_P(SmallTurnScatter, KeepsCleanDetectionsAndTheirCovariance) {
+TEST_P(RotationFitWithFewCaptures, KeepsInliersAndConsistentCovariance) {
   constexpr int runs = 400;
   for (const Method method : {&fit_joint_center, &fit_turning_axis}) {
     SpotScene scene = method == &fit_joint_center ? level_scene() : tilted_scene({0, 0});
@@ -190,7 +191,7 @@ TEST_P(SmallTurnScatter, KeepsCleanDetectionsAndTheirCovariance) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(RotationScatter, SmallTurnScatter,
+INSTANTIATE_TEST_SUITE_P(RotationScatter, RotationFitWithFewCaptures,
                          testing::Values(SmallTurn{3, 5}, SmallTurn{4, 5}, SmallTurn{3, 8},
                                          SmallTurn{6, 5}),
                          [](const auto& turn) {
@@ -198,7 +199,7 @@ INSTANTIATE_TEST_SUITE_P(RotationScatter, SmallTurnScatter,
                                   std::to_string(turn.param.lamps) + "Lamps";
                          });
 
-TEST(SmallTurns, MeanCircleKeepsCleanDetections) {
+TEST(FitCircleCenters, KeepsInliersOfFewCaptures) {
   constexpr int runs = 200;
   for (const int captures : {8, 9, 12, 24}) {
     SpotScene scene = level_scene();
@@ -215,8 +216,8 @@ TEST(SmallTurns, MeanCircleKeepsCleanDetections) {
   }
 }
 
-/// A detection that is 6 px off, 20 standard deviations, is rejected, and none but that.
-TEST(SmallTurns, AnOutlierIsRejected) {
+/// A detection with an error of 6 px, 20 standard deviations, is rejected, and only this one.
+TEST(RotationFit, RejectsOutlierAmongFewCaptures) {
   constexpr int runs = 50;
   struct Case {
     Method method;
@@ -229,7 +230,7 @@ TEST(SmallTurns, AnOutlierIsRejected) {
     scene.captures = captures;
     scene.only_in_image = false;
     auto frames = scene.frames(kNoise_px);
-    // Away from the centre of the turn.
+    // Away from the rotation center.
     Eigen::Vector2d& pixel = frames[1].detections[2].pixel;
     pixel += 6 * (pixel - scene.camera.center_px()).normalized();
     Random random(12);
@@ -251,30 +252,32 @@ TEST(SmallTurns, AnOutlierIsRejected) {
   }
 }
 
-TEST(RotationScatter, OfTheMeanCircle) { expect_consistent(level_scene(), mean_circle, false); }
+TEST(FitCircleCenters, CovarianceMatchesScatter) {
+  expect_consistent(level_scene(), mean_circle, false);
+}
 
-TEST(RotationScatter, OfTheJointCenter) {
+TEST(FitJointCenter, CovarianceMatchesScatter) {
   expect_consistent(level_scene(), fit_joint_center, true);
 }
 
-TEST(RotationScatter, OfTheAxis) {
+TEST(FitRotationAxis, CovarianceMatchesScatter) {
   expect_consistent(tilted_scene({0, 0}), fit_turning_axis, true);
 }
 
-TEST(RotationScatter, OfTheAxisFromHalfATurn) {
+TEST(FitRotationAxis, CovarianceMatchesScatterForHalfRotation) {
   SpotScene scene = tilted_scene({0, 0});
   scene.arc_rad = 3;
   expect_consistent(scene, fit_turning_axis, true);
 }
 
-TEST(RotationScatter, OfTheAxisFromTwoLamps) {
+TEST(FitRotationAxis, CovarianceMatchesScatterForTwoLamps) {
   SpotScene scene = tilted_scene({0, 0});
   scene.map.lamps.resize(2);
   scene.map.lamps[1].position_m = {0.5, 0.4, 1.6};
   expect_consistent(scene, fit_turning_axis, true);
 }
 
-TEST(RotationScatter, OfAxisAndLeverArmFromTwoHeights) {
+TEST(FitRotationAxis, CovariancesMatchScatterForTwoHeights) {
   SpotScene scene = tilted_scene({0, 0});
   scene.heights_m = {0, 0.3};
   scene.lever_arm_m = {0.012, -0.009};

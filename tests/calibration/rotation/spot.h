@@ -10,7 +10,7 @@
 
 namespace vlp {
 
-/// A camera that turns on the spot, made up for a test.
+/// Simulated camera that rotates in place.
 struct SpotScene {
   LampMap map = synthetic_lamps();
   Camera camera = synthetic_camera();
@@ -19,28 +19,29 @@ struct SpotScene {
   Eigen::Vector2d axis_m{0.05, -0.03};
   Eigen::Vector2d lever_arm_m{0, 0};
   std::vector<double> heights_m{0};
-  /// At each height: uneven angles, the first at `first_rad`, so many over `arc_rad`.
+  /// Number of captures at each height, at uneven yaws from `first_rad` over `arc_rad`.
   int captures = 12;
   double first_rad = 0.4;
   double arc_rad = 6;
-  /// Only lamps wholly in the image are seen, unless this is false.
+  /// If true, only lamps inside the image are detected.
   bool only_in_image = true;
 
   RotationCenter truth() const { return tilted_by(camera, tilt_rad, azimuth_rad); }
-  /// What it sees, computed forwards and without noise, and stated to have this noise.
+  /// Returns exact detections with the given `sigma_px`.
   std::vector<Frame> frames(double sigma_px = 1) const;
 };
 
-/// Tilted by 1.5 degrees.
+/// Returns a scene with a tilt of 1.5 degrees.
 SpotScene tilted_scene(const Eigen::Vector2d& lever_arm_m = {0.012, -0.009},
                        const std::vector<double>& heights_m = {0});
 
-/// The axis found in such frames; fails the test when they are refused.
+/// Returns the fitted axis; fails the test if the captures are rejected.
 RotationFit fit_of(const SpotScene& scene, const std::vector<Frame>& frames);
 
+/// Returns the frames with noise according to sigma_px.
 std::vector<Frame> with_noise(std::vector<Frame> frames, Random& random);
 
-/// The angle between two directions.
+/// Returns the angle between two directions, rad.
 double angle_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b);
 
 }  // namespace vlp

@@ -21,7 +21,7 @@ void expect_axis(const RotationFit& found, const SpotScene& scene, double within
       within_deg);
 }
 
-TEST(SpotCaptures, TellsHeightsYawsAndAxes) {
+TEST(FindRotationCaptures, EstimatesHeightsYawsAndAxes) {
   const SpotScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
   const SpotCaptures spot = spot_captures(scene.frames(), scene.map, scene.camera);
   ASSERT_EQ(spot.status, SpotStatus::ok);
@@ -40,7 +40,7 @@ TEST(SpotCaptures, TellsHeightsYawsAndAxes) {
   EXPECT_TRUE(spot.left_out.empty());
 }
 
-TEST(SpotCaptures, TakesTwoLampsAndThreeCaptures) {
+TEST(FindRotationCaptures, AcceptsTwoLampsAndThreeCaptures) {
   SpotScene scene;
   scene.tilt_rad = rad_from_deg(10);
   scene.map = lamp_map_of({{-0.3, -0.35, 1.6}, {0.5, 0.2, 1.6}});
@@ -49,20 +49,20 @@ TEST(SpotCaptures, TakesTwoLampsAndThreeCaptures) {
   expect_axis(fit_of(scene, scene.frames()), scene, 1e-6);
 }
 
-TEST(SpotCaptures, TakesLampsAtSeveralHeights) {
+TEST(FindRotationCaptures, AcceptsLampsAtSeveralHeights) {
   SpotScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
   scene.map =
       lamp_map_of({{-0.5, -0.35, 1.6}, {0.5, 0.2, 1.4}, {-0.4, 0.3, 1.8}, {0.1, -0.4, 1.5}});
   expect_axis(fit_of(scene, scene.frames()), scene, 1e-6);
 }
 
-TEST(SpotCaptures, TakesAQuarterTurn) {
+TEST(FindRotationCaptures, AcceptsQuarterRotation) {
   SpotScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
-  scene.arc_rad = rad_from_deg(105);  // less what unevenness takes at the ends
+  scene.arc_rad = rad_from_deg(105);  // minus the uneven steps at the ends
   expect_axis(fit_of(scene, scene.frames()), scene, 1e-6);
 }
 
-TEST(SpotCaptures, LeavesOutAHeightWithTooFewCapturesAndSaysSo) {
+TEST(FindRotationCaptures, RejectsHeightWithTooFewCaptures) {
   const SpotScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
   auto frames = scene.frames();
   frames.resize(14);
@@ -73,8 +73,8 @@ TEST(SpotCaptures, LeavesOutAHeightWithTooFewCapturesAndSaysSo) {
   EXPECT_EQ(spot.left_out[1].image, "13.png");
 }
 
-/// A third of the captures with a lamp far off and the noise of a poor detector.
-TEST(SpotCaptures, OutliersAreFoundAndChangeLittle) {
+/// One third of the captures with a large error of one lamp and the noise of a poor detector.
+TEST(FitRotationAxis, RejectsOutliers) {
   const SpotScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
   Random random(5);
   auto frames = with_noise(scene.frames(0.05), random);
@@ -98,7 +98,7 @@ TEST(SpotCaptures, OutliersAreFoundAndChangeLittle) {
   EXPECT_LE(named.size(), wrong.size() + 1);
 }
 
-TEST(SpotCaptures, AMisidentifiedLampAmongTwoCostsItsCapture) {
+TEST(FindRotationCaptures, RejectsCaptureWithMisidentifiedLamp) {
   SpotScene scene;
   scene.tilt_rad = rad_from_deg(1.5);
   scene.map = lamp_map_of({{-0.3, -0.35, 1.6}, {0.5, 0.2, 1.6}, {0.1, 0.4, 1.6}});
@@ -112,8 +112,8 @@ TEST(SpotCaptures, AMisidentifiedLampAmongTwoCostsItsCapture) {
   expect_axis(fit_turning_axis(spot, scene.camera), scene, 1e-6);
 }
 
-/// The heights are the map's, the places on the ceiling are not trusted.
-TEST(SpotCaptures, ErrorsOfTheMapAlongTheCeilingDoNotMatter) {
+/// The fit uses the heights of the map, but not its horizontal positions.
+TEST(FitRotationAxis, ToleratesHorizontalMapErrors) {
   SpotScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
   scene.arc_rad = 2.5;
   const auto frames = scene.frames();

@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Captures at several heights, or at one: which are told apart, and what that is good for.
+/// Captures at one height or at several: separation of the heights, and its effect on the lever
+/// arm.
 #include <gmock/gmock.h>
 
 #include "calibration/rotation/spot.h"
@@ -14,7 +15,8 @@ namespace {
 
 constexpr int kSeeds = 20;
 
-/// A ceiling of 2.6 m, where 10 cm are less than 4 % of the distance from the lamps.
+/// Returns a scene with a ceiling of 2.6 m, where 10 cm are less than 4 % of the distance from the
+/// lamps.
 SpotScene high_scene() {
   SpotScene scene = tilted_scene();
   for (Lamp& lamp : scene.map.lamps) lamp.position_m *= 2.6 / 1.6;
@@ -27,7 +29,7 @@ SpotCaptures captures_of(const SpotScene& scene, const std::vector<Frame>& frame
   return spot;
 }
 
-TEST(SpotHeights, TenCentimetresAreToldApartUnderAHighCeiling) {
+TEST(FindRotationCaptures, SeparatesHeightsTenCentimetersApart) {
   SpotScene scene = high_scene();
   scene.heights_m = {0, 0.1};
   for (int seed = 0; seed < kSeeds; ++seed) {
@@ -40,13 +42,13 @@ TEST(SpotHeights, TenCentimetresAreToldApartUnderAHighCeiling) {
     ASSERT_TRUE(found.converged && found.center.covariance);
     const auto sd_rad = axis_sd_rad(found.center, scene.camera);
     EXPECT_LT(*sd_rad, rad_from_deg(0.1));
-    // Of 20 draws none is beyond five standard deviations of a plane normal distribution.
+    // For 20 draws of a planar normal distribution, none exceeds five standard deviations.
     EXPECT_LT(angle_between(found.center.zenith_in_camera, scene.truth().zenith_in_camera),
               5 * *sd_rad);
   }
 }
 
-TEST(SpotHeights, FourHeightsAreFour) {
+TEST(FindRotationCaptures, SeparatesFourHeights) {
   SpotScene scene = high_scene();
   scene.heights_m = {0, 0.05, 0.15, 0.2};
   for (int seed = 0; seed < kSeeds; ++seed) {
@@ -58,8 +60,8 @@ TEST(SpotHeights, FourHeightsAreFour) {
   }
 }
 
-/// Noise of 1 px puts the heights of two lamps' fixes off by 1 % of the distance.
-TEST(SpotHeights, NoiseDoesNotMakeTwoOfOne) {
+/// Noise of 1 px causes height errors of 1 % of the distance for fixes of two lamps.
+TEST(FindRotationCaptures, KeepsOneHeightUnderNoise) {
   for (const std::size_t lamps : {std::size_t{2}, std::size_t{8}}) {
     SpotScene scene = tilted_scene();
     scene.map.lamps.resize(lamps);
@@ -75,7 +77,7 @@ TEST(SpotHeights, NoiseDoesNotMakeTwoOfOne) {
   }
 }
 
-TEST(SpotHeights, AtOneLampsAtSeveralTellTheLeverArm) {
+TEST(FitRotationAxis, EstimatesLeverArmFromLampsAtSeveralHeights) {
   SpotScene scene = tilted_scene();
   scene.map =
       lamp_map_of({{-0.5, -0.35, 1.6}, {0.5, 0.2, 1.4}, {-0.4, 0.3, 1.8}, {0.1, -0.4, 1.5}});
@@ -86,8 +88,8 @@ TEST(SpotHeights, AtOneLampsAtSeveralTellTheLeverArm) {
   EXPECT_THAT(*exact.center.lever_arm_m, IsNear(scene.lever_arm_m, 1e-7));
 }
 
-/// Lamps that differ by 2 mm would tell a lever arm of 15 mm to several centimetres.
-TEST(SpotHeights, AtOneLampsAtNearlyOneDoNot) {
+/// Lamps whose heights differ by 2 mm determine a lever arm of 15 mm only to several centimeters.
+TEST(FitRotationAxis, OmitsLeverArmForLampsAtNearlyOneHeight) {
   SpotScene scene = tilted_scene();
   for (std::size_t i = 0; i < scene.map.lamps.size(); i += 2) {
     scene.map.lamps[i].position_m.z() += 0.002;
@@ -99,8 +101,8 @@ TEST(SpotHeights, AtOneLampsAtNearlyOneDoNot) {
   EXPECT_FALSE(found.center.lever_arm_m);
 }
 
-/// What the axis at one height is good for, with a lever arm: fixes of the axis at that height.
-TEST(SpotHeights, AtOneFixesAreOfTheAxis) {
+/// With a lever arm and a single height, fixes are those of the axis at that height.
+TEST(FitRotationAxis, YieldsFixesOfAxisAtOneHeight) {
   const SpotScene scene = tilted_scene();
   const RotationFit found = fit_turning_axis(captures_of(scene, scene.frames()), scene.camera);
   ASSERT_TRUE(found.converged);

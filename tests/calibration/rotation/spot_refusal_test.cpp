@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Captures that are of no turn on the spot, or of too little of one.
+/// Captures that are no rotation in place, or too small a part of one.
 #include <gtest/gtest.h>
 
 #include "calibration/rotation/spot.h"
@@ -15,13 +15,13 @@ SpotStatus status_of(const SpotScene& scene, const std::vector<Frame>& frames) {
 }
 SpotStatus status_of(const SpotScene& scene) { return status_of(scene, scene.frames()); }
 
-TEST(SpotRefusal, OfTooSmallAnArc) {
+TEST(FindRotationCaptures, ReportsTooSmallArc) {
   SpotScene scene;
   scene.arc_rad = rad_from_deg(80);
   EXPECT_EQ(status_of(scene), SpotStatus::short_arc);
 }
 
-TEST(SpotRefusal, OfCapturesThatAreAlike) {
+TEST(FindRotationCaptures, ReportsCapturesAtOneYaw) {
   SpotScene scene;
   scene.arc_rad = 1e-3;
   EXPECT_EQ(status_of(scene), SpotStatus::alike);
@@ -29,7 +29,7 @@ TEST(SpotRefusal, OfCapturesThatAreAlike) {
   EXPECT_EQ(status_of(scene, with_noise(scene.frames(0.3), random)), SpotStatus::alike);
 }
 
-TEST(SpotRefusal, OfTooFewCaptures) {
+TEST(FindRotationCaptures, ReportsTooFewCaptures) {
   SpotScene scene;
   for (const int captures : {1, 2}) {
     scene.captures = captures;
@@ -38,7 +38,7 @@ TEST(SpotRefusal, OfTooFewCaptures) {
   EXPECT_EQ(status_of(scene, {}), SpotStatus::other_map);
 }
 
-TEST(SpotRefusal, OfOneLamp) {
+TEST(FindRotationCaptures, ReportsTooFewLamps) {
   SpotScene scene;
   auto frames = scene.frames();
   for (Frame& frame : frames) {
@@ -47,7 +47,7 @@ TEST(SpotRefusal, OfOneLamp) {
   EXPECT_EQ(status_of(scene, frames), SpotStatus::too_few_lamps);
   scene.map.lamps.resize(1);
   EXPECT_EQ(status_of(scene), SpotStatus::too_few_lamps);
-  // Two in all, but never two at a time.
+  // Two lamps in total, but one per capture.
   SpotScene in_turn;
   frames = in_turn.frames();
   for (std::size_t i = 0; i < frames.size(); ++i) {
@@ -57,7 +57,7 @@ TEST(SpotRefusal, OfOneLamp) {
   EXPECT_EQ(status_of(in_turn, frames), SpotStatus::too_few_lamps);
 }
 
-TEST(SpotRefusal, OfTheLampsOfAnotherMap) {
+TEST(FindRotationCaptures, ReportsLampsOfAnotherMap) {
   SpotScene scene;
   const auto frames = scene.frames();
   for (Lamp& lamp : scene.map.lamps) lamp.id += 100;
@@ -72,7 +72,7 @@ TEST(SpotRefusal, OfTheLampsOfAnotherMap) {
   EXPECT_EQ(status_of(scene, frames), SpotStatus::other_map);
 }
 
-TEST(SpotRefusal, OfADrive) {
+TEST(FindRotationCaptures, ReportsMovingAxis) {
   SpotScene scene;
   std::vector<Frame> frames;
   for (int k = 0; k < 12; ++k) {

@@ -29,7 +29,7 @@ void expect_exact(const SpotScene& scene) {
   }
 }
 
-TEST(TurningAxis, IsExactWithoutALeverArmAtOneHeight) {
+TEST(FitRotationAxis, ReturnsExactAxisAtOneHeightWithoutLeverArm) {
   for (const double tilt_deg : {0.0, 0.5, 2.0, 5.0, 10.0}) {
     SCOPED_TRACE(tilt_deg);
     SpotScene scene;
@@ -38,7 +38,7 @@ TEST(TurningAxis, IsExactWithoutALeverArmAtOneHeight) {
   }
 }
 
-TEST(TurningAxis, IsRefusedWhenHalfOfTheCapturesAreFromElsewhere) {
+TEST(FitRotationAxis, RejectsCapturesAboutTwoAxes) {
   SpotScene scene, elsewhere;
   elsewhere.axis_m.x() += 0.07;
   auto frames = scene.frames(0.1);
@@ -48,7 +48,7 @@ TEST(TurningAxis, IsRefusedWhenHalfOfTheCapturesAreFromElsewhere) {
   EXPECT_TRUE(spot.status != SpotStatus::ok || !fit_turning_axis(spot, scene.camera).converged);
 }
 
-TEST(TurningAxis, IsExactWithAnyLeverArmAtTwoHeights) {
+TEST(FitRotationAxis, ReturnsExactLeverArmAtTwoHeights) {
   for (const double tilt_deg : {0.0, 0.5, 2.0, 5.0, 10.0}) {
     for (const Eigen::Vector2d& lever_arm_m :
          {Eigen::Vector2d(0, 0), Eigen::Vector2d(0.002, -0.001), Eigen::Vector2d(0.012, -0.009),
@@ -63,8 +63,8 @@ TEST(TurningAxis, IsExactWithAnyLeverArmAtTwoHeights) {
   }
 }
 
-/// Lamps anywhere in view, few captures, small arcs: no start but the closed form's is needed.
-TEST(TurningAxis, IsExactFromAnywhere) {
+/// Lamps anywhere in view, few captures, small arcs: the closed-form initial values suffice.
+TEST(FitRotationAxis, ConvergesForRandomScenes) {
   Random random(11);
   for (int i = 0; i < 150; ++i) {
     SCOPED_TRACE(i);
@@ -79,7 +79,7 @@ TEST(TurningAxis, IsExactFromAnywhere) {
     std::vector<Eigen::Vector3d> lamps_m;
     const std::size_t lamps = 2 + random.index(5);
     while (lamps_m.size() < lamps) {
-      // One after another: a compiler may take arguments in any order.
+      // Sequential statements, because the order of evaluation of arguments is unspecified.
       const double z_m = random.uniform(1.5, 1.7), y_m = random.uniform(-0.8, 0.8);
       const Eigen::Vector3d at_m(random.uniform(-0.8, 0.8), y_m, z_m);
       const bool apart = std::all_of(lamps_m.begin(), lamps_m.end(), [&](const auto& other) {

@@ -2,13 +2,13 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
 #
-# Whether programs that were linked with the library as it was run with it as it is: its symbols are those of
-# libvlp_positioning.symbols, and its types, as libabigail reads them from the debug information of shown.cpp, which
-# names them all, are laid out as in libvlp_positioning.layouts.
+# Checks that programs linked with an earlier version of the library run with this one. Its symbols must be those of
+# libvlp_positioning.symbols. The layouts of its types, which libabigail reads from the debug information of
+# shown.cpp, must be those of libvlp_positioning.layouts.
 #
 #   abi_test.sh [--update] SOURCE_DIR BUILD_DIR SCRATCH
 #
-#   --update   write the two files anew: what is lost or moved breaks programs, what is new does not
+#   --update   rewrite the two files: removed or moved entries break programs, new ones do not
 #
 # Exit code 77 without abidw, or on another processor than that of the files.
 set -euo pipefail

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Every type that the installed headers define and every function that the library shows, so that
-/// the debug information of this one file tells its whole ABI; see abi_test.sh.
+/// Uses every type of the installed headers and every exported function, so that the debug
+/// information of this file contains the complete ABI; see abi_test.sh.
 #include <vlp/vlp.h>
 
 #include <vlp/lamps/lamp_detector.h>

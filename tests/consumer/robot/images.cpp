@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Stands in for the robot's camera: an image from standard input, a dark one, no more.
+/// Replaces the robot's camera: an image from standard input, then a dark one, then none.
 #include <vlp/lamps/lamp_detector.h>
 
 #include <cstdint>

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// The fixes of same_fix.c through the C++ API, printed alike: no bit of them may depend on the API
-/// or on how its user compiles.
+/// Prints the fixes of same_fix.c, computed by the C++ API, in the same format. No bit may depend
+/// on the API or on the user's compiler options.
 #include <vlp/positioning/positioner.h>
 
 #include <cstdio>

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Tags near the rim of a lens of 190 degrees, whose edges it bends by several pixels.
+/// Tags near the rim of a lens of 190 degrees, which curves their edges by several pixels.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -46,7 +46,7 @@ struct Errors {
   double rms_px() const { return std::sqrt(squares / (8 * tags)); }
 };
 
-TEST(BentTags, HaveTheirCornersWhereTheEdgesCross) {
+TEST(BoardDetector, RefinesCornersOfCurvedTags) {
   constexpr double long_px = 80, far_off_px = 0.3;
   Scene scene = wider_scene();
   CaptureSet views = *std::ranges::find(scene.sets, "boards", &CaptureSet::folder);

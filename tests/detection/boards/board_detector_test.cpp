@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Boards as rendered, with known corners, and real ones.
+/// Rendered boards with known corners, and real boards.
 #include "detection/boards/board_detector.h"
 
 #include <gtest/gtest.h>
@@ -22,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-class RenderedBoard : public testing::TestWithParam<const char*> {
+class BoardDetectorOnRenderedBoard : public testing::TestWithParam<const char*> {
  protected:
   const fs::path rig = fs::path(VLP_SOURCE_DIR "/datasets") / GetParam() / "rendered";
   const Board board = read_board(rig / "board.yaml");
@@ -52,7 +52,7 @@ class RenderedBoard : public testing::TestWithParam<const char*> {
   }
 };
 
-TEST_P(RenderedBoard, IsFoundWithItsCorners) {
+TEST_P(BoardDetectorOnRenderedBoard, DetectsAllTagsWithAccurateCorners) {
   const SeenBoard seen = BoardDetector(board).detect(image);
   EXPECT_EQ(seen.tags.size(), true_corners().size());
   EXPECT_TRUE(seen.foreign.empty());
@@ -60,7 +60,7 @@ TEST_P(RenderedBoard, IsFoundWithItsCorners) {
   EXPECT_LT(rms_px(seen), 0.03);  // 0.019 and 0.013 over all views; 0.5 with the origin wrong
 }
 
-TEST_P(RenderedBoard, IsFoundInSixteenBits) {
+TEST_P(BoardDetectorOnRenderedBoard, DetectsTagsIn16BitImage) {
   cv::Mat deep;
   image.convertTo(deep, CV_16U, 16);  // as a camera of 12 bits has it
   const SeenBoard seen = BoardDetector(board).detect(deep);
@@ -68,7 +68,7 @@ TEST_P(RenderedBoard, IsFoundInSixteenBits) {
   EXPECT_LT(rms_px(seen), 0.03);
 }
 
-TEST_P(RenderedBoard, CutByTheImagesEdgeKeepsWhatIsWhole) {
+TEST_P(BoardDetectorOnRenderedBoard, KeepsWholeTagsOfTruncatedBoard) {
   const cv::Mat part = image(cv::Rect(0, 0, image.cols / 2, image.rows)).clone();
   const SeenBoard seen = BoardDetector(board).detect(part);
   EXPECT_GT(seen.tags.size(), 3U);
@@ -76,7 +76,7 @@ TEST_P(RenderedBoard, CutByTheImagesEdgeKeepsWhatIsWhole) {
   EXPECT_LT(rms_px(seen), 0.03);
 }
 
-TEST_P(RenderedBoard, HeldUpsideDownHasTheSameCorners) {
+TEST_P(BoardDetectorOnRenderedBoard, ReturnsSameCornersForUpsideDownImage) {
   cv::Mat turned;
   cv::rotate(image, turned, cv::ROTATE_180);
   const SeenBoard upright = BoardDetector(board).detect(image);
@@ -92,7 +92,7 @@ TEST_P(RenderedBoard, HeldUpsideDownHasTheSameCorners) {
   }
 }
 
-TEST_P(RenderedBoard, OfOtherIdsIsForeign) {
+TEST_P(BoardDetectorOnRenderedBoard, ReportsTagsWithOtherIdsAsForeign) {
   Board other = board;
   other.first_id = 100;
   const SeenBoard seen = BoardDetector(other).detect(image);
@@ -100,7 +100,7 @@ TEST_P(RenderedBoard, OfOtherIdsIsForeign) {
   EXPECT_GT(seen.foreign.size(), 10U);
 }
 
-TEST_P(RenderedBoard, SeenTwiceIsNotUsed) {
+TEST_P(BoardDetectorOnRenderedBoard, RejectsTagsDetectedTwice) {
   cv::Mat twice;
   cv::hconcat(image, image, twice);
   const SeenBoard seen = BoardDetector(board).detect(twice);
@@ -108,7 +108,7 @@ TEST_P(RenderedBoard, SeenTwiceIsNotUsed) {
   EXPECT_GT(seen.unusable, 20);
 }
 
-TEST_P(RenderedBoard, IsNotFoundInImagesOfARowOrTwo) {
+TEST_P(BoardDetectorOnRenderedBoard, ReturnsNoTagsForTinyImages) {
   const BoardDetector detector(board);
   for (const auto& [width, height] : {std::pair{1, 1}, {2, 100}, {800, 1}, {800, 2}, {3, 9}}) {
     cv::Mat part;
@@ -117,15 +117,16 @@ TEST_P(RenderedBoard, IsNotFoundInImagesOfARowOrTwo) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Boards, RenderedBoard, testing::Values("paper-rig", "paper-rig-faulty"));
+INSTANTIATE_TEST_SUITE_P(Boards, BoardDetectorOnRenderedBoard,
+                         testing::Values("paper-rig", "paper-rig-faulty"));
 
-TEST(BoardDetector, RefusesAFamilyThatArucoLacks) {
+TEST(BoardDetector, ThrowsForFamilyMissingInAruco) {
   Board board = read_board(VLP_SOURCE_DIR "/datasets/paper-rig-faulty/rendered/board.yaml");
   board.family = "tagStandard41h12";
   EXPECT_THROW(BoardDetector{board}, std::invalid_argument);
 }
 
-/// How many images of a folder show so many tags.
+/// Returns the number of images of a folder per number of detected tags.
 std::map<std::size_t, int> images_by_tags(const fs::path& folder, const fs::path& board) {
   std::map<std::size_t, int> counts;
   const BoardDetector detector(read_board(board));
@@ -135,13 +136,13 @@ std::map<std::size_t, int> images_by_tags(const fs::path& folder, const fs::path
   return counts;
 }
 
-TEST(RealBoards, OfAPhoneAreWhole) {
+TEST(BoardDetector, DetectsAllTagsInPhoneImages) {
   const auto folder = real_data("apriltag-lattice-phone");
   if (folder.empty()) GTEST_SKIP() << "no real captures here";
   EXPECT_EQ(images_by_tags(folder, folder / "board.yaml"), (std::map<std::size_t, int>{{40, 8}}));
 }
 
-TEST(RealBoards, OfAStereoCameraAreWholeButForFour) {
+TEST(BoardDetector, DetectsAllVisibleTagsInStereoImages) {
   const auto folder = real_data("kalibr-aprilgrid-stereo");
   if (folder.empty()) GTEST_SKIP() << "no real captures here";
   const std::map<std::size_t, int> expected{{15, 2}, {20, 14}};  // the rest is out of the image

@@ -12,13 +12,13 @@
 namespace vlp {
 namespace {
 
-/// A blur that grows to the rim, and along a motion.
+/// Returns a blur that increases towards the rim and along a motion.
 double blur_px(const Eigen::Vector2d& at_px, const Eigen::Vector2d& along) {
   const Eigen::Vector2d x = (at_px - Eigen::Vector2d(400, 300)) / 400;
   return 0.8 * std::exp(0.3 * x.squaredNorm() + 0.1 * x.x() - 0.2 * along.x() * along.y());
 }
 
-/// Known to 2 %, and different by `apart`.
+/// Creates samples of this blur with a relative standard deviation in addition to the noise.
 std::vector<EdgeFigure> figures(int count, double apart, double noise = 0.02) {
   Random random(5);
   std::vector<EdgeFigure> all;
@@ -40,7 +40,7 @@ TEST(EdgeField, IsExactWithoutNoise) {
   }
 }
 
-TEST(EdgeField, TellsHowFarFiguresAreApartBeyondTheirNoise) {
+TEST(EdgeField, ReportsExcessStandardDeviation) {
   for (const double apart : {0.05, 0.2}) {
     const EdgeField field(figures(300, apart), EdgeField::Terms::place_and_direction);
     EXPECT_NEAR(field.apart() / apart, 1, 0.15);
@@ -51,7 +51,7 @@ TEST(EdgeField, TellsHowFarFiguresAreApartBeyondTheirNoise) {
   EXPECT_GT(without_direction.apart(), 0.05);
 }
 
-TEST(EdgeField, StaysWhereSomeFiguresAreOfSomethingElse) {
+TEST(EdgeField, IsRobustToOutliers) {
   auto all = figures(100, 0);
   for (std::size_t i = 0; i < all.size(); i += 8) all[i].value *= 4;
   const EdgeField field(all, EdgeField::Terms::place_and_direction);
@@ -60,7 +60,7 @@ TEST(EdgeField, StaysWhereSomeFiguresAreOfSomethingElse) {
               0.03);
 }
 
-TEST(EdgeField, OfFewFiguresIsTheirMiddle) {
+TEST(EdgeField, ReturnsMedianForFewSamples) {
   const std::vector<EdgeFigure> few{
       {{10, 10}, {1, 0}, 0.5, 0.1}, {{90, 10}, {1, 0}, 0.8, 0.1}, {{50, 80}, {0, 1}, 2.0, 0.1}};
   const EdgeField field(few, EdgeField::Terms::place);

@@ -12,8 +12,8 @@
 namespace vlp {
 namespace {
 
-/// An edge of 40 px, behind a tone curve, with a black stripe of 3 px upon which white follows
-/// along half of it.
+/// Edge of 40 px with a tone curve and a black stripe of 3 px, which white bits adjoin along one
+/// half of the edge.
 struct Step {
   double off_px = 0.31, slope_px = 0.2, bow_px = -0.15, blur_px = 0.8;
   double black = 16, white = 200, gamma = 1;
@@ -60,7 +60,7 @@ struct Step {
   }
 };
 
-TEST(EdgeFit, IsExactWithoutNoise) {
+TEST(FitEdge, IsExactWithoutNoise) {
   const Step step;
   EdgeCurve edge = step.start();
   const auto fit = fit_edge(edge, step.pixels(), {});
@@ -70,7 +70,7 @@ TEST(EdgeFit, IsExactWithoutNoise) {
   EXPECT_FALSE(fit->runs_over);
 }
 
-TEST(EdgeFit, IsExactBehindToneCurves) {
+TEST(FitEdge, IsExactWithToneCurve) {
   for (const double gamma : {1.3, 2.4}) {
     const Step step{.gamma = gamma};
     EdgeCurve edge = step.start();
@@ -83,7 +83,7 @@ TEST(EdgeFit, IsExactBehindToneCurves) {
   }
 }
 
-TEST(EdgeFit, IsDrawnOutwardsByWhiteThatItDoesNotKnowOf) {
+TEST(FitEdge, IsBiasedOutwardsByUnmodeledWhiteBits) {
   const Step step;
   auto pixels = step.pixels();
   for (EdgePixel& pixel : pixels) pixel.white_behind = 0;
@@ -92,7 +92,7 @@ TEST(EdgeFit, IsDrawnOutwardsByWhiteThatItDoesNotKnowOf) {
   EXPECT_GT(edge.coefficients[0], step.off_px + 0.02);
 }
 
-TEST(EdgeFit, IsExactWhereWhiteRunsOver) {
+TEST(FitEdge, IsExactForSaturatedOuterSide) {
   for (const double gamma : {1.0, 2.2}) {
     const Step step{.white = 380, .gamma = gamma, .clipped_at = 255};
     EdgeCurve edge = step.start();
@@ -105,7 +105,7 @@ TEST(EdgeFit, IsExactWhereWhiteRunsOver) {
 }
 
 /// Tags of some families are white inside.
-TEST(EdgeFit, IsExactWhereWhiteInsideRunsOver) {
+TEST(FitEdge, IsExactForSaturatedInnerSide) {
   const Step step{.black = 380, .white = 16, .stripe_px = 100};
   auto pixels = step.pixels();
   for (EdgePixel& pixel : pixels) pixel.white_behind = 0;
@@ -116,7 +116,7 @@ TEST(EdgeFit, IsExactWhereWhiteInsideRunsOver) {
   step.expect_found(edge, 2e-3);
 }
 
-/// Root of the mean square of the error of an edge's place, over sets of noise.
+/// Returns the RMS error of the position of an edge over several realizations of the noise.
 double scatter_px(const Step& step, const EdgePrior& prior) {
   constexpr unsigned sets = 60;
   double squares = 0;
@@ -129,13 +129,13 @@ double scatter_px(const Step& step, const EdgePrior& prior) {
   return std::sqrt(squares);
 }
 
-TEST(EdgeFit, OfBrightPaperIsAsGoodAsOfOther) {
+TEST(FitEdge, KeepsPrecisionForNearlySaturatedPaper) {
   const double other_px = scatter_px({.white = 240, .noise = 1.5}, {});
   const double bright_px = scatter_px({.white = 252, .noise = 1.5}, {});
   EXPECT_LT(bright_px, 1.2 * other_px);
 }
 
-TEST(EdgeFit, WithItsBlurKnownIsBetterWhereWhiteRunsOver) {
+TEST(FitEdge, PriorsImprovePrecisionOfSaturatedEdge) {
   const Step step{.white = 380, .gamma = 2.2, .noise = 1};
   const double alone_px = scatter_px(step, {step.gamma});
   const double held_px = scatter_px(step, {step.gamma, step.blur_px, 60});
@@ -145,7 +145,7 @@ TEST(EdgeFit, WithItsBlurKnownIsBetterWhereWhiteRunsOver) {
   EXPECT_LT(lit_px, 0.6 * held_px);
 }
 
-TEST(EdgeFit, SaysWhatLightAndBlurAreKnownTo) {
+TEST(FitEdge, ReportedVariancesOfLightAndBlurMatchErrors) {
   const Step step{.white = 380, .gamma = 2.2, .noise = 1}, seen{.gamma = 2.2, .noise = 1};
   constexpr unsigned sets = 100;
   double lights = 0, blurs = 0;
@@ -164,14 +164,14 @@ TEST(EdgeFit, SaysWhatLightAndBlurAreKnownTo) {
   EXPECT_NEAR(blurs, 1, 0.35);
 }
 
-TEST(EdgeFit, OfDimPaperIsFoundBehindTheSteepestCurve) {
+TEST(FitEdge, FitsDimEdgeWithSteepestToneCurve) {
   const Step step{.black = 0.3, .white = 5, .gamma = 2.4};  // levels of 15 and 49
   EdgeCurve edge = step.start();
   ASSERT_TRUE(fit_edge(edge, step.pixels(), {step.gamma}));
   step.expect_found(edge, 5e-3);
 }
 
-TEST(EdgeFit, IsNoneOfNoiseOrOfFewPixels) {
+TEST(FitEdge, ReturnsNulloptForNoiseOrFewPixels) {
   Step step{.black = 99, .white = 101, .noise = 30};
   EdgeCurve edge = step.start();
   EXPECT_FALSE(fit_edge(edge, step.pixels(), {}));
@@ -180,7 +180,7 @@ TEST(EdgeFit, IsNoneOfNoiseOrOfFewPixels) {
   EXPECT_FALSE(fit_edge(edge, few, {}));
 }
 
-TEST(EdgeCurve, CrossesAnother) {
+TEST(EdgeCurveIntersection, LiesOnBothCurves) {
   EdgeCurve flat = Step().start(), upright = flat;
   flat.coefficients << 0.5, 0.1, -0.3, 0.05;
   upright.along = {0, 1};

@@ -81,7 +81,7 @@ Found measure(const Scene& scene, std::size_t count, double min_side_px = 0) {
 
 Scene station_scene() { return read_scene(VLP_SOURCE_DIR "/datasets/station/scene.yaml"); }
 
-TEST(EdgeSteps, HaveMtf50OfRenderedBlur) {
+TEST(EdgeSteps, MatchMtf50OfRenderedBlur) {
   for (const double sigma_px : {0.5, 0.7, 1.0, 1.5, 2.0}) {
     Scene scene = station_scene();
     scene.optics.blur_px = sigma_px;
@@ -95,7 +95,7 @@ TEST(EdgeSteps, HaveMtf50OfRenderedBlur) {
   }
 }
 
-TEST(EdgeSteps, HaveMtf50OfDefocus) {
+TEST(EdgeSteps, MatchMtf50OfDefocus) {
   for (const double radius_px : {0.8, 1.6, 2.4}) {
     Scene scene = station_scene();
     scene.optics.defocus = Defocus{radius_px};
@@ -112,7 +112,7 @@ TEST(EdgeSteps, HaveMtf50OfDefocus) {
   }
 }
 
-TEST(EdgeSteps, HaveMtf50BehindToneCurve) {
+TEST(EdgeSteps, MatchMtf50WithToneCurve) {
   for (const double sigma_px : {0.7, 1.4}) {
     Scene scene = station_scene();
     scene.optics.blur_px = sigma_px;
@@ -127,7 +127,7 @@ TEST(EdgeSteps, HaveMtf50BehindToneCurve) {
   }
 }
 
-TEST(EdgeSteps, HaveLightOfBlackRaisedByVeil) {
+TEST(EdgeSteps, ReportDarkLightRaisedByVeil) {
   const double clean = measure(station_scene(), 3).black_to_white;
   Scene veiled = station_scene();
   veiled.optics.veil = 0.25;

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// How many of the tags that can be told at all keep their corners, as white runs over and tone
-/// curves, sharpening and JPEG do their part: against the finders, which only count.
+/// Fraction of the tags detected by the tag finders whose corners BoardDetector refines, for
+/// saturated images and for images with tone curve, sharpening and JPEG.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -22,17 +22,17 @@ namespace {
 
 struct Pictures {
   const char* scene;
-  /// How bright the board's white is, over what an image shows as white.
+  /// Brightness of the board's white, relative to full scale.
   double white;
   std::optional<Picture> picture;
-  /// The least share of the tags that keep their corners.
+  /// Minimum fraction of the tags with refined corners.
   double kept;
   const char* name;
 
   friend void PrintTo(const Pictures& pictures, std::ostream* out) { *out << pictures.name; }
 };
 
-class KeptTags : public testing::TestWithParam<Pictures> {
+class BoardDetectorYield : public testing::TestWithParam<Pictures> {
  protected:
   const Scene scene =
       read_scene(std::string(VLP_SOURCE_DIR "/datasets/") + GetParam().scene + "/scene.yaml");
@@ -56,7 +56,7 @@ class KeptTags : public testing::TestWithParam<Pictures> {
   }
 };
 
-TEST_P(KeptTags, AreNearlyAllThatCanBeTold) {
+TEST_P(BoardDetectorYield, KeepsNearlyAllTagsOfTagFinder) {
   constexpr std::size_t views = 36, apart = 3;
   CaptureSet set = *std::find_if(scene.sets.begin(), scene.sets.end(),
                                  [](const CaptureSet& each) { return each.folder == "boards"; });
@@ -81,7 +81,7 @@ TEST_P(KeptTags, AreNearlyAllThatCanBeTold) {
 
 constexpr Picture kCoded{2.4, Sharpening{1, 1}, 80};
 INSTANTIATE_TEST_SUITE_P(
-    Scenes, KeptTags,
+    Scenes, BoardDetectorYield,
     testing::Values(Pictures{"paper-rig", 1, {}, 0.98, "PlainOfWhite"},
                     Pictures{"paper-rig", 1.5, {}, 0.98, "PlainOfOneAndAHalfTimesWhite"},
                     Pictures{"paper-rig", 2, {}, 0.98, "PlainOfTwiceWhite"},

@@ -35,7 +35,7 @@ Board squares(BoardKind kind, int cols, int rows) {
   return board;
 }
 
-/// As OpenCV itself draws it, a little blurred.
+/// Draws a ChArUco board by OpenCV, slightly blurred.
 cv::Mat drawn_by_opencv(const Board& board) {
   const auto dictionary = cv::aruco::getPredefinedDictionary(cv::aruco::DICT_5X5_100);
   const cv::Size size(board.cols * kSquare_px + 2 * kMargin_px,
@@ -55,7 +55,7 @@ cv::Mat drawn_by_opencv(const Board& board) {
   return image;
 }
 
-/// Corners lie between pixels.
+/// Returns the true position of a corner, which lies between pixels.
 Eigen::Vector2d place_of(const Board& board, std::size_t index) {
   const auto cols = static_cast<std::size_t>(board.cols - 1);
   const Eigen::Vector2d node(static_cast<double>(index % cols), static_cast<double>(index / cols));
@@ -84,7 +84,7 @@ void expect_all_corners(const Board& board, const SeenBoard& seen) {
   }
 }
 
-TEST(SquareCorners, AreThoseOfOpencvsCharucoBoard) {
+TEST(SquareCorners, DetectsAllCornersOfOpencvCharucoBoard) {
   std::vector<Board> boards{squares(BoardKind::charuco, 7, 5), squares(BoardKind::charuco, 7, 6)};
 #ifdef VLP_ARUCO_IS_A_CLASS
   // As it was drawn before OpenCV 4.6, with a white square first.
@@ -101,7 +101,7 @@ TEST(SquareCorners, AreThoseOfOpencvsCharucoBoard) {
   }
 }
 
-TEST(SquareCorners, OfACharucoBoardAreThoseInView) {
+TEST(SquareCorners, DetectsVisibleCornersOfTruncatedCharucoBoard) {
   const Board board = squares(BoardKind::charuco, 7, 5);
   const cv::Mat image = drawn_by_opencv(board);
   const cv::Mat part = image(cv::Rect(0, 0, image.cols / 2, image.rows)).clone();
@@ -112,8 +112,8 @@ TEST(SquareCorners, OfACharucoBoardAreThoseInView) {
   }
 }
 
-// Clutter that looks like a marker which the board has, and whose place is elsewhere.
-TEST(SquareCorners, AreNotMovedByAMisreadMarker) {
+// Clutter that looks like a marker of the board at another position.
+TEST(SquareCorners, RejectsCornersNextToMisreadMarker) {
   const Board board = squares(BoardKind::charuco, 7, 5);
   const cv::Mat1b image = drawn_by_opencv(board);
   cv::Mat1f smoothed;
@@ -132,7 +132,7 @@ TEST(SquareCorners, AreNotMovedByAMisreadMarker) {
   }
 }
 
-TEST(SquareCorners, OfAChessboardAreCountedWithTheImage) {
+TEST(SquareCorners, CountsChessboardCornersFromTopLeftOfImage) {
   for (const auto& [cols, rows] : {std::pair(9, 6), std::pair(9, 7), std::pair(8, 8)}) {
     SCOPED_TRACE(cols * 10 + rows);
     const Board board = squares(BoardKind::chessboard, cols, rows);
@@ -146,8 +146,8 @@ TEST(SquareCorners, OfAChessboardAreCountedWithTheImage) {
   }
 }
 
-/// Larger images are searched in a reduced one.
-TEST(SquareCorners, OfALargeImageAreAsExact) {
+/// Large images are searched at a reduced resolution.
+TEST(SquareCorners, DetectsChessboardAccuratelyInLargeImage) {
   const Board board = squares(BoardKind::chessboard, 9, 6);
   const cv::Mat drawn = drawn_chessboard(board);
   cv::Mat image(3001, 4002, CV_8U, cv::Scalar(255));
@@ -161,7 +161,7 @@ TEST(SquareCorners, OfALargeImageAreAsExact) {
   EXPECT_EQ(shown, (std::array{6, 9}));
 }
 
-TEST(SquareCorners, OfAChessboardAreAllOrNone) {
+TEST(SquareCorners, ReturnsNoCornersForIncompleteChessboard) {
   const Board board = squares(BoardKind::chessboard, 9, 6);
   cv::Mat image = drawn_chessboard(board);
   EXPECT_TRUE(BoardDetector(board)
@@ -171,7 +171,7 @@ TEST(SquareCorners, OfAChessboardAreAllOrNone) {
   EXPECT_TRUE(BoardDetector(board).detect(image).points.empty());
 }
 
-TEST(SquareCorners, TellAnotherBoard) {
+TEST(OtherTags, ReportsChessboardSizeAndMarkerDictionary) {
   const cv::Mat image = drawn_chessboard(squares(BoardKind::chessboard, 9, 6));
   const auto [cols, rows] = chessboard_shown(image);
   EXPECT_EQ(std::max(cols, rows), 9);
@@ -183,7 +183,7 @@ TEST(SquareCorners, TellAnotherBoard) {
             "the image shows markers of DICT_5X5, the largest of id 16");
 }
 
-TEST(LatticeOrder, TurnsWhatGoesUpTheColumnsAround) {
+TEST(OrderLattice, ReversesRowsCountedUpwards) {
   std::vector<SeenPoint> points;
   for (std::size_t i = 0; i < 12; ++i) {
     points.push_back({i, {10.0 * static_cast<double>(i % 4), -10.0 * static_cast<double>(i / 4)}});
@@ -193,7 +193,7 @@ TEST(LatticeOrder, TurnsWhatGoesUpTheColumnsAround) {
   EXPECT_EQ(points[11].pixel, Eigen::Vector2d(30, 0));
 }
 
-TEST(ArucoMarkers, OfADictionaryThatThereIsNotAreRefused) {
+TEST(BoardDetector, ThrowsForUnknownMarkerDictionary) {
   Board board = squares(BoardKind::charuco, 7, 5);
   board.family = "DICT_9X9_50";
   EXPECT_THROW(BoardDetector{board}, std::invalid_argument);

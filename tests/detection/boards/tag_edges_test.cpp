@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Corners of tags as rendered, against where they project.
+/// Corners of rendered tags, compared with their projections.
 #include "detection/boards/tag_edges.h"
 
 #include <gtest/gtest.h>
@@ -47,7 +47,7 @@ double narrowest_px(const SeenTag::Corners& corners) {
   return least;
 }
 
-/// Of boards in front of the camera of datasets/paper-rig.
+/// Measures the corner errors of boards in front of the camera of datasets/paper-rig.
 template <typename Wanted>
 CornerErrors errors_of(const Scene& scene, const CaptureSet& views, std::size_t images,
                        Wanted wanted) {
@@ -75,7 +75,7 @@ CaptureSet boards_of(const Scene& scene) {
   return *std::ranges::find(scene.sets, "boards", &CaptureSet::folder);
 }
 
-TEST(TagEdges, OfNarrowTagsAreNotDrawnOutwardsByTheirBits) {
+TEST(TagEdges, CornersOfNarrowTagsAreNotBiasedByBits) {
   Scene scene = paper_rig();
   scene.sensor.shot_noise = false;
   scene.sensor.read_noise_e = 0;
@@ -88,7 +88,7 @@ TEST(TagEdges, OfNarrowTagsAreNotDrawnOutwardsByTheirBits) {
   RecordProperty("rms_px", std::to_string(errors.rms_px()));
 }
 
-TEST(TagEdges, OfWhiteThatRunsOverAreWhereTheyWere) {
+TEST(TagEdges, CornersOfSaturatedTagsAreUnbiased) {
   Scene scene = paper_rig();
   CaptureSet views = boards_of(scene);
   views.exposure_s = 0.0079;  // one and a half times white

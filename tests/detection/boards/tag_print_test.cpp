@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Against libapriltag's own pictures of tags.
+/// Comparison with libapriltag's images of tags.
 #include "detection/boards/tag_print.h"
 
 #include <gtest/gtest.h>
@@ -10,7 +10,7 @@
 namespace vlp {
 namespace {
 
-TEST(TagPrint, HasTheBitsOfTheFamilysPictures) {
+TEST(TagGeometry, MatchesImagesOfLibapriltag) {
   Board board;
   board.border_bits = 1;
   board.tag_spacing = 0.5;
@@ -45,7 +45,7 @@ TEST(TagPrint, HasTheBitsOfTheFamilysPictures) {
   }
 }
 
-TEST(TagPrint, HasItsBitsBehindAWiderBorder) {
+TEST(TagGeometry, ShiftsBitsByWidthOfBorder) {
   Board board;
   board.family = "tag36h11";
   board.border_bits = 1;
@@ -64,7 +64,7 @@ TEST(TagPrint, HasItsBitsBehindAWiderBorder) {
   }
 }
 
-TEST(TagPrint, KnowsNothingBehindAWhiteBorder) {
+TEST(TagGeometry, ReturnsNoSegmentsForWhiteBorder) {
   Board board;
   board.family = "tagStandard41h12";
   board.border_bits = 1;

@@ -9,8 +9,8 @@
 namespace vlp {
 namespace {
 
-/// An image that calls for gamma so clearly, with a corner that moves with its logarithm by a
-/// parabola.
+/// Creates an image with costs that have their minimum at `gamma` and the curvature `clearly`. Its
+/// corners are a parabola of log(gamma).
 BoardView image(double gamma, double clearly) {
   const auto corners = [](double x) {
     SeenTag::Corners all;
@@ -42,7 +42,7 @@ double take_levels_curve(std::vector<BoardView>& views) {
   return take_curve(views, costs_of_levels(views));
 }
 
-TEST(CurveOfLevels, IsWhatAnImageCallsForAndMovesItsCorners) {
+TEST(ApplyToneCurve, EstimatesGammaAndInterpolatesCorners) {
   for (const double gamma : {1.25, 1.7, 2.2, 2.4}) {
     std::vector<BoardView> images{image(gamma, 500)};
     EXPECT_NEAR(take_levels_curve(images), gamma, 1e-9);
@@ -57,19 +57,19 @@ TEST(CurveOfLevels, IsWhatAnImageCallsForAndMovesItsCorners) {
   }
 }
 
-TEST(CurveOfLevels, LeavesDeviationsBetweenThoseBesideIt) {
+TEST(ApplyToneCurve, InterpolatesStandardDeviationsLinearly) {
   std::vector<BoardView> images{image(1.8, 500)};
   SeenTag& tag = images[0].seen.tags[0];
   const double at = std::log(1.8 / 1.6) / std::log(2.0 / 1.6);
   for (std::size_t i = 0; i < 4; ++i)
     tag.behind_curves[i].sds_px[0] = std::array{0.024, 0.024, 0.026, 0.19}[i];
-  tag.behind_curves[2].sds_px[1] = 0;  // nobody knows it behind one of them
+  tag.behind_curves[2].sds_px[1] = 0;  // unknown for one of the tone curves
   take_levels_curve(images);
   EXPECT_NEAR(images[0].seen.tags[0].sds_px[0], 0.024 + at * 0.002, 1e-9);
   EXPECT_EQ(images[0].seen.tags[0].sds_px[1], 0);
 }
 
-TEST(CurveOfLevels, IsOneForAllImages) {
+TEST(ApplyToneCurve, EstimatesCommonGammaOfAllImages) {
   std::vector<BoardView> images{image(1.6, 300), image(2.0, 300), image(1.1, 10)};
   const double gamma = take_levels_curve(images);
   EXPECT_NEAR(gamma, 1.76, 0.03);
@@ -78,20 +78,20 @@ TEST(CurveOfLevels, IsOneForAllImages) {
   }
 }
 
-TEST(CurveOfLevels, IsNotMadeByAnImageThatShowsSomethingElse) {
+TEST(ApplyToneCurve, LimitsInfluenceOfSingleImage) {
   std::vector<BoardView> images(12, image(1, 500));
   images.push_back(image(2.4, 1e7));
   EXPECT_EQ(take_levels_curve(images), 1);
   EXPECT_EQ(images.back().seen.tags[0].corners_px[0].x(), 100);
 }
 
-TEST(CurveOfLevels, IsNoneWhereItIsLittle) {
+TEST(ApplyToneCurve, ReturnsOneForSmallGamma) {
   std::vector<BoardView> images{image(1.15, 500)};
   EXPECT_EQ(take_levels_curve(images), 1);
   EXPECT_EQ(images[0].seen.tags[0].corners_px[0].x(), 100);
 }
 
-TEST(CurveOfLevels, LeavesImagesThatHaveNoneForSure) {
+TEST(ApplyToneCurve, KeepsCornersOfImagesWithoutToneCurve) {
   BoardView plain = image(1, 500);
   plain.seen.curve_costs.resize(2);
   plain.seen.tags[0].behind_curves.clear();
@@ -101,7 +101,7 @@ TEST(CurveOfLevels, LeavesImagesThatHaveNoneForSure) {
   EXPECT_LT(images[1].seen.tags[0].corners_px[0].x(), 99.8);
 }
 
-TEST(CurveOfLevels, IsTakenOnce) {
+TEST(ApplyToneCurve, DoesNothingWhenRepeated) {
   std::vector<BoardView> images{image(2, 500)};
   take_levels_curve(images);
   const auto once = images[0].seen.tags[0].corners_px;
@@ -109,7 +109,7 @@ TEST(CurveOfLevels, IsTakenOnce) {
   EXPECT_EQ(images[0].seen.tags[0].corners_px, once);
 }
 
-TEST(CurveOfLevels, IsNoneWithoutImages) {
+TEST(ApplyToneCurve, ReturnsOneWithoutImages) {
   std::vector<BoardView> none, without(2);
   EXPECT_EQ(take_levels_curve(none), 1);
   EXPECT_EQ(take_levels_curve(without), 1);

@@ -13,7 +13,7 @@ namespace vlp {
 namespace {
 
 /// Two stations with biases of 3 mm and -3 mm along x and fixes 4 mm to either side along y.
-TEST(BiasAndScatter, TellBiasFromScatter) {
+TEST(BiasAndScatter, SeparatesBiasFromScatter) {
   std::vector<FixError> errors;
   for (const std::size_t station : {0U, 1U}) {
     for (const double side : {-4e-3, 4e-3}) {
@@ -32,7 +32,7 @@ TEST(BiasAndScatter, TellBiasFromScatter) {
   EXPECT_EQ(figures->bias_m, 0);  // 9 of bias^2, and 16 that chance puts there
 }
 
-TEST(BiasAndScatter, FindABiasUnderMoreScatter) {
+TEST(BiasAndScatter, IsUnbiasedUnderLargeScatter) {
   Random random(1);
   std::vector<FixError> errors;
   for (std::size_t i = 0; i < 20000; ++i) {

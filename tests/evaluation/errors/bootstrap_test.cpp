@@ -20,7 +20,8 @@ struct Errors {
   std::vector<std::size_t> units;
 };
 
-/// Horizontal errors: each of x and y of a station's own bias and of chance alike.
+/// Draws horizontal errors: x and y each have a bias per station and independent noise, both
+/// normal.
 Errors draw(std::size_t stations, std::size_t captures, double bias, double scatter,
             Random& random) {
   Errors errors;
@@ -35,8 +36,8 @@ Errors draw(std::size_t stations, std::size_t captures, double bias, double scat
   return errors;
 }
 
-/// In how many of 300 cases the intervals of mean, median, p90 and rms hold what is true of a
-/// Rayleigh distribution of this sigma.
+/// Returns in how many of 300 cases the intervals of mean, median, p90 and rms contain the true
+/// value of a Rayleigh distribution with this sigma.
 std::array<int, 4> held(std::size_t stations, std::size_t captures, double bias, double scatter) {
   const double sigma = std::hypot(bias, scatter);
   const double mean = sigma * std::sqrt(std::numbers::pi / 2);
@@ -59,24 +60,24 @@ std::array<int, 4> held(std::size_t stations, std::size_t captures, double bias,
   return counts;
 }
 
-/// 95 % of 300 draws is 285 with a standard deviation of 4; percentile intervals of a hundred are a
-/// little too narrow: 94.5 % in 2,000 draws.
-TEST(Bootstrap, HoldsTheTruthInNineteenOfTwentyDraws) {
+/// The expectation of 95 % of 300 cases is 285 with a standard deviation of 4. Percentile intervals
+/// from a hundred clusters are slightly too narrow: 94.5 % in 2,000 cases.
+TEST(ErrorIntervals, CoversTrueValuesAtNominalRate) {
   for (const int count : held(100, 1, 0, 1)) {
     EXPECT_GE(count, 270);
     EXPECT_LE(count, 297);
   }
 }
 
-TEST(Bootstrap, HoldsItWhereCapturesOfAStationShareABias) {
+TEST(ErrorIntervals, CoversTrueValuesWithPerStationBias) {
   for (const int count : held(100, 3, 1, 0.3)) {
     EXPECT_GE(count, 270);
     EXPECT_LE(count, 297);
   }
 }
 
-/// What drawing single captures would do: it is why units are drawn.
-TEST(Bootstrap, OfSingleCapturesWouldBeTooNarrow) {
+/// Resampling single captures ignores their common bias, which is why clusters are resampled.
+TEST(ErrorIntervals, SingleCapturesAsUnitsAreTooNarrow) {
   Random random(2);
   Errors errors = draw(40, 12, 1, 0.1, random);
   const Interval together = error_intervals(errors.values, errors.units, 1)->mean;
@@ -85,9 +86,9 @@ TEST(Bootstrap, OfSingleCapturesWouldBeTooNarrow) {
   EXPECT_LT(2 * (singly.high - singly.low), together.high - together.low);
 }
 
-/// For many errors theory has the widths: 2 x 1.96 sd of the mean, and for quantiles
-/// sqrt(q (1 - q) / n) / density. Percentiles of 2,000 draws of 1,000 parts are good to some 5 %.
-TEST(Bootstrap, IsAsWideAsTheoryForManyErrors) {
+/// Theoretical widths for many errors: 2 x 1.96 sd of the mean, and for quantiles sqrt(q (1 - q) /
+/// n) / density. Percentiles of 2,000 resamples of 1,000 groups are accurate to some 5 %.
+TEST(ErrorIntervals, WidthMatchesTheoryForManyErrors) {
   Random random(3);
   const std::size_t count = 50000;
   const Errors errors = draw(count, 1, 0, 1, random);
@@ -107,7 +108,7 @@ TEST(Bootstrap, IsAsWideAsTheoryForManyErrors) {
   expect_width(*intervals->p90, quantile_sd(0.9));
 }
 
-TEST(Bootstrap, IsTheSameWhateverTheThreads) {
+TEST(ErrorIntervals, IsIndependentOfThreadCount) {
   Random random(4);
   const Errors errors = draw(3000, 2, 1, 1, random);
   const auto one = error_intervals(errors.values, errors.units, 1);
@@ -120,7 +121,7 @@ TEST(Bootstrap, IsTheSameWhateverTheThreads) {
   EXPECT_EQ(one->p90->high, four->p90->high);
 }
 
-TEST(Bootstrap, SaysNothingOfFewUnits) {
+TEST(ErrorIntervals, ReturnsNulloptForFewUnits) {
   const std::vector<double> errors{1, 2, 3, 4, 5, 6};
   EXPECT_FALSE(error_intervals(errors, std::vector<std::size_t>{0, 0, 1, 1, 2, 3}, 1));
   const auto intervals = error_intervals(errors, std::vector<std::size_t>{0, 0, 1, 4, 2, 3}, 1);
@@ -128,7 +129,7 @@ TEST(Bootstrap, SaysNothingOfFewUnits) {
   EXPECT_EQ(intervals->units, 5);
 }
 
-TEST(Bootstrap, SaysNothingOfTheWorstTenthOfFewUnits) {
+TEST(ErrorIntervals, OmitsP90ForFewUnits) {
   Random random(5);
   const Errors few = draw(kFewestUnitsOfP90 - 1, 3, 1, 1, random);
   EXPECT_FALSE(error_intervals(few.values, few.units, 1)->p90);
@@ -136,7 +137,7 @@ TEST(Bootstrap, SaysNothingOfTheWorstTenthOfFewUnits) {
   EXPECT_TRUE(error_intervals(enough.values, enough.units, 1)->p90);
 }
 
-TEST(Bootstrap, OfEqualErrorsHasNoWidth) {
+TEST(ErrorIntervals, HasZeroWidthForEqualErrors) {
   const std::vector<double> errors(20, 2.5);
   std::vector<std::size_t> units(20);
   std::iota(units.begin(), units.end(), std::size_t{0});

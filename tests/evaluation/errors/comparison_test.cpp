@@ -17,7 +17,8 @@ struct Pairs {
   std::vector<FixRow> fixes, others;
   std::vector<FixError> errors, other_errors;
 };
-/// So many captures, the first run's errors larger by `difference_m` on average, with chance.
+/// Makes pairs of captures. The errors of the first run are larger by `difference_m` on average,
+/// with noise.
 Pairs pairs(std::size_t count, double difference_m) {
   Random random(1);
   Pairs all;
@@ -34,7 +35,7 @@ std::string_view verdict_of(const Pairs& all) {
   return compare(all.fixes, all.errors, all.others, all.other_errors, 1).verdict();
 }
 
-TEST(Comparison, SeesSmallDifferencesInPairs) {
+TEST(Compare, DetectsSmallPairedDifferences) {
   EXPECT_EQ(verdict_of(pairs(100, 3e-4)), "worse");
   EXPECT_EQ(verdict_of(pairs(100, -3e-4)), "better");
   EXPECT_EQ(verdict_of(pairs(kFewestUnitsCompared, 1e-2)), "worse");
@@ -44,15 +45,16 @@ TEST(Comparison, SeesSmallDifferencesInPairs) {
   EXPECT_EQ(compare(same.fixes, same.errors, same.fixes, same.errors, 1).verdict(), "the same");
 }
 
-TEST(Comparison, TakesWhatDoesNotMatterForTheSame) {
-  // Of errors of 15 mm on average 1 % is 0.15 mm; the differences' mean is known to 0.01 mm.
+TEST(Compare, ReportsInsignificantDifferenceAsTheSame) {
+  // For errors of 15 mm on average 1 % is 0.15 mm; the mean difference has an uncertainty of 0.01
+  // mm.
   EXPECT_EQ(verdict_of(pairs(100, 1e-4)), "the same");
   EXPECT_EQ(verdict_of(pairs(100, -1e-4)), "the same");
   EXPECT_EQ(verdict_of(pairs(100, 1.5e-4)), "no evidence");
   const Pairs tenth = pairs(100, 1e-4);
   EXPECT_EQ(compare(tenth.fixes, tenth.errors, tenth.others, tenth.other_errors, 1).words(),
             "the same within 0.15 mm");
-  // Of small errors it is a micrometre.
+  // For small errors the smallest relevant difference is a micrometer.
   Pairs small = pairs(100, 0);
   for (FixError& error : small.errors) error.horizontal_m = {1e-5 + 1.7e-7, 0};
   for (FixError& error : small.other_errors) error.horizontal_m = {1e-5, 0};
@@ -65,7 +67,7 @@ TEST(Comparison, TakesWhatDoesNotMatterForTheSame) {
   EXPECT_EQ(comparison.words(), "no evidence, too few");
 }
 
-TEST(Comparison, CountsUnitsAndNotPairs) {
+TEST(Compare, RequiresUnitsNotPairs) {
   Pairs all = pairs(100, 1e-2);
   for (FixError& error : all.errors) error.unit = 3 * (error.unit % 19);
   const Comparison comparison = compare(all.fixes, all.errors, all.others, all.other_errors, 1);
@@ -74,7 +76,7 @@ TEST(Comparison, CountsUnitsAndNotPairs) {
   EXPECT_GT(comparison.interval_m->low, 0);
 }
 
-TEST(Comparison, NeedsTheWholeIntervalOnOneSide) {
+TEST(Comparison, VerdictRequiresWholeIntervalOnOneSide) {
   Comparison comparison;
   EXPECT_EQ(comparison.verdict(), "no evidence");
   comparison.units = kFewestUnitsCompared;
@@ -89,7 +91,7 @@ TEST(Comparison, NeedsTheWholeIntervalOnOneSide) {
   EXPECT_EQ(comparison.verdict(), "worse");
 }
 
-TEST(Comparison, CountsPairsAndWhatIsMissing) {
+TEST(Compare, CountsPairsAndMissingFixes) {
   Pairs all = pairs(10, 1e-2);
   all.errors.erase(all.errors.begin(), all.errors.begin() + 3);
   all.other_errors.erase(all.other_errors.begin() + 9);
@@ -102,7 +104,7 @@ TEST(Comparison, CountsPairsAndWhatIsMissing) {
   EXPECT_NEAR(comparison.mean_difference_m, 1e-2, 2e-4);
 }
 
-TEST(Comparison, RefusesFixesOfOtherCaptures) {
+TEST(CheckSameImages, RejectsFixesOfOtherCaptures) {
   const FromFile<FixRow> fixes{"a.csv", {fix_at("a", 0, 0)}};
   const FromFile<FixRow> others{"b.csv", {fix_at("a", 0, 0), fix_at("b", 0, 0)}};
   EXPECT_THAT(refusal_of([&] { check_same_images(fixes, others); }),

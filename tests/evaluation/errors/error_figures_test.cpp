@@ -9,7 +9,7 @@
 namespace vlp {
 namespace {
 
-TEST(ErrorFigures, AreThoseByHand) {
+TEST(ErrorStatistics, MatchesManualComputation) {
   const ErrorFigures figures = figures_of({10, 1, 2, 3, 4, 9, 8, 7, 6, 5});
   EXPECT_EQ(figures.count, 10);
   EXPECT_DOUBLE_EQ(figures.mean, 5.5);
@@ -19,7 +19,7 @@ TEST(ErrorFigures, AreThoseByHand) {
   EXPECT_DOUBLE_EQ(figures.rms, std::sqrt(38.5));
 }
 
-TEST(ErrorFigures, OfOneErrorAreThatError) {
+TEST(ErrorStatistics, ReturnsTheErrorForSingleError) {
   const ErrorFigures figures = figures_of({3});
   for (const double figure :
        {figures.mean, figures.median, figures.p90, figures.max, figures.rms}) {
@@ -27,14 +27,14 @@ TEST(ErrorFigures, OfOneErrorAreThatError) {
   }
 }
 
-TEST(ErrorFigures, OfErrorsWithASignHaveABias) {
+TEST(SignedErrorStatistics, ReturnsBias) {
   const SignedFigures figures = signed_figures_of({-3, 1, -1});
   EXPECT_EQ(figures.bias, -1);
   EXPECT_EQ(figures.sizes.median, 1);
   EXPECT_EQ(figures.sizes.max, 3);
 }
 
-TEST(ErrorFigures, AreOnTheDistribution) {
+TEST(ComputeDistribution, ContainsQuantilesOfFigures) {
   std::vector<double> errors(200);
   for (std::size_t i = 0; i < errors.size(); ++i) errors[i] = static_cast<double>(200 - i);
   const auto distribution = distribution_of(errors);

@@ -12,7 +12,7 @@
 namespace vlp {
 namespace {
 
-TEST(StatedRatio, IsOneWhenErrorsAreAsStated) {
+TEST(NormalizedErrors, IsOneIfErrorsMatchReportedSd) {
   Random random(1);
   std::vector<FixRow> fixes;
   std::vector<FixError> errors;
@@ -56,7 +56,7 @@ Camera pinhole() {
 
 /// Four lamps round the camera, 2 m above it, and a focal length of 500 px: sd(X) = sd(Y) =
 /// (H / f) noise / sqrt(4), see ErrorBudget::noise.
-TEST(LimitRatio, IsErrorsOverTheFormulasLimit) {
+TEST(CrlbRatio, MatchesAnalyticLimit) {
   const double sd_m = 2.0 / 500 * 0.1 / 2, limit_m = sd_m * std::sqrt(2);
   const std::vector<TruthRow> truth{
       {"a", {0, 0}, 0, 0.3}, {"b", {90, 0}, 0, 0}, {"c", {0, 0}, {}, 0}};
@@ -71,7 +71,7 @@ TEST(LimitRatio, IsErrorsOverTheFormulasLimit) {
   EXPECT_NEAR(ratio->sd, 1 / std::sqrt(4.0), 1e-6);
 }
 
-TEST(LimitRatio, IsBeatenByMoreThanChanceAlone) {
+TEST(CrlbRatio, BeatenIgnoresChanceAndDetectsSmallErrors) {
   Random random(3);
   constexpr int trials = 2000, fixes = 50;
   const auto beaten = [&](double stated) {
@@ -90,7 +90,7 @@ TEST(LimitRatio, IsBeatenByMoreThanChanceAlone) {
 
 /// Every sixth camera is 10 m below the lamps, the others 2 m: their limit is five times as large,
 /// and a few fixes make up most of the ratio.
-TEST(LimitRatio, IsNoOftenerBeatenByChanceWhereLimitsDiffer) {
+TEST(CrlbRatio, FalseAlarmRateHoldsForUnequalLimits) {
   Random random(4);
   constexpr int trials = 300;
   constexpr std::size_t fixes = 60;

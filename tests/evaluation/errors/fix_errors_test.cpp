@@ -13,7 +13,7 @@ namespace {
 
 using testing::HasSubstr;
 
-TEST(FixErrors, AgainstTheTruthAreByImage) {
+TEST(ErrorsAgainstTruth, MatchesRowsByImage) {
   const FromFile<FixRow> fixes{
       "fixes.csv",
       {fix_at("b", 1.003, 2.004, 0.5, 3.1), no_fix("c", "degenerate"), fix_at("a", 0, 0, 0.1)}};
@@ -31,7 +31,7 @@ TEST(FixErrors, AgainstTheTruthAreByImage) {
   EXPECT_EQ(errors.errors[1].unit, 0);
 }
 
-TEST(FixErrors, RefuseImagesThatTheTruthDoesNotHave) {
+TEST(ErrorsAgainstTruth, RejectsImagesMissingInTruth) {
   FromFile<FixRow> fixes{"fixes.csv", {fix_at("a", 0, 0), fix_at("x", 0, 0), fix_at("y", 0, 0)}};
   fixes.rows[1].line = 17;
   const FromFile<TruthRow> truth{"truth.csv", {{"a", {0, 0}, {}, {}}}};
@@ -40,7 +40,7 @@ TEST(FixErrors, RefuseImagesThatTheTruthDoesNotHave) {
   EXPECT_THAT(refusal, HasSubstr("2 of 3"));
 }
 
-TEST(FixErrors, AgainstAPathAreFromItsNearestPoint) {
+TEST(ErrorsAgainstPath, UsesNearestPointOfPath) {
   const Path path{{{0, 0}, {1, 0}, {1, 1}}, {0, 1, 1}};
   const FixErrors errors = errors_against_path(
       {fix_at("a", 0.5, 0.1, 0.7), fix_at("b", -3, -4), fix_at("c", 1.2, 0.5), no_fix("d", "x")},
@@ -54,7 +54,7 @@ TEST(FixErrors, AgainstAPathAreFromItsNearestPoint) {
   EXPECT_FALSE(errors.errors[2].yaw_rad);
 }
 
-TEST(FixErrors, AgainstAPathGoTogetherInThirtyRuns) {
+TEST(ErrorsAgainstPath, GroupsFixesIntoThirtyUnits) {
   const std::vector<FixRow> fixes(3000, fix_at("a", 0, 0));
   const FixErrors errors = errors_against_path(fixes, {{{0, 0}, {1, 0}}, {}});
   EXPECT_EQ(errors.errors.front().unit, 0);

@@ -11,7 +11,7 @@
 namespace vlp {
 namespace {
 
-TEST(LineFit, IsTheLineThatTheFixesScatterAbout) {
+TEST(FitLine, AveragesOutJitter) {
   std::vector<FixRow> fixes;
   for (int i = 0; i <= 100; ++i) {  // along x = 1 - 0.01 + ..., upwards, jitter of 2 mm across
     fixes.push_back(fix_at("", 0.01 + (i % 2 == 0 ? 2e-3 : -2e-3), i / 100.0));
@@ -27,8 +27,9 @@ TEST(LineFit, IsTheLineThatTheFixesScatterAbout) {
   EXPECT_NEAR(fit->line_m[1].y(), 0, 1e-4);
 }
 
-/// A line through the commanded one's middle, turned by 0.1: errors from 0 to 0.1 in proportion.
-TEST(LineFit, SamplesTheLineEvenly) {
+/// Line through the center of the commanded one, rotated by 0.1: errors grow linearly from 0 to
+/// 0.1.
+TEST(FitLine, SamplesLineEvenly) {
   std::vector<FixRow> fixes;
   for (int i = -10; i <= 10; ++i) fixes.push_back(fix_at("", i / 10.0, i / 100.0));
   const auto fit = fit_line(fixes, {Eigen::Vector2d(-1, 0), Eigen::Vector2d(1, 0)});
@@ -40,7 +41,7 @@ TEST(LineFit, SamplesTheLineEvenly) {
   EXPECT_NEAR(fit->jitter_m, 0, 1e-7);  // the root of rounding
 }
 
-TEST(LineFit, RunsAsItWasCommanded) {
+TEST(FitLine, HasDirectionOfCommandedLine) {
   const std::vector<FixRow> fixes{fix_at("", 0, 0), fix_at("", 1, 0)};
   const Eigen::Vector2d begin(0, 0), end(1, 0);
   for (const CommandedLine& line : {CommandedLine{begin, end}, CommandedLine{end, begin}}) {
@@ -51,7 +52,7 @@ TEST(LineFit, RunsAsItWasCommanded) {
   }
 }
 
-TEST(LineFit, NeedsADirection) {
+TEST(FitLine, ReturnsNulloptWithoutDirection) {
   const CommandedLine line{Eigen::Vector2d(0, 0), Eigen::Vector2d(1, 0)};
   EXPECT_FALSE(fit_line({fix_at("", 0, 0)}, line));
   EXPECT_FALSE(fit_line({fix_at("", 1, 1), fix_at("", 1, 1)}, line));

@@ -9,7 +9,7 @@
 namespace vlp {
 namespace {
 
-TEST(Stations, HoldPlacesWithinTheRadiusOfTheirFirst) {
+TEST(AssignReferencePoints, GroupsPositionsWithinRadiusOfFirst) {
   const std::vector<Eigen::Vector3d> places_m{
       {0, 0, 0},         {0.0009, 0, 0}, {0.0018, 0, 0},  // 0.9 mm from the second, not the first
       {0, 0, 0.0015},    {0, 0, 0.0006}, {-0.0005, -0.0005, -0.0005},
@@ -17,8 +17,8 @@ TEST(Stations, HoldPlacesWithinTheRadiusOfTheirFirst) {
   EXPECT_EQ(stations_of(places_m, 1e-3), (std::vector<std::size_t>{0, 0, 1, 2, 0, 0, 1}));
 }
 
-/// Against the definition, over cells on all sides of the origin.
-TEST(Stations, AreThoseOfALinearSearch) {
+/// Compares with the definition, for cells on all sides of the origin.
+TEST(AssignReferencePoints, MatchesLinearSearch) {
   Random random(1);
   std::vector<Eigen::Vector3d> places_m;
   for (int i = 0; i < 2000; ++i) {

@@ -13,7 +13,8 @@
 namespace vlp {
 namespace {
 
-/// Flat and noisy; every `bright_every`th pixel at random is lit, none for 0.
+/// Returns a uniform image with noise. One pixel of `bright_every` at random is lit; none if it is
+/// 0.
 template <typename Level>
 cv::Mat noisy(cv::Size size, double level, double noise, std::size_t bright_every, double bright) {
   Random random(7);
@@ -39,7 +40,7 @@ void expect_flat(const cv::Mat& image, double level) {
   EXPECT_EQ(background.threshold, level + 1.6);
 }
 
-TEST(Background, IsTheLevelAndNoiseOfFlatImagesOf8Bits) {
+TEST(EstimateBackground, MatchesLevelAndNoiseOfFlat8BitImages) {
   for (const cv::Size size : {cv::Size(97, 80), cv::Size(800, 600), cv::Size(1920, 1200)}) {
     for (const double noise : {2.0, 5.0, 10.0}) {
       SCOPED_TRACE(testing::Message() << size << ", " << noise);
@@ -48,54 +49,54 @@ TEST(Background, IsTheLevelAndNoiseOfFlatImagesOf8Bits) {
   }
 }
 
-TEST(Background, IsTheLevelAndNoiseOfFlatImagesOf16Bits) {
+TEST(EstimateBackground, MatchesLevelAndNoiseOfFlat16BitImages) {
   for (const double noise : {3.0, 50.0, 400.0}) {
     SCOPED_TRACE(noise);
     expect_dark(noisy<std::uint16_t>({800, 600}, 4000, noise, 0, 0), 4000, noise);
   }
 }
 
-TEST(Background, IsNotMovedByLightsOnATwentiethOfThePixels) {
+TEST(EstimateBackground, IsUnbiasedWhenFivePercentOfPixelsAreLit) {
   expect_dark(noisy<std::uint8_t>({800, 600}, 20, 4, 20, 250), 20, 4);
   expect_dark(noisy<std::uint16_t>({800, 600}, 900, 80, 20, 65535), 900, 80);
 }
 
-TEST(Background, LeavesAllButAFewPixelsOfFlatImagesBelowItsThreshold) {
+TEST(EstimateBackground, ThresholdExceedsNearlyAllPixelsOfFlatImages) {
   for (const double noise : {0.5, 2.0, 8.0}) {
     const cv::Mat image = noisy<std::uint8_t>({800, 600}, 60, noise, 0, 0);
     EXPECT_LT(cv::countNonZero(image > background_of(image_view(image)).threshold), 20) << noise;
   }
 }
 
-TEST(Background, OfTinyImagesIsTheirMedian) {
+TEST(EstimateBackground, ReturnsMedianForTinyImages) {
   expect_flat(cv::Mat(1, 1, CV_8U, cv::Scalar(40)), 40);
   expect_flat(cv::Mat(1, 1, CV_16U, cv::Scalar(4000)), 4000);
   expect_flat((cv::Mat_<std::uint8_t>(3, 2) << 9, 9, 200, 9, 9, 9), 9);
   expect_flat((cv::Mat_<std::uint16_t>(2, 3) << 700, 700, 700, 60000, 700, 700), 700);
 }
 
-TEST(Background, OfBlackAndWhiteImagesIsBlackAndWhite) {
+TEST(EstimateBackground, ReturnsLevelOfBlackAndWhiteImages) {
   expect_flat(cv::Mat::zeros(600, 800, CV_8U), 0);
   expect_flat(cv::Mat::zeros(600, 800, CV_16U), 0);
   expect_flat(cv::Mat(600, 800, CV_8U, cv::Scalar(255)), 255);
   expect_flat(cv::Mat(600, 800, CV_16U, cv::Scalar(65535)), 65535);
 }
 
-TEST(Background, IsThatAboveALevelThatNothingIsBelow) {
-  // As many times as bright as it was, an image that was black in most places.
+TEST(EstimateBackground, MatchesNoiseWhenDarkLevelIsClipped) {
+  // Models a brightened image that was black in most places.
   const cv::Mat image = cv::max(noisy<std::uint8_t>({800, 600}, 1, 1.2, 0, 0), 1);
   const Background background = background_of(image_view(image));
   EXPECT_NEAR(background.noise, 1.2, 0.3);
   EXPECT_LT(cv::countNonZero(image > background.threshold), 20);
 }
 
-TEST(Background, WithoutNoiseIsNotTakenForClippedWhenMuchIsLit) {
+TEST(EstimateBackground, DetectsNoClippingInNoiselessImagesWithLargeLights) {
   for (const int type : {CV_8U, CV_16U}) {
     for (const double dark : {0.0, 9.0}) {
       for (const int lit_rows : {60, 150, 240}) {  // of 600: a tenth to two fifths
         cv::Mat image(600, 800, type, cv::Scalar(dark));
         image.rowRange(100, 100 + lit_rows) = 200;
-        image.row(100) = 60;  // an edge that is not sharp
+        image.row(100) = 60;  // a blurred edge
         SCOPED_TRACE(testing::Message() << type << ", " << dark << ", " << lit_rows);
         expect_flat(image, dark);
       }
@@ -103,14 +104,14 @@ TEST(Background, WithoutNoiseIsNotTakenForClippedWhenMuchIsLit) {
   }
 }
 
-TEST(Background, OfPartOfAnImageLeavesTheRestOut) {
+TEST(EstimateBackground, IgnoresPixelsOutsideImageView) {
   cv::Mat image(600, 800, CV_8U, cv::Scalar(200));
   cv::Mat part = image(cv::Rect(100, 50, 33, 41));
   part = 30;
   expect_flat(part, 30);
 }
 
-TEST(Background, OfFewerBitsInSixteenIsTheSame) {
+TEST(EstimateBackground, ScalesWithLevelStepIn16BitImages) {
   Random random(3);
   cv::Mat eight(600, 800, CV_8U), sixteen;
   for (const double dark : {0.2, 3.0, 40.0}) {
@@ -132,14 +133,14 @@ TEST(Background, OfFewerBitsInSixteenIsTheSame) {
   }
 }
 
-TEST(Background, OfFewLevelsSaysNothingOfTheirStep) {
+TEST(EstimateBackground, IgnoresLevelStepWhenFewLevelsOccur) {
   cv::Mat image = cv::Mat::zeros(600, 800, CV_16U);
   image(cv::Rect(100, 50, 200, 200)) = 400;
   EXPECT_LT(background_of(image_view(image)).threshold, 2);
 }
 
-TEST(Background, MeetsEveryKindOfColumn) {
-  // Of four columns one is darker, as behind a mosaic of colours.
+TEST(EstimateBackground, SamplesAllColumnsOfColorFilterPattern) {
+  // One of four columns is darker, as with a mosaic of color filters.
   for (const cv::Size size : {cv::Size(800, 600), cv::Size(1280, 960), cv::Size(1920, 1200)}) {
     for (int darker = 0; darker < 4; ++darker) {
       cv::Mat image(size, CV_8U, cv::Scalar(30));

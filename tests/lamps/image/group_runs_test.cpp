@@ -16,7 +16,7 @@ std::vector<Run> rows(int first, int last, int begin, int end) {
   return runs;
 }
 
-/// All of them by row, then by column, as they are found.
+/// Joins runs, ordered by row, then by column, as find_runs() returns them.
 std::vector<Run> joined(const std::vector<std::vector<Run>>& parts) {
   std::vector<Run> all;
   for (const auto& part : parts) all.insert(all.end(), part.begin(), part.end());
@@ -26,9 +26,9 @@ std::vector<Run> joined(const std::vector<std::vector<Run>>& parts) {
   return all;
 }
 
-TEST(GroupRuns, OfNoRunsIsNothing) { EXPECT_TRUE(group_runs({}, 5).empty()); }
+TEST(GroupPixelRuns, ReturnsNoBlobsWithoutRuns) { EXPECT_TRUE(group_runs({}, 5).empty()); }
 
-TEST(GroupRuns, JoinsRunsAcrossUpToTheMostDarkRows) {
+TEST(GroupPixelRuns, JoinsRunsAcrossMaxDarkRows) {
   for (const int dark : {0, 1, 5, 24}) {
     const auto runs = joined({rows(10, 14, 20, 40), rows(15 + dark, 19 + dark, 20, 40)});
     const auto whole = group_runs(runs, dark);
@@ -42,7 +42,7 @@ TEST(GroupRuns, JoinsRunsAcrossUpToTheMostDarkRows) {
   }
 }
 
-TEST(GroupRuns, KeepsLightsSideBySideApart) {
+TEST(GroupPixelRuns, SeparatesLightsSideBySide) {
   const auto blobs = group_runs(joined({rows(10, 30, 20, 40), rows(5, 35, 40, 60)}), 5);
   ASSERT_EQ(blobs.size(), 2U);
   EXPECT_EQ(blobs[0].top(), 5);
@@ -51,7 +51,7 @@ TEST(GroupRuns, KeepsLightsSideBySideApart) {
   EXPECT_EQ(blobs[1].runs.size(), 21U);
 }
 
-TEST(GroupRuns, KeepsTheHalvesOfALightBehindAVerticalBarApart) {
+TEST(GroupPixelRuns, SeparatesHalvesOfLightBehindVerticalBar) {
   std::vector<vlp::Run> runs;
   for (int row = -30; row <= 30; ++row) {
     const int half = static_cast<int>(std::sqrt(31 * 31 - row * row));
@@ -66,7 +66,7 @@ TEST(GroupRuns, KeepsTheHalvesOfALightBehindAVerticalBarApart) {
   EXPECT_GE(blobs[1].runs[0].begin, 103);
 }
 
-TEST(GroupRuns, JoinsTwoBlobsByARunThatTouchesBoth) {
+TEST(GroupPixelRuns, JoinsBlobsConnectedByOneRun) {
   const auto runs = joined({rows(10, 20, 20, 40), rows(12, 20, 50, 70), rows(21, 22, 20, 70)});
   const auto blobs = group_runs(runs, 3);
   ASSERT_EQ(blobs.size(), 1U);
@@ -75,21 +75,21 @@ TEST(GroupRuns, JoinsTwoBlobsByARunThatTouchesBoth) {
   EXPECT_EQ(blobs[0].runs.size(), runs.size());
 }
 
-TEST(GroupRuns, JoinsTwoBlobsWhoseLastRowsDiffer) {
-  // A stripe of one has gone dark before the run that joins them.
+TEST(GroupPixelRuns, JoinsBlobsWithDifferentLastRows) {
+  // A stripe of one blob ends before the run that joins both.
   const auto runs = joined({rows(10, 14, 20, 40), rows(10, 18, 50, 70), rows(19, 20, 35, 55)});
   EXPECT_EQ(group_runs(runs, 3).size(), 2U);
   EXPECT_EQ(group_runs(runs, 4).size(), 1U);
 }
 
-TEST(GroupRuns, KeepsALightThatForksWhole) {
+TEST(GroupPixelRuns, ReturnsOneBlobForForkedLight) {
   const auto blobs =
       group_runs(joined({rows(10, 12, 20, 70), rows(13, 20, 20, 40), rows(13, 20, 50, 70)}), 3);
   ASSERT_EQ(blobs.size(), 1U);
   EXPECT_EQ(blobs[0].runs.size(), 19U);
 }
 
-TEST(GroupRuns, OrdersBlobsAndTheirRunsByPlace) {
+TEST(GroupPixelRuns, OrdersBlobsAndRunsByRowAndColumn) {
   const auto runs = joined({rows(10, 12, 60, 70), rows(10, 40, 20, 30), rows(3, 5, 90, 99),
                             rows(13, 20, 61, 130), rows(11, 12, 120, 125)});
   const auto blobs = group_runs(runs, 2);

@@ -16,13 +16,13 @@ namespace {
 
 constexpr int kAround_px = 64;
 
-/// The pixels of a view as an image of OpenCV.
+/// Returns the pixels of a view as an image of OpenCV.
 cv::Mat mat_of(const ImageView& view) {
   return {view.height, view.width, view.bits == 8 ? CV_8U : CV_16U, const_cast<void*>(view.data),
           std::size_t(view.stride)};
 }
 
-/// Dark, with noise, and some spots of light.
+/// Returns a dark image with noise and some spots of light.
 cv::Mat spots_on_dark(const cv::Size& size, int depth, int spots) {
   Random random(static_cast<std::uint64_t>(size.width));
   cv::Mat1d image(size);
@@ -52,11 +52,11 @@ void expect_turned(const cv::Mat& image, double threshold) {
       ASSERT_EQ(cv::countNonZero(lines(around) != all(around)), 0) << row << ", " << column;
     }
   }
-  // What is not turned is black and was dark.
+  // Pixels that are not transposed are black and were dark.
   const cv::Mat differs = lines != all;
   EXPECT_EQ(cv::countNonZero(differs & (lines != 0)), 0);
   EXPECT_EQ(cv::countNonZero(differs & bright), 0);
-  // Where nothing is lit nothing is looked for, and nothing is missed.
+  // Only lit tiles are searched, and no run is missed.
   const auto some = find_runs(found.pixels, threshold, found.lit);
   const auto every = find_runs(image_view(all), threshold);
   EXPECT_TRUE(std::equal(some.begin(), some.end(), every.begin(), every.end(),
@@ -65,12 +65,12 @@ void expect_turned(const cv::Mat& image, double threshold) {
                          }));
 }
 
-TEST(Lines, AreTheImageWhenRowsAreRead) {
+TEST(MakeScanlineImage, ReturnsSameImageForRowReadout) {
   const cv::Mat image = spots_on_dark({100, 70}, CV_8U, 3);
   EXPECT_EQ(lines_of(image_view(image), Readout::rows, {0, 1, 100}).pixels.data, image.data);
 }
 
-TEST(Lines, AreTheImageTurnedAroundAllThatIsBright) {
+TEST(MakeScanlineImage, TransposesTilesAroundLitPixels) {
   for (const cv::Size& size : {cv::Size(640, 448), cv::Size(601, 333), cv::Size(64, 64),
                                cv::Size(63, 65), cv::Size(1000, 7), cv::Size(1, 500)}) {
     for (const int spots : {1, 4, 20}) {
@@ -81,7 +81,7 @@ TEST(Lines, AreTheImageTurnedAroundAllThatIsBright) {
   }
 }
 
-TEST(Lines, AreAsDarkAsTheBackgroundAroundWhatIsBright) {
+TEST(MakeScanlineImage, FillsSurroundingsOfLightsWithBackgroundLevel) {
   for (const int depth : {CV_8U, CV_16U}) {
     const double white = depth == CV_8U ? 255 : 65535;
     cv::Mat image = spots_on_dark({2000, 1500}, depth, 0);
@@ -91,7 +91,7 @@ TEST(Lines, AreAsDarkAsTheBackgroundAroundWhatIsBright) {
     const cv::Mat lines = mat_of(found.pixels);
     EXPECT_EQ(lines.size(), cv::Size(1500, 2000));
     EXPECT_EQ(lines.type(), image.type());
-    // As far as it is large: 200 px, and more.
+    // The margin is the size of the light: at least 200 px.
     const cv::Rect around(light.y - 200, light.x - 200, light.height + 400, light.width + 400);
     const cv::Mat turned = image.t();
     const cv::Mat differs = lines(around) != turned(around), at_level = lines(around) == 7;
@@ -101,7 +101,7 @@ TEST(Lines, AreAsDarkAsTheBackgroundAroundWhatIsBright) {
   }
 }
 
-TEST(Lines, OfADarkImageAreBlackAlsoWithNoise) {
+TEST(MakeScanlineImage, ReturnsBlackImageWhenNoTileIsLit) {
   cv::Mat dark = spots_on_dark({601, 333}, CV_8U, 0);
   dark.at<std::uint8_t>(100, 200) = dark.at<std::uint8_t>(300, 500) = 200;  // no run of three
   const Lines lines = lines_of(image_view(dark), Readout::columns, {7.4, 1, 100});
@@ -110,7 +110,7 @@ TEST(Lines, OfADarkImageAreBlackAlsoWithNoise) {
   EXPECT_TRUE(find_runs(lines.pixels, 100, lines.lit).empty());
 }
 
-TEST(Lines, HaveTheRunThatTilesShare) {
+TEST(MakeScanlineImage, KeepsRunAcrossTileBorder) {
   cv::Mat image(200, 200, CV_8U, cv::Scalar(0));
   image.at<std::uint8_t>(63, 10) = image.at<std::uint8_t>(65, 10) = 200;
   const Lines lines = lines_of(image_view(image), Readout::columns, {0, 1, 100});
@@ -121,14 +121,15 @@ TEST(Lines, HaveTheRunThatTilesShare) {
   EXPECT_EQ(runs[0].end, 66);
 }
 
-/// The first of two places by row, then by column of the lines.
+/// Compares positions by row, then by column of the scanlines.
 bool before(const Light& a, const Light& b) {
   return a.pixel.x() != b.pixel.x() ? a.pixel.x() < b.pixel.x() : a.pixel.y() < b.pixel.y();
 }
 
-TEST(Lines, OfAFrameAndOfTheTurnedFrameShowTheSameLights) {
+TEST(MakeScanlineImage, YieldsSameLightsForTransposedImage) {
   Scene scene = read_scene(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml");
-  // The sample for the background takes other pixels of a turned image: they must be alike.
+  // The sample for the background uses other pixels of a transposed image; they must have the same
+  // levels.
   scene.ambient_e_per_s = 0;
   scene.sensor.shot_noise = false;
   scene.sensor.read_noise_e = 0;

@@ -31,7 +31,7 @@ int count(const TileMask& tiles) {
   return count;
 }
 
-TEST(LitTiles, HaveEveryLightOfTwoRowsInSuccession) {
+TEST(FindLitTiles, DetectsLightsOfTwoConsecutiveRows) {
   for (const int depth : {CV_8U, CV_16U}) {
     for (int y = 0; y + 2 <= 200; ++y) {
       for (const int x : {0, 63, 64, 130, 255, 256, 299}) {
@@ -46,7 +46,7 @@ TEST(LitTiles, HaveEveryLightOfTwoRowsInSuccession) {
   }
 }
 
-TEST(LitTiles, HaveStripesOfSingleRowsOverMoreThan16Rows) {
+TEST(FindLitTiles, DetectsSingleRowStripesOverMoreThan16Rows) {
   for (const int period : {2, 3, 4, 5, 6, 8}) {
     for (int y = 0; y < 128; ++y) {
       std::vector<cv::Rect> stripes;
@@ -59,19 +59,19 @@ TEST(LitTiles, HaveStripesOfSingleRowsOverMoreThan16Rows) {
   }
 }
 
-TEST(LitTiles, HaveNoPixelThatIsAlone) {
+TEST(FindLitTiles, IgnoresSinglePixels) {
   for (int y = 0; y < 200; ++y) {
     EXPECT_EQ(count(lit_tiles(image_view(with_light({{130, y, 1, 1}})), kThreshold)), 0) << y;
   }
 }
 
-TEST(LitTiles, AreNoneAtOrAboveWhite) {
+TEST(FindLitTiles, ReturnsNoTilesWhenThresholdIsWhiteOrHigher) {
   EXPECT_EQ(count(lit_tiles(image_view(with_light({{130, 80, 40, 40}})), 255)), 0);
   EXPECT_EQ(count(lit_tiles(image_view(with_light({{130, 80, 40, 40}})), 199.5)), 1);
   EXPECT_EQ(count(lit_tiles(image_view(with_light({{130, 80, 40, 40}})), 200)), 0);
 }
 
-TEST(GroupBoxes, AreAroundTilesThatTouchAlsoAtCorners) {
+TEST(FindGroupBoxes, JoinsTilesThatTouchAtCorners) {
   TileMask tiles(6, 5);
   for (const auto& [x, y] : {std::pair(1, 0), {2, 1}, {1, 2}, {5, 4}, {4, 4}}) tiles.row(y)[x] = 1;
   const auto boxes = group_boxes(tiles);

@@ -32,14 +32,14 @@ cv::Mat row_with(const std::vector<std::pair<int, int>>& lit, int depth = CV_8U,
   return row;
 }
 
-TEST(FindRuns, FindsTheLitPixelsOfEveryRowInOrder) {
+TEST(FindPixelRuns, ReturnsLitPixelsOfEachRowInOrder) {
   cv::Mat image;
   cv::vconcat(std::vector{row_with({{20, 30}, {50, 53}}), row_with({}), row_with({{5, 8}})}, image);
   EXPECT_THAT(find_runs(image_view(image), 100),
               ElementsAre(vlp::Run{0, 20, 30}, vlp::Run{0, 50, 53}, vlp::Run{2, 5, 8}));
 }
 
-TEST(FindRuns, PassesOverGapsOfUpToTwoPixels) {
+TEST(FindPixelRuns, BridgesGapsOfUpToTwoPixels) {
   EXPECT_THAT(find_runs(image_view(row_with({{20, 25}, {26, 30}})), 100),
               ElementsAre(vlp::Run{0, 20, 30}));
   EXPECT_THAT(find_runs(image_view(row_with({{20, 25}, {27, 30}})), 100),
@@ -48,14 +48,14 @@ TEST(FindRuns, PassesOverGapsOfUpToTwoPixels) {
               ElementsAre(vlp::Run{0, 20, 25}, vlp::Run{0, 28, 31}));
 }
 
-TEST(FindRuns, TakesOneOrTwoPixelsForNoise) {
+TEST(FindPixelRuns, RejectsRunsOfOneOrTwoPixels) {
   EXPECT_THAT(find_runs(image_view(row_with({{0, 1}, {20, 21}, {40, 42}, {198, 200}})), 100),
               IsEmpty());
   EXPECT_THAT(find_runs(image_view(row_with({{20, 23}, {40, 42}})), 100),
               ElementsAre(vlp::Run{0, 20, 23}));
 }
 
-TEST(FindRuns, FindsRunsWhereverTheyBeginAndEnd) {
+TEST(FindPixelRuns, DetectsRunsAtAllPositions) {
   // Blocks of 64 pixels begin and end among these.
   for (int begin = 0; begin < 197; ++begin) {
     for (const int width : {3, 64, 65, 130}) {
@@ -66,7 +66,7 @@ TEST(FindRuns, FindsRunsWhereverTheyBeginAndEnd) {
   }
 }
 
-TEST(FindRuns, PassesOverGapsBetweenBlocks) {
+TEST(FindPixelRuns, BridgesGapsAtTileBorders) {
   for (int gap = 60; gap < 68; ++gap) {
     EXPECT_THAT(find_runs(image_view(row_with({{50, gap}, {gap + 2, 90}})), 100),
                 ElementsAre(vlp::Run{0, 50, 90}));
@@ -75,26 +75,26 @@ TEST(FindRuns, PassesOverGapsBetweenBlocks) {
   }
 }
 
-TEST(FindRuns, DoesNotJoinRunsAcrossADarkBlock) {
+TEST(FindPixelRuns, SeparatesRunsAcrossDarkTile) {
   EXPECT_THAT(find_runs(image_view(row_with({{60, 64}, {128, 131}})), 100),
               ElementsAre(vlp::Run{0, 60, 64}, vlp::Run{0, 128, 131}));
 }
 
-TEST(FindRuns, TakesPixelsAboveTheThresholdOnly) {
+TEST(FindPixelRuns, RejectsPixelsAtThreshold) {
   const cv::Mat row = row_with({{20, 30}}, CV_8U, 10, 100);
   EXPECT_THAT(find_runs(image_view(row), 99.9), ElementsAre(vlp::Run{0, 20, 30}));
   EXPECT_THAT(find_runs(image_view(row), 100), IsEmpty());
   EXPECT_THAT(find_runs(image_view(row), 100.1), IsEmpty());
 }
 
-TEST(FindRuns, FindsRunsOf16Bits) {
+TEST(FindPixelRuns, DetectsRunsIn16BitImages) {
   const cv::Mat row = row_with({{20, 30}}, CV_16U, 3000, 40000);
   EXPECT_THAT(find_runs(image_view(row), 39999.5), ElementsAre(vlp::Run{0, 20, 30}));
   EXPECT_THAT(find_runs(image_view(row), 40000), IsEmpty());
   EXPECT_THAT(find_runs(image_view(row), 300), ElementsAre(vlp::Run{0, 0, 200}));
 }
 
-TEST(FindRuns, FindsNothingAboveWhite) {
+TEST(FindPixelRuns, ReturnsNoRunsWhenThresholdIsWhiteOrHigher) {
   for (const double threshold : {255.0, 257.5, 1e9}) {
     EXPECT_THAT(find_runs(image_view(row_with({{20, 30}}, CV_8U, 10, 255)), threshold), IsEmpty());
   }

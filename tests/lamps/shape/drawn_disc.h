@@ -13,32 +13,32 @@
 
 namespace vlp {
 
-constexpr double kDark = 0.04;  // of white
-/// Cosine between the row and the normal, from which on the first outline is good.
+constexpr double kDark = 0.04;  // fraction of white
+/// Minimum cosine between the row and the normal at which the unrefined outline is accurate.
 constexpr double kSteep = 0.75;
 
-/// A disc on a dark image of 200 x 160 pixels, blurred, seen by pixels that are lit all over. The
-/// blur is with theirs: 0.3 px or more.
+/// Blurred disc on a dark image of 200 x 160 pixels with a fill factor of 1. The blur includes that
+/// of the pixels: 0.3 px or more.
 struct DrawnDisc {
   Eigen::Vector2d center{101.3, 79.6};
   double radius_px = 38.4, blur_px = 0.8;
-  double level = 0.7;                  // of white, above the dark
-  double change = 0;                   // of the level, from the centre to the right rim
-  double fall = 0;                     // of the level, with the square of the radius, at the rim
-  std::vector<int> dark_columns = {};  // of a bar before it
-  /// More of the level above chips, of which so many pixels are from one to the next.
+  double level = 0.7;                  // fraction of white, above the dark level
+  double change = 0;                   // fraction of the level, from the center to the right rim
+  double fall = 0;                     // fraction of the level at the rim, grows as radius^2
+  std::vector<int> dark_columns = {};  // columns of an occluding bar
+  /// Additional fraction of the level above LED chips, and the distance between chips.
   double chips = 0, pitch_px = 6;
 
   Eigen::Vector2d low() const { return center - Eigen::Vector2d(radius_px, radius_px); }
   Eigen::Vector2d high() const { return center + Eigen::Vector2d(radius_px, radius_px); }
   double off(const Eigen::Vector2d& pixel) const { return (pixel - center).norm() - radius_px; }
-  /// Of the angle between the row and the outline's normal.
+  /// Returns the cosine of the angle between the row and the outline's normal.
   double cosine(const Eigen::Vector2d& pixel) const {
     return std::abs(pixel.x() - center.x()) / radius_px;
   }
   cv::Mat image(int depth) const {
     constexpr int finer = 8;
-    constexpr double pixels_own = 1 / 12.0;  // of their area, squared
+    constexpr double pixels_own = 1 / 12.0;  // variance of a pixel's area
     cv::Mat1d sharp(160 * finer, 200 * finer);
     for (int row = 0; row < sharp.rows; ++row) {
       for (int column = 0; column < sharp.cols; ++column) {
@@ -89,7 +89,7 @@ inline std::vector<EdgePoint> refined_in(const cv::Mat& image, const DrawnDisc& 
   return refined_outline_in(image, disc).points;
 }
 
-/// Where rows cut the outline more steeply than that.
+/// Returns the largest error of the points with at least this cosine between row and normal.
 inline double worst_off(const DrawnDisc& disc, const std::vector<EdgePoint>& points,
                         double least_cosine) {
   double worst = 0;

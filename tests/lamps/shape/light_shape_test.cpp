@@ -16,12 +16,12 @@ namespace {
 
 using Eigen::Vector2d;
 
-/// Behind a lens that bends lines, off the image's middle.
-class MovingDisc : public testing::Test {
+/// Moving disc off the image center, with a lens that distorts scanlines.
+class LightShapeOfMovingDisc : public testing::Test {
  protected:
-  MovingDisc() : shape(camera), center_px(*shape.pixel_of(circle.center)) {}
+  LightShapeOfMovingDisc() : shape(camera), center_px(*shape.pixel_of(circle.center)) {}
 
-  /// The rim, each point where it is while its line is read: at d + m (l - l_c).
+  /// Returns the rim with each point at its position when its scanline is read: at d + m (l - l_c).
   std::vector<EdgePoint> outline(const Vector2d& motion_per_line) const {
     constexpr int count = 120;
     std::vector<EdgePoint> points;
@@ -46,8 +46,8 @@ class MovingDisc : public testing::Test {
   Background dark{0, 1, 5};
 };
 
-TEST_F(MovingDisc, HasItsCentreWhereItIsWhileThatIsRead) {
-  // Of a lamp 2.5 m above a camera that drives at 2 m/s, rows of 30 us.
+TEST_F(LightShapeOfMovingDisc, CenterMatchesPositionAtReadoutOfCenterRow) {
+  // A lamp 2.5 m above a camera that moves at 2 m/s, with a row time of 30 us.
   for (const Vector2d& motion :
        {Vector2d(2.4e-5, 0), Vector2d(0, 2.4e-5), Vector2d(-1.5e-5, 2e-5)}) {
     auto light = shape.light_of(outline(motion), dark);
@@ -61,7 +61,7 @@ TEST_F(MovingDisc, HasItsCentreWhereItIsWhileThatIsRead) {
   }
 }
 
-TEST_F(MovingDisc, OfACameraThatStandsStays) {
+TEST_F(LightShapeOfMovingDisc, KeepsCenterForStationaryCamera) {
   auto light = shape.light_of(outline(Vector2d::Zero()), dark);
   ASSERT_TRUE(light);
   shape.shift({Vector2d::Zero(), 1e-12 * Matrix2::Identity()}, Vector2d::Zero(), *light);

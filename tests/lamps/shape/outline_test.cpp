@@ -14,7 +14,7 @@ namespace {
 
 using Eigen::Vector2d;
 
-TEST(Outline, LiesOnTheCircleOfADisc) {
+TEST(FindOutline, PointsLieOnCircleOfDisc) {
   for (const int depth : {CV_8U, CV_16U}) {
     for (const double blur_px : {0.6, 0.8}) {
       const DrawnDisc disc{.blur_px = blur_px};
@@ -25,7 +25,7 @@ TEST(Outline, LiesOnTheCircleOfADisc) {
   }
 }
 
-TEST(Outline, TellsBeginsFromEndsAndTheirLevelAndRise) {
+TEST(FindOutline, ReturnsSideLevelAndRiseOfEdges) {
   const DrawnDisc disc;
   const double rise_px = 2 * 0.6745 * disc.blur_px;  // between the quartiles of a normal curve
   for (const EdgePoint& point : outline_in(disc.image(CV_16U))) {
@@ -37,7 +37,7 @@ TEST(Outline, TellsBeginsFromEndsAndTheirLevelAndRise) {
   }
 }
 
-TEST(Outline, LeavesOutTheImagesEdge) {
+TEST(FindOutline, ExcludesImageBorder) {
   for (const double column : {25.0, 175.0}) {
     const DrawnDisc disc{.center = {column, 79.6}};
     const auto points = outline_in(disc.image(CV_16U));
@@ -54,7 +54,7 @@ TEST(Outline, LeavesOutTheImagesEdge) {
   EXPECT_TRUE(outline_in(cv::Mat(160, 200, CV_8U, cv::Scalar(9))).empty());
 }
 
-TEST(Outermost, LeavesOutTheEdgesOfABar) {
+TEST(SelectOutermost, ExcludesEdgesOfOccludingBar) {
   const DrawnDisc disc{.dark_columns = {95, 96, 97, 98, 99, 100}};
   const auto all = outline_in(disc.image(CV_16U));
   EXPECT_GT(worst_off(disc, all, 0), 10);
@@ -63,7 +63,7 @@ TEST(Outermost, LeavesOutTheEdgesOfABar) {
   EXPECT_LT(worst_off(disc, points, kSteep), 0.05);
 }
 
-TEST(Outermost, IsTheFirstBeginAndTheLastEndOfEachRow) {
+TEST(SelectOutermost, ReturnsFirstBeginAndLastEndOfEachRow) {
   const auto points = outermost({{{30, 5}, 1, 1, false},
                                  {{20, 4}, 1, 1, true},
                                  {{12, 5}, 1, 1, true},

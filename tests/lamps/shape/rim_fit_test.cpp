@@ -16,7 +16,8 @@ using Eigen::Vector2d;
 
 const Vector2d kShift(0.21, -0.13);
 
-/// Of a circle that is off by kShift and too small, bright on one side: there pieces are surer.
+/// Returns pieces of a circle that is displaced by kShift and too small. It is bright on one side,
+/// where pieces are more precise.
 std::vector<RimPiece> pieces_of_circle(int count, double noise, Random& random) {
   std::vector<RimPiece> pieces;
   for (int i = 0; i < count; ++i) {
@@ -29,7 +30,7 @@ std::vector<RimPiece> pieces_of_circle(int count, double noise, Random& random) 
   return pieces;
 }
 
-TEST(OutlineShift, IsExactWithoutNoise) {
+TEST(EstimateOutlineShift, IsExactWithoutNoise) {
   Random random(1);
   for (const bool round : {true, false}) {
     const auto shift = shift_of(pieces_of_circle(12, 0, random), round);
@@ -39,7 +40,7 @@ TEST(OutlineShift, IsExactWithoutNoise) {
   }
 }
 
-TEST(OutlineShift, StatesItsScatter) {
+TEST(EstimateOutlineShift, CovarianceMatchesScatter) {
   constexpr int draws = 4000;
   Random random(2);
   for (const bool round : {true, false}) {
@@ -51,13 +52,13 @@ TEST(OutlineShift, StatesItsScatter) {
         squares += (shift->px - kShift).squaredNorm();
         stated += shift->covariance.trace();
       }
-      // What scatters by chance less than stated makes none surer.
+      // A scatter below the given standard deviations does not reduce the covariance.
       EXPECT_NEAR(squares / stated, noise == 1 ? 0.9 : 1.15, 0.2) << round << ", " << noise;
     }
   }
 }
 
-TEST(OutlineShift, LeavesOutAPieceThatIsAnotherEdge) {
+TEST(EstimateOutlineShift, RejectsOutlierPiece) {
   Random random(3);
   auto pieces = pieces_of_circle(14, 1, random);
   pieces[3].behind_px += 2;
@@ -67,7 +68,7 @@ TEST(OutlineShift, LeavesOutAPieceThatIsAnotherEdge) {
   EXPECT_LT(shift->agreeing, 13);
 }
 
-TEST(OutlineShift, WantsMorePiecesThanUnknowns) {
+TEST(EstimateOutlineShift, ReturnsNulloptForTooFewPieces) {
   Random random(4);
   EXPECT_FALSE(shift_of(pieces_of_circle(4, 1, random), true));
   EXPECT_FALSE(shift_of(pieces_of_circle(6, 1, random), false));

@@ -34,7 +34,7 @@ std::optional<Rim> rim_in(const cv::Mat& pixels) {
                 LightShape(drawn_camera(kSize)));
 }
 
-/// A downlight whose core lies off the middle in that direction.
+/// Returns a downlight with a core off the middle in this direction.
 DrawnLamp downlight(double angle_rad, double period_lines) {
   DrawnRecess recess;
   recess.core_off_px = 16 * Vector2d(std::cos(angle_rad), std::sin(angle_rad));
@@ -60,7 +60,7 @@ void for_each_downlight(const Test& test) {
   }
 }
 
-TEST(Rim, IsThatOfADownlightWhereverItsCoreIs) {
+TEST(FitRim, MatchesDownlightForAllCorePositions) {
   double chi_square = 0, worst_px = 0, count = 0;
   for_each_downlight([&](const DrawnLamp& lamp, int depth, double noise, std::uint64_t seed) {
     const auto rim = rim_in(drawn({lamp}, kSize, depth, noise, seed));
@@ -78,7 +78,7 @@ TEST(Rim, IsThatOfADownlightWhereverItsCoreIs) {
   EXPECT_GT(chi_square / count, 0.1);
 }
 
-/// As a camera for people codes light.
+/// Applies the tone curve of a consumer camera.
 cv::Mat coded(const cv::Mat& image) {
   cv::Mat1b curve(1, 256);
   for (int i = 0; i < 256; ++i) {
@@ -89,7 +89,7 @@ cv::Mat coded(const cv::Mat& image) {
   return result;
 }
 
-TEST(Rim, IsNotDrawnTowardsTheCoreByAToneCurve) {
+TEST(FitRim, IsUnbiasedUnderToneCurve) {
   double towards_px = 0, squares = 0, chi_square = 0, worst = 0;
   int count = 0;
   for (const double period : {12.0, 17.0, 26.0, 33.0}) {
@@ -111,7 +111,7 @@ TEST(Rim, IsNotDrawnTowardsTheCoreByAToneCurve) {
   EXPECT_LT(worst, 6);
 }
 
-/// As such a camera shows what is brighter than white as well.
+/// Renders a lamp with the tone curve of a consumer camera; levels above white are clipped.
 cv::Mat1b coded_and_clipped(const DrawnLamp& lamp, double noise, Random& random) {
   cv::Mat1b image(kSize);
   for (int row = 0; row < image.rows; ++row) {
@@ -124,7 +124,7 @@ cv::Mat1b coded_and_clipped(const DrawnLamp& lamp, double noise, Random& random)
   return image;
 }
 
-TEST(Rim, IsNotDrawnTowardsWallsThatAreBrighterThanWhite) {
+TEST(FitRim, IsUnbiasedBesideSaturatedWalls) {
   Random random(1);
   for (const double white : {0.8, 1.5, 2.0, 4.0}) {
     double towards_px = 0, chi_square = 0, worst = 0;
@@ -152,7 +152,7 @@ TEST(Rim, IsNotDrawnTowardsWallsThatAreBrighterThanWhite) {
   }
 }
 
-TEST(Rim, IsSeenOfLargeDownlightsToo) {
+TEST(FitRim, DetectsClearRimOfLargeDownlights) {
   for (const double scale : {3.0, 7.0}) {
     DrawnLamp lamp = downlight(0.7, 40);
     lamp.center *= scale, lamp.radius_px *= scale;
@@ -169,7 +169,7 @@ TEST(Rim, IsSeenOfLargeDownlightsToo) {
   }
 }
 
-TEST(Rim, OfADownlightLeadsToItsLamp) {
+TEST(LightDetector, IdentifiesDownlights) {
   for_each_downlight([](const DrawnLamp& lamp, int depth, double noise, std::uint64_t seed) {
     const LampMap map{{drawn_lamp(7, lamp.stripes.period_lines), drawn_lamp(8, 14.5)}};
     const auto lights = LightDetector(map, drawn_camera(kSize))
@@ -181,13 +181,13 @@ TEST(Rim, OfADownlightLeadsToItsLamp) {
       EXPECT_EQ(lights[0].kind, LightKind::lamp);
       EXPECT_EQ(lights[0].lamp, 7);
     }
-    // Measured behind an envelope that falls to a tenth within two periods.
+    // The period is measured with an envelope that decreases to a tenth within two periods.
     EXPECT_NEAR(lights[0].stripes.period_lines / lamp.stripes.period_lines, 1, kLampDrift);
     EXPECT_LT((lights[0].pixel - lamp.center).norm(), 1);
   });
 }
 
-TEST(Rim, OfAGlowIsNotClear) {
+TEST(FitRim, ReportsNoClearRimForGlows) {
   for (const double period : {9.0, 14.5, 22.0}) {
     for (const double noise : {0.0, 0.5, 1.5}) {
       const DrawnLamp glow{
@@ -198,7 +198,7 @@ TEST(Rim, OfAGlowIsNotClear) {
   }
 }
 
-TEST(Rim, OfADiscIsItsEdge) {
+TEST(FitRim, MatchesEdgeOfDisc) {
   const DrawnLamp disc{.center = {151.3, 139.6}, .radius_px = 50.7};
   const auto rim = rim_in(drawn({disc}, kSize, CV_8U, 1));
   ASSERT_TRUE(rim);
@@ -206,12 +206,12 @@ TEST(Rim, OfADiscIsItsEdge) {
   EXPECT_LT((rim->light.pixel - disc.center).norm(), 0.2);
 }
 
-TEST(Rim, IsNotLookedForInSpecks) {
+TEST(FitRim, ReturnsNulloptForSmallBlob) {
   const DrawnLamp speck{.center = {151.3, 139.6}, .radius_px = 8};
   EXPECT_FALSE(rim_in(drawn({speck}, kSize, CV_8U)));
 }
 
-TEST(UnevenlyLit, IsADownlightAndNotADisc) {
+TEST(IsUnevenlyLit, DistinguishesDownlightsFromDiscs) {
   const auto uneven = [](const DrawnLamp& lamp, int depth) {
     const cv::Mat pixels = drawn({lamp}, kSize, depth, 1);
     const ImageView image = image_view(pixels);

@@ -39,7 +39,7 @@ Points with_line(Points points, std::size_t count, const Vector2d& begin, const 
   return points;
 }
 
-TEST(RobustCircle, IsTheCircleOfExactPoints) {
+TEST(FitRobustCircle, MatchesCircleOfExactPoints) {
   for (const Circle& truth : {Circle{{300, 200}, 40}, Circle{{-3, 2}, 6}}) {
     for (const std::size_t count : {5U, 6U, 20U, 300U}) {
       expect_found(arc(truth, 0.3, 0.3 + 2 * pi, count), truth, 1e-9, int(count));
@@ -47,7 +47,7 @@ TEST(RobustCircle, IsTheCircleOfExactPoints) {
   }
 }
 
-TEST(RobustCircle, IsTheCircleOfAnArc) {
+TEST(FitRobustCircle, MatchesCircleOfArc) {
   const Circle truth{{300, 200}, 40};
   for (const double arc_deg : {270.0, 180.0, 90.0}) {
     for (const double begin : {0.0, 1.0, 4.0}) {
@@ -56,17 +56,17 @@ TEST(RobustCircle, IsTheCircleOfAnArc) {
   }
 }
 
-TEST(RobustCircle, IsNotMovedByALineOfTwoFifthsOfThePoints) {
+TEST(FitRobustCircle, RejectsLineWithFortyPercentOfPoints) {
   const Circle truth{{300, 200}, 40};
-  // Beside the circle, along a chord's continuation, and away from a tangent.
+  // Next to the circle, and along the extension of a chord, away from a tangent.
   expect_found(with_line(arc(truth, 0, 2 * pi, 60), 40, {345, 100}, {345, 300}), truth, 1e-9, 60);
   expect_found(with_line(arc(truth, 0, 2 * pi, 60), 40, {345, 220}, {420, 260}), truth, 1e-9, 60);
-  // A lamp cut by a straight thing: half a circle and the chord.
+  // A lamp behind a straight occluder: half a circle and the chord.
   expect_found(with_line(arc(truth, 0.1, pi - 0.1, 60), 40, {265, 201}, {335, 201}), truth, 1e-9,
                60);
 }
 
-TEST(RobustCircle, HasTheCovarianceOfItsScatter) {
+TEST(FitRobustCircle, CovarianceMatchesScatter) {
   const Circle truth{{300, 200}, 40};
   for (const double arc_rad : {2 * pi, pi}) {
     Random random(5);
@@ -78,21 +78,21 @@ TEST(RobustCircle, HasTheCovarianceOfItsScatter) {
       const Vector2d error = fit->circle.center - truth.center;
       sum += error.dot(fit->center_covariance.llt().solve(error));
     }
-    // Chi-square with two degrees of freedom: its mean is 2, that of 2000 within 0.14 (3 sigma).
-    // The covariance is itself found from 80 points, which adds a few percent.
+    // Chi-square with two degrees of freedom has the mean 2, known within 0.14 (3 sigma) for 2000
+    // draws. The covariance is itself estimated from 80 points, which adds a few percent.
     EXPECT_NEAR(sum / draws, 2.06, 0.2) << arc_rad;
   }
 }
 
-TEST(RobustCircle, HasTheRmsOfTheScatter) {
+TEST(FitRobustCircle, RmsMatchesScatter) {
   Random random(6);
   const auto fit = circle_of(with_noise(arc({{300, 200}, 40}, 0, 2 * pi, 2000), 0.1, random));
   ASSERT_TRUE(fit);
   EXPECT_NEAR(fit->rms, 0.1, 0.005);
 }
 
-TEST(RobustCircle, FollowsTheWeights) {
-  // Two halves that differ by a little: the heavy one has the say.
+TEST(FitRobustCircle, UsesWeights) {
+  // Two parts that differ slightly: the one with large weights determines the fit.
   const Circle heavy{{300, 200}, 40};
   Points points = arc(heavy, 0, 1.5 * pi, 90);
   std::vector<double> weights(90, 1);
@@ -105,7 +105,7 @@ TEST(RobustCircle, FollowsTheWeights) {
   EXPECT_GT((circle_of(points)->circle.center - heavy.center).norm(), 0.02);
 }
 
-TEST(RobustCircle, IsTheSameEveryTime) {
+TEST(FitRobustCircle, IsDeterministic) {
   Random random(3);
   const Points points =
       with_line(with_noise(arc({{300, 200}, 40}, 0, 4, 60), 0.1, random), 30, {0, 0}, {300, 200});
@@ -116,7 +116,7 @@ TEST(RobustCircle, IsTheSameEveryTime) {
   EXPECT_EQ(one->inliers, other->inliers);
 }
 
-TEST(RobustCircle, IsNothingWithoutFivePointsThatAgree) {
+TEST(FitRobustCircle, ReturnsNulloptForLessThanFiveInliers) {
   for (const std::size_t count : {0U, 1U, 3U, 4U}) {
     EXPECT_FALSE(circle_of(arc({{300, 200}, 40}, 0, 2 * pi, count))) << count;
   }
@@ -124,7 +124,7 @@ TEST(RobustCircle, IsNothingWithoutFivePointsThatAgree) {
   EXPECT_FALSE(circle_of({{0, 0}, {100, 3}, {52, 71}, {-20, 55}, {33, 150}, {150, 90}, {7, 99}}));
 }
 
-TEST(RobustCircle, IsNothingForPointsOnALine) {
+TEST(FitRobustCircle, ReturnsNulloptForCollinearPoints) {
   EXPECT_FALSE(circle_of(with_line({}, 50, {0, 0}, {300, 200})));
   EXPECT_FALSE(circle_of(with_line({}, 5, {3, 0}, {3, 10})));
 }

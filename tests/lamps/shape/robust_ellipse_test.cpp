@@ -54,7 +54,7 @@ void expect_found(const Points& points, const Ellipse& truth, double within, int
   EXPECT_EQ(std::count(fit->inliers.begin(), fit->inliers.end(), true), count);
 }
 
-TEST(RobustEllipse, IsTheEllipseOfExactPoints) {
+TEST(FitRobustEllipse, MatchesEllipseOfExactPoints) {
   for (const double ratio : {1.0, 1.03, 1.08, 1.15}) {
     for (int degrees = 0; degrees < 180; degrees += 15) {
       SCOPED_TRACE(testing::Message() << ratio << " at " << degrees);
@@ -65,7 +65,7 @@ TEST(RobustEllipse, IsTheEllipseOfExactPoints) {
   }
 }
 
-TEST(RobustEllipse, IsNotMovedByOutliers) {
+TEST(FitRobustEllipse, RejectsOutliers) {
   Random random(4);
   for (const double ratio : {1.0, 1.07, 1.15}) {
     for (const int outliers : {10, 20, 30}) {
@@ -73,7 +73,7 @@ TEST(RobustEllipse, IsNotMovedByOutliers) {
         SCOPED_TRACE(testing::Message() << ratio << ", " << outliers << " % at " << degrees);
         const Ellipse truth = ellipse_of(ratio, degrees * pi / 180);
         Points points = truth.points(std::size_t(100 - outliers));
-        for (int i = 0; i < outliers; ++i) {  // from 0.3 to 0.9 of the way to the rim, or outside
+        for (int i = 0; i < outliers; ++i) {  // at 0.3 to 0.9 of the radius, or outside
           const double angle = random.uniform(0, 2 * pi), away = random.uniform(0.3, 0.9);
           const Vector2d rim = truth.rim_from_circle() * Vector2d(std::cos(angle), std::sin(angle));
           points.push_back(truth.center + (i % 3 == 0 ? 2 - away : away) * rim);
@@ -84,7 +84,7 @@ TEST(RobustEllipse, IsNotMovedByOutliers) {
   }
 }
 
-TEST(RobustEllipse, HasTheCovarianceOfItsScatter) {
+TEST(FitRobustEllipse, CovarianceMatchesScatter) {
   for (const double ratio : {1.0, 1.1}) {
     const Ellipse truth = ellipse_of(ratio, 0.6);
     for (const double arc_rad : {2 * pi, 1.3 * pi}) {
@@ -97,14 +97,14 @@ TEST(RobustEllipse, HasTheCovarianceOfItsScatter) {
         const Vector2d error = fit->center - truth.center;
         sum += error.dot(fit->center_covariance.llt().solve(error));
       }
-      // Chi-square with two degrees of freedom: its mean is 2, that of 2000 within 0.14 (3 sigma).
-      // The covariance is itself found from 80 points, which adds a few percent.
+      // Chi-square with two degrees of freedom has the mean 2, known within 0.14 (3 sigma) for 2000
+      // draws. The covariance is itself estimated from 80 points, which adds a few percent.
       EXPECT_NEAR(sum / draws, 2.06, 0.2) << ratio << ", " << arc_rad;
     }
   }
 }
 
-TEST(RobustEllipse, IsWhatOpenCvFindsWithoutOutliers) {
+TEST(FitRobustEllipse, MatchesOpenCvWithoutOutliers) {
   Random random(8);
   for (int degrees = 0; degrees < 180; degrees += 20) {
     const Ellipse truth = ellipse_of(1.12, degrees * pi / 180);
@@ -120,7 +120,7 @@ TEST(RobustEllipse, IsWhatOpenCvFindsWithoutOutliers) {
   }
 }
 
-TEST(RobustEllipse, OfACircleIsAsGoodAsTheCircle) {
+TEST(FitRobustEllipse, MatchesAccuracyOfCircleFitForCircles) {
   Random random(9);
   const Circle truth{{300, 200}, 40};
   double of_circle = 0, of_ellipse = 0;
@@ -136,7 +136,7 @@ TEST(RobustEllipse, OfACircleIsAsGoodAsTheCircle) {
   EXPECT_NEAR(of_ellipse / of_circle, 1, 0.05);
 }
 
-TEST(RobustEllipse, IsNothingWithoutSevenPointsThatAgree) {
+TEST(FitRobustEllipse, ReturnsNulloptForLessThanSevenInliers) {
   const Ellipse truth = ellipse_of(1.05, 0.3);
   for (const std::size_t count : {0U, 1U, 4U, 5U, 6U})
     EXPECT_FALSE(ellipse_of(truth.points(count)));
@@ -145,7 +145,7 @@ TEST(RobustEllipse, IsNothingWithoutSevenPointsThatAgree) {
   EXPECT_FALSE(ellipse_of({{0, 0}, {3, 2}, {6, 4}, {9, 6}, {12, 8}, {15, 10}, {18, 12}, {21, 14}}));
 }
 
-TEST(SlenderEllipse, IsFoundExactly) {
+TEST(FitSlenderEllipse, MatchesEllipseOfExactPoints) {
   for (const double ratio : {1.0, 3.0, 6.0, 12.0}) {
     for (const double degrees : {0.0, 30.0, 90.0, 140.0}) {
       const Ellipse truth = ellipse_of(ratio, degrees * pi / 180);
@@ -161,7 +161,7 @@ TEST(SlenderEllipse, IsFoundExactly) {
   EXPECT_FALSE(fit_slender_ellipse(line, std::vector<double>(line.size(), 1), 0.35));
 }
 
-TEST(SlenderEllipse, HasTheScatterThatItStates) {
+TEST(FitSlenderEllipse, CovarianceMatchesScatter) {
   Random random(9);
   const Ellipse truth = ellipse_of(6, 0.6);
   double chi_square = 0;

@@ -17,17 +17,19 @@ namespace {
 using Eigen::Vector2d;
 using std::numbers::pi;
 
-/// Of a level camera with a focal length of 600 px: lines per unit of the level plane.
+/// Line slope of a level camera with a focal length of 600 px: scanlines per unit of the level
+/// plane.
 const Vector2d kLineSlope(0, 600);
 constexpr double kRadius = 0.08;
 
-/// As a shutter sees the rim of a disc whose centre moves by `motion` while a line is read.
+/// Returns the rim of a disc as a rolling shutter records it. The center moves by `motion` per
+/// scanline.
 Points read_line_by_line(Points points, const Vector2d& center, const Vector2d& motion) {
   for (Vector2d& point : points) point += motion * kLineSlope.dot(point - center);
   return points;
 }
 
-/// A camera that drives and turns, and so many radians of the rim of the light there.
+/// Camera that translates and rotates, and the outlines of lights that it records.
 class Room {
  public:
   Vector2d motion_at(const Vector2d& center) const {
@@ -53,7 +55,7 @@ std::vector<OutlineSums> three_whole(const Room& room, Random& random) {
           room.seen({0.1, -0.4}, 2 * pi, random)};
 }
 
-TEST(Shear, OfACameraThatDrivesAndTurnsIsThatOfItsMotion) {
+TEST(Shear, MatchesMotionOfTranslatingAndRotatingCamera) {
   Random random(1);
   const Room room;
   const auto lights = three_whole(room, random);
@@ -68,7 +70,7 @@ TEST(Shear, OfACameraThatDrivesAndTurnsIsThatOfItsMotion) {
   EXPECT_THAT(shear->motion_at(room.seen(at, 2 * pi, random)), IsNear(motion, 1e-6));
 }
 
-TEST(Shear, PutsTheCentreOfAPartWhereThatOfTheWholeIs) {
+TEST(Shear, CorrectsCenterOfPartialOutline) {
   Random random(2);
   const Room room;
   const Vector2d center(-0.3, -0.3);
@@ -90,12 +92,12 @@ TEST(Shear, PutsTheCentreOfAPartWhereThatOfTheWholeIs) {
         error.dot(found->covariance.topLeftCorner<2, 2>().inverse() * error) / (2 * trials);
   }
   EXPECT_LT(std::sqrt(squared), 0.15 * std::sqrt(circle_squared));
-  // The part that lamps at other heights might have, and these have not, counts as an error, too.
+  // The error allowed for lamps at other heights, which these lamps do not have, is included.
   EXPECT_GT(chi_square, 0.1);
   EXPECT_LT(chi_square, 1.3);
 }
 
-TEST(Shear, IsNoneOfACameraThatStands) {
+TEST(Shear, ReturnsNulloptForStationaryCamera) {
   Random random(3);
   Room room;
   room.v.setZero();
@@ -107,7 +109,7 @@ TEST(Shear, IsNoneOfACameraThatStands) {
   EXPECT_EQ(found, 0);
 }
 
-TEST(Shear, IsNotTakenFromALightThatContradictsTheOthers) {
+TEST(Shear, RejectsContradictingLight) {
   Random random(4);
   const Room room;
   auto lights = three_whole(room, random);
@@ -121,9 +123,9 @@ TEST(Shear, IsNotTakenFromALightThatContradictsTheOthers) {
               IsNear(300 * Vector2d(-motion.y(), motion.x()), 5e-4));
 }
 
-TEST(Shear, IsNoneWithoutLights) {
+TEST(Shear, ReturnsNulloptWithoutUsableLights) {
   EXPECT_FALSE(Shear::common({}));
-  // Three points of an outline tell nothing.
+  // Three points of an outline do not determine the motion.
   const Points points{{1, 0}, {0, 1}, {-1, 0}};
   const OutlineSums few(points, std::vector<double>{1, 1, 1}, {true, true, true}, {{0, 0}, 1},
                         kLineSlope);

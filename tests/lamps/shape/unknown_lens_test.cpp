@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Centres of ellipses in the image against the images of discs' centres.
+/// Centers of ellipses in the image compared with the images of discs' centers.
 #include "lamps/shape/unknown_lens.h"
 
 #include <gtest/gtest.h>
@@ -17,10 +17,10 @@ namespace vlp {
 namespace {
 
 constexpr ImageSize kUnknownLensImage{800, 600};
-constexpr double kHalf_px = 500;  // of its diagonal
+constexpr double kHalf_px = 500;  // half of its diagonal
 
-/// A disc on a ceiling, seen by a camera that leans by that towards x, with a lens that has its
-/// axis in the middle of the image. Places and radii on the ceiling are slopes.
+/// Image of a disc on a ceiling, for a camera tilted towards x, with a lens whose axis is at the
+/// image center. Positions and radii on the ceiling are slopes.
 struct SeenDisc {
   Eigen::Vector2d shift_px, pixel;
   double radius_px;
@@ -48,7 +48,7 @@ std::optional<SeenDisc> seen(const Lens& lens, double lean_rad, const Eigen::Vec
                   std::sqrt(fit->rim_from_circle.determinant())};
 }
 
-/// The bound on the shift: the standard deviation is per axis.
+/// Returns the bound on the shift: the standard deviation is per axis.
 double bound_px(const SeenDisc& disc) {
   Light light{};
   light.pixel = disc.pixel;
@@ -63,7 +63,7 @@ Lens lens_of(LensModel model, double focal_px, std::vector<double> coefficients)
   return Lens(model, parameters);
 }
 
-TEST(UnknownLens, HoldsForTheEquidistantLensOfItsBound) {
+TEST(UnknownLensSd, CoversEquidistantLens) {
   const Lens equidistant = lens_of(LensModel::fisheye, kHalf_px, {0, 0, 0, 0});
   int discs = 0;
   for (const double off_axis : {0.1, 0.3, 0.5, 0.7, 0.9}) {
@@ -81,11 +81,11 @@ TEST(UnknownLens, HoldsForTheEquidistantLensOfItsBound) {
   EXPECT_EQ(discs, 15);
 }
 
-TEST(UnknownLens, HoldsForACameraThatLeans) {
+TEST(UnknownLensSd, CoversTiltedCamera) {
   const Lens pinhole = lens_of(LensModel::pinhole, kHalf_px, {});
   for (const double lean_deg : {2.0, 5.0, 10.0}) {
     const double lean_rad = rad_from_deg(lean_deg);
-    // In the middle of the image.
+    // The disc is at the image center.
     const auto disc = seen(pinhole, lean_rad, {-std::tan(lean_rad), 0}, 0.06);
     ASSERT_TRUE(disc);
     EXPECT_LT(disc->shift_px.norm(), 1.03 * bound_px(*disc));
@@ -94,7 +94,7 @@ TEST(UnknownLens, HoldsForACameraThatLeans) {
   }
 }
 
-TEST(UnknownLens, GrowsWithTheDiscAndWithItsDistanceFromTheMiddle) {
+TEST(UnknownLensSd, IncreasesWithRadiusAndDistanceFromImageCenter) {
   Light light{};
   light.pixel = {399.5, 299.5};
   light.radius_px = 30;
@@ -108,7 +108,7 @@ TEST(UnknownLens, GrowsWithTheDiscAndWithItsDistanceFromTheMiddle) {
   EXPECT_EQ(unknown_lens_sd_px(light, kUnknownLensImage), 0) << "a rectangle's edges say it";
 }
 
-/// Discs of a scene without its lens: their errors over what is stated of them.
+/// Returns the score of a scene without its lens: errors relative to the reported sigma.
 Score without_lens(const std::string& scene, std::size_t step) {
   const Captures captures(scene, "check");
   DetectorCamera camera = detector_camera(captures.calibration());
@@ -116,7 +116,7 @@ Score without_lens(const std::string& scene, std::size_t step) {
   return captures.score(step, LightDetector(captures.lamps(), camera));
 }
 
-TEST(UnknownLens, IsInWhatCentresWithoutOneState) {
+TEST(LightDetector, SigmaCoversUnknownLens) {
   for (const auto& [scene, step] :
        {std::pair("paper-rig", 12), {"paper-rig-faulty", 24}, {"wide", 16}}) {
     const Score score = without_lens(scene, std::size_t(step));

@@ -27,7 +27,7 @@ double coherence_of_drawn(const DrawnLamp& lamp) {
   return coherence_in(drawn({lamp}, kPictureSize, CV_16U, 0.5), lamp);
 }
 
-TEST(Coherence, IsNearOneOfALampHoweverItIsLit) {
+TEST(ComputeCoherence, ReturnsNearlyOneForLampsOfAnyShape) {
   for (const double period : {3.7, 11.0, 40.0}) {
     EXPECT_GT(coherence_of_drawn(DrawnLamp{.stripes = {.period_lines = period}}), 0.99) << period;
   }
@@ -35,12 +35,12 @@ TEST(Coherence, IsNearOneOfALampHoweverItIsLit) {
   EXPECT_GT(coherence_of_drawn(DrawnLamp{.recess = DrawnRecess{}}), 0.97);
 }
 
-TEST(Coherence, LeavesOneHiddenPartOut) {
+TEST(ComputeCoherence, IgnoresOneHiddenPart) {
   const DrawnBar bar{std::numbers::pi / 2, 20, 14};
   EXPECT_GT(coherence_of_drawn(DrawnLamp{.bar = bar}), 0.9);
 }
 
-TEST(Coherence, IsLostWhenBarsLean) {
+TEST(ComputeCoherence, RejectsTiltedBars) {
   const auto of_leaning = [](double degrees) {
     DrawnLamp lamp;
     lamp.stripes.period_lines = 0.9 * lamp.radius_px;  // two periods
@@ -61,8 +61,8 @@ TEST(Coherence, IsLostWhenBarsLean) {
   EXPECT_LT(of_leaning(12), kMinCoherence);
 }
 
-TEST(Coherence, IsSeldomReachedByPartsThatVaryEachInItsWay) {
-  // Patches a quarter of a period high, and as wide as a part.
+TEST(ComputeCoherence, RejectsIndependentParts) {
+  // Patches with the height of a quarter of a period and the width of a part.
   constexpr int trials = 2000, patch = 6;
   Random random(5);
   int coherent = 0;
@@ -80,7 +80,7 @@ TEST(Coherence, IsSeldomReachedByPartsThatVaryEachInItsWay) {
   EXPECT_LE(coherent, 10);
 }
 
-TEST(Coherence, OfTooFewLinesIsNone) {
+TEST(ComputeCoherence, ReturnsZeroForTooFewLines) {
   const DrawnLamp lamp{.stripes = {.period_lines = 170}};
   EXPECT_EQ(coherence_of_drawn(lamp), 0);
   const cv::Mat pixels(120, 120, CV_8U, cv::Scalar(10));

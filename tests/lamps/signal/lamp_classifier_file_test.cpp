@@ -22,7 +22,7 @@ LampClassifier sample() {
   return classifier;
 }
 
-TEST(LampClassifierFile, ReadsWhatItWrote) {
+TEST(LampClassifierFile, ReadReturnsWrittenClassifier) {
   const TemporaryFolder folder;
   write_lamp_classifier(folder / "a.yaml", sample());
   const LampClassifier read = read_lamp_classifier(folder / "a.yaml");
@@ -39,7 +39,7 @@ TEST(LampClassifierFile, ReadsWhatItWrote) {
             TemporaryFolder::content_of(folder / "b.yaml"));
 }
 
-TEST(LampClassifierFile, RefusesWhatIsWrong) {
+TEST(ReadLampClassifier, ThrowsForInvalidFile) {
   const TemporaryFolder folder;
   write_lamp_classifier(folder / "good.yaml", sample());
   const std::string good = TemporaryFolder::content_of(folder / "good.yaml");
@@ -64,7 +64,7 @@ TEST(LampClassifierFile, RefusesWhatIsWrong) {
   EXPECT_THAT(refusal("scale:", "scales:"), HasSubstr("scale"));
 }
 
-TEST(LampClassifierFile, IsNotReadWhenItIsCutShort) {
+TEST(ReadLampClassifier, ThrowsForTruncatedFile) {
   const TemporaryFolder folder;
   write_lamp_classifier(folder / "good.yaml", sample());
   const std::string good = TemporaryFolder::content_of(folder / "good.yaml");

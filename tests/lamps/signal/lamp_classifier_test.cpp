@@ -17,7 +17,7 @@ struct Made {
   double period_lines, duty;
 };
 
-/// Lights of lamps in the sizes and phases that a room shows, a lamp of each in every image.
+/// Returns lights of lamps in typical sizes and phases, one of each lamp in every image.
 std::vector<LabelledLight> lights_of(const std::vector<Made>& lamps, std::size_t images,
                                      std::uint64_t seed) {
   Random random(seed);
@@ -35,10 +35,10 @@ std::vector<LabelledLight> lights_of(const std::vector<Made>& lamps, std::size_t
 }
 
 const std::vector<Made> kLamps{{4, 16.7, 0.5}, {7, 13.3, 0.5}, {9, 10.8, 0.5}};
-/// Two of one period, told apart by their duty alone.
+/// Two lamps of the same period, which only their duty distinguishes.
 const std::vector<Made> kTwins{{1, 12, 0.35}, {2, 12, 0.7}};
 
-TEST(LampClassifier, KnowsTheLampsThatItWasTrainedOn) {
+TEST(LampClassifier, IdentifiesTrainedLamps) {
   const LampClassifier classifier = train_classifier(lights_of(kLamps, 30, 1));
   ASSERT_EQ(classifier.lamps.size(), 3);
   EXPECT_EQ(classifier.lamps[0].lamp, 4);
@@ -50,21 +50,21 @@ TEST(LampClassifier, KnowsTheLampsThatItWasTrainedOn) {
   EXPECT_TRUE(inseparable(classifier).empty());
 }
 
-TEST(LampClassifier, TellsLampsOfOnePeriodApartByTheirDuty) {
+TEST(LampClassifier, SeparatesLampsOfEqualPeriodByDuty) {
   const LampClassifier classifier = train_classifier(lights_of(kTwins, 40, 1));
   const Confusion confusion = confusion_of(classifier, lights_of(kTwins, 100, 2));
   EXPECT_EQ(confusion.wrong(), 0);
   EXPECT_GE(confusion.right(), 150) << confusion.counts;
 }
 
-TEST(LampClassifier, CallsAnUnknownLampUnknown) {
+TEST(LampClassifier, ReportsUnknownForUntrainedLamps) {
   const LampClassifier classifier = train_classifier(lights_of(kLamps, 30, 1));
   const Confusion confusion =
       confusion_of(classifier, lights_of({{5, 11.9, 0.5}, {6, 6, 0.5}}, 50, 2));
   EXPECT_EQ(confusion.unknown(), 100);
 }
 
-TEST(LampClassifier, CallsLampsUnknownThatAreAlike) {
+TEST(LampClassifier, ReportsUnknownForInseparableLamps) {
   const std::vector<Made> alike{{4, 16.7, 0.5}, {7, 13.3, 0.5}, {9, 13.35, 0.5}};
   const LampClassifier classifier = train_classifier(lights_of(alike, 30, 1));
   const Confusion confusion = confusion_of(classifier, lights_of(alike, 100, 2));
@@ -76,7 +76,7 @@ TEST(LampClassifier, CallsLampsUnknownThatAreAlike) {
   EXPECT_EQ(pairs[0].second, 9);
 }
 
-TEST(LampClassifier, IsNotMisledByAFewWrongLabels) {
+TEST(TrainClassifier, RejectsWrongLabels) {
   auto lights = lights_of(kLamps, 30, 1);
   lights[0].lamp = 9, lights[4].lamp = 4, lights[8].lamp = 7;
   const LampClassifier classifier = train_classifier(lights);
@@ -89,7 +89,7 @@ TEST(LampClassifier, IsNotMisledByAFewWrongLabels) {
   EXPECT_GE(confusion.right(), 297);
 }
 
-TEST(LampClassifier, TakesUnclearStripesOnlyVeryNearALamp) {
+TEST(LampClassifier, AcceptsUnclearStripesOnlyCloseToLamp) {
   const LampClassifier classifier = train_classifier(lights_of(kLamps, 30, 1));
   Stripes stripes = lights_of(kLamps, 1, 3)[1].stripes;
   ASSERT_EQ(lamp_of(classifier, stripes), 7);
@@ -99,7 +99,7 @@ TEST(LampClassifier, TakesUnclearStripesOnlyVeryNearALamp) {
   EXPECT_EQ(lamp_of(classifier, stripes), std::nullopt);
 }
 
-TEST(LampClassifier, DoesNotDependOnTheOrderOfTheLights) {
+TEST(TrainClassifier, IsIndependentOfOrderOfLights) {
   auto lights = lights_of(kLamps, 20, 1);
   const LampClassifier a = train_classifier(lights);
   std::reverse(lights.begin(), lights.end());
@@ -111,15 +111,16 @@ TEST(LampClassifier, DoesNotDependOnTheOrderOfTheLights) {
   }
 }
 
-TEST(CrossValidation, JudgesEachLightOnce) {
+TEST(CrossValidate, CountsEachLightOnce) {
   const Confusion confusion = cross_validated(lights_of(kLamps, 40, 1), train_classifier);
   EXPECT_EQ(confusion.counts.sum(), 120);
   EXPECT_EQ(confusion.wrong(), 0);
   EXPECT_GE(confusion.right(), 117);
 }
 
-TEST(CrossValidation, HoldsOutWhatItJudges) {
-  // All of lamp 9 in one fifth of the images: whoever judges them has never seen it.
+TEST(CrossValidate, ExcludesHeldOutImagesFromTraining) {
+  // All lights of lamp 9 are in one fifth of the images: the classifier for this fold was not
+  // trained on lamp 9.
   auto lights = lights_of(kLamps, 40, 1);
   std::erase_if(lights,
                 [](const LabelledLight& light) { return light.lamp == 9 && light.image % 5 != 0; });
@@ -128,7 +129,7 @@ TEST(CrossValidation, HoldsOutWhatItJudges) {
   EXPECT_EQ(confusion.counts(2, 3), 8);
 }
 
-TEST(CrossValidation, IsOfTheClassifierThatIsGiven) {
+TEST(CrossValidate, UsesGivenTrainingFunction) {
   const auto mistaken = [](std::span<const LabelledLight> lights) {
     LampClassifier classifier = train_classifier(lights);
     std::swap(classifier.lamps.front().lamp, classifier.lamps.back().lamp);

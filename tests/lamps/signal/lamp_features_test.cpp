@@ -11,7 +11,7 @@
 namespace vlp {
 namespace {
 
-TEST(LampFeatures, AreThoseOfTheStripes) {
+TEST(ComputeLampFeatures, ReturnsFeaturesOfStripes) {
   Stripes stripes{};
   stripes.period_lines = 12;
   stripes.duty = 0.4;
@@ -21,7 +21,7 @@ TEST(LampFeatures, AreThoseOfTheStripes) {
   EXPECT_EQ(kLampFeatures[0], "log_period_lines");
 }
 
-TEST(LampFeatures, DoNotDependOnTheDistance) {
+TEST(ComputeLampFeatures, IsIndependentOfDistance) {
   Random random(7);
   for (const int lines : {60, 90, 120, 180}) {
     for (const double duty : {0.35, 0.6}) {
@@ -38,14 +38,14 @@ TEST(LampFeatures, DoNotDependOnTheDistance) {
   }
 }
 
-TEST(LampFeatures, CountWholeStripesByHalves) {
+TEST(MeasureStripes, CountsStripesInStepsOfHalf) {
   // 60 lines, lit from 5 to 9, 15 to 19 and so on: six begins, five or six ends.
   std::vector<double> signal(60, 0);
   for (std::size_t i = 0; i < signal.size(); ++i) signal[i] = i % 10 >= 5 ? 100 : 0;
   EXPECT_NEAR(stripes_of(signal).count_per_line, 11.0 / 2 / 60, 1e-12);
 }
 
-TEST(LampFeatures, MeasureTheLitAreaOfTheDisc) {
+TEST(MeasureStripes, ComputesLitAreaOfDisc) {
   // The upper half is lit, then the half in the middle, where the chords are longer.
   std::vector<double> half(80, 0), middle(80, 0);
   for (std::size_t i = 0; i < 80; ++i) {
@@ -53,7 +53,7 @@ TEST(LampFeatures, MeasureTheLitAreaOfTheDisc) {
     middle[i] = i >= 20 && i < 60 ? 100 : 0;
   }
   EXPECT_NEAR(stripes_of(half).lit_area, 0.5, 1e-12);
-  // Of chords sqrt(1 - y^2) over |y| < 0.45, over those over |y| < 0.9.
+  // Area of the chords sqrt(1 - y^2) for |y| < 0.45, divided by that for |y| < 0.9.
   const auto area = [](double y) { return y * std::sqrt(1 - y * y) + std::asin(y); };
   EXPECT_NEAR(stripes_of(middle).lit_area, area(0.45) / area(0.9), 1e-3);
 }

@@ -17,7 +17,7 @@ Lamp lamp(int id, double frequency_hz, std::optional<double> duty = 0.5) {
   return {id, {double(id), 0, 1.6}, make_disc(0.18), frequency_hz, duty};
 }
 
-/// Of many measurements, over what period_sd() says.
+/// Returns the ratio of the RMS error of many measured periods to period_sd().
 double measured_over_stated(double period, double lines, double exposure_lines) {
   Random random(5);
   constexpr int draws = 300;
@@ -31,7 +31,7 @@ double measured_over_stated(double period, double lines, double exposure_lines) 
   return std::sqrt(squares / draws) / period_sd(period, lines, exposure_lines);
 }
 
-TEST(PeriodSd, IsWhatIsMeasured) {
+TEST(PredictPeriodSd, MatchesMeasuredErrors) {
   for (const double lines : {40.0, 60.0, 100.0}) {
     for (const double period : {9.3, 20.8}) {
       for (const double exposure_lines : {0.02, 0.5, 1.0, 1.67, 4.0}) {
@@ -45,18 +45,18 @@ TEST(PeriodSd, IsWhatIsMeasured) {
   }
 }
 
-TEST(PeriodSd, IsABoundForPeriodsOfWholeLines) {
+TEST(PredictPeriodSd, BoundsErrorsForIntegerPeriods) {
   for (const double period : {5.0, 14.0}) {
     EXPECT_LT(measured_over_stated(period, 60, 0.02), 1.1);
     EXPECT_LT(measured_over_stated(period, 60, 1.67), 1.1);
   }
 }
 
-TEST(PeriodSd, IsInfiniteWithoutAPeriod) {
+TEST(PredictPeriodSd, ReturnsInfinityForTooFewPeriods) {
   EXPECT_EQ(period_sd(40, 50, 1), std::numeric_limits<double>::infinity());
 }
 
-TEST(LampMapCheck, CountsTheLinesOnALamp) {
+TEST(ComputeLinesOnLamp, ComputesNumberOfLines) {
   EXPECT_NEAR(lines_on(lamp(1, 2000), kConditions).value(), 58.5, 1e-9);
   Lamp unknown = lamp(1, 2000);
   unknown.shape.size_m.reset();
@@ -66,7 +66,7 @@ TEST(LampMapCheck, CountsTheLinesOnALamp) {
   EXPECT_FALSE(lines_on(lamp(1, 2000), above));
 }
 
-TEST(LampMapCheck, NamesLampsOfNearlyOneFrequency) {
+TEST(FindAmbiguousLamps, ReportsLampsOfNearlyEqualFrequency) {
   const LampMap map{{lamp(1, 2000), lamp(2, 2500), lamp(3, 2530), lamp(4, 3100)}};
   const auto pairs = lamps_alike(map, kConditions);
   ASSERT_EQ(pairs.size(), 1);
@@ -76,13 +76,13 @@ TEST(LampMapCheck, NamesLampsOfNearlyOneFrequency) {
   EXPECT_GT(pairs[0].needed, kLampDrift);
 }
 
-TEST(LampMapCheck, AcceptsADifferenceInDuty) {
+TEST(FindAmbiguousLamps, AcceptsLampsOfDifferentDuty) {
   EXPECT_TRUE(lamps_alike({{lamp(2, 2500, 0.3), lamp(3, 2500, 0.7)}}, kConditions).empty());
   EXPECT_EQ(lamps_alike({{lamp(2, 2500, 0.4), lamp(3, 2500, 0.6)}}, kConditions).size(), 1);
   EXPECT_EQ(lamps_alike({{lamp(2, 2500, 0.3), lamp(3, 2500, {})}}, kConditions).size(), 1);
 }
 
-TEST(LampMapCheck, AsksForMoreWhereLessIsSeen) {
+TEST(FindAmbiguousLamps, RequiresLargerDifferenceForFewerLines) {
   const LampMap map{{lamp(1, 2500), lamp(2, 2560)}};
   EXPECT_TRUE(lamps_alike(map, kConditions).empty());
   StripeConditions sharp = kConditions, far = kConditions;
@@ -119,8 +119,8 @@ TEST(ExplainMissingRoom, ListsTenRoomsAtMost) {
   EXPECT_THAT(explain_missing_room(lamps, "--room"), testing::EndsWith("r18, r19 and 2 more"));
 }
 
-/// What it says is what happens: of lamps that are just far enough apart nearly all are identified.
-TEST(LampMapCheck, HoldsForTheRule) {
+/// Nearly all lamps just above the reported limit are identified.
+TEST(FindAmbiguousLamps, MatchesIdentificationByFrequency) {
   StripeConditions conditions = kConditions;
   conditions.exposure_s.reset();
   const auto needed = lamps_alike({{lamp(1, 2500), lamp(2, 2501)}}, conditions)[0].needed;
@@ -140,7 +140,7 @@ TEST(LampMapCheck, HoldsForTheRule) {
   EXPECT_EQ(wrong, 0);
 }
 
-TEST(LampMapCheck, NamesLampsWithoutReadableStripes) {
+TEST(FindUnreadableLamps, ReportsLampsWithoutReadableStripes) {
   const LampMap map{{lamp(1, 600), lamp(2, 2500), lamp(3, 19000)}};
   const auto unreadable = lamps_unreadable(map, kConditions);
   ASSERT_EQ(unreadable.size(), 2);

@@ -27,7 +27,7 @@ std::optional<int> identified(const std::vector<Lamp>& lamps, const Stripes& str
   return lamp_by_frequency({lamps}, kRowTime_s, stripes);
 }
 
-TEST(LampRule, TakesTheLampOfThatFrequency) {
+TEST(IdentifyLampByFrequency, ReturnsLampOfMatchingFrequency) {
   const std::vector<Lamp> lamps{rule_lamp(1, 2000), rule_lamp(2, 2500)};
   EXPECT_EQ(identified(lamps, stripes(2000)), 1);
   EXPECT_EQ(identified(lamps, stripes(2080)), 1);
@@ -36,7 +36,7 @@ TEST(LampRule, TakesTheLampOfThatFrequency) {
   EXPECT_EQ(identified(lamps, stripes(3000)), std::nullopt) << "like neither";
 }
 
-TEST(LampRule, AsksMoreOfStripesThatAreFewOrUnclear) {
+TEST(IdentifyLampByFrequency, AllowsLessDeviationForFewOrUnclearStripes) {
   const std::vector<Lamp> lamps{rule_lamp(1, 2000)};
   Stripes few = stripes(2080), unclear = few;
   few.periods = 2;
@@ -47,7 +47,7 @@ TEST(LampRule, AsksMoreOfStripesThatAreFewOrUnclear) {
   EXPECT_EQ(identified(lamps, few), 1);
 }
 
-TEST(LampRule, LeavesUnclearStripesUnknownThatAreNotRegular) {
+TEST(IdentifyLampByFrequency, RejectsUnclearIrregularStripes) {
   const std::vector<Lamp> lamps{rule_lamp(1, 2000)};
   Stripes unclear = stripes(2000);
   unclear.clarity = 0.6;
@@ -57,7 +57,7 @@ TEST(LampRule, LeavesUnclearStripesUnknownThatAreNotRegular) {
   EXPECT_EQ(identified(lamps, unclear), 1);
 }
 
-TEST(LampRule, TellsLampsOfOneFrequencyApartByTheirDuties) {
+TEST(IdentifyLampByFrequency, SeparatesLampsOfEqualFrequencyByDuty) {
   const std::vector<Lamp> lamps{rule_lamp(1, 2000, 0.3), rule_lamp(2, 2010, 0.7)};
   EXPECT_EQ(identified(lamps, stripes(2005, 0.33)), 1);
   EXPECT_EQ(identified(lamps, stripes(2005, 0.64)), 2);
@@ -67,12 +67,12 @@ TEST(LampRule, TellsLampsOfOneFrequencyApartByTheirDuties) {
       << "the other's duty is not known";
 }
 
-TEST(LampRule, TrustsAClearFrequencyMoreThanADuty) {
+TEST(IdentifyLampByFrequency, PrefersClearFrequencyOverDuty) {
   const std::vector<Lamp> lamps{rule_lamp(1, 2000, 0.3), rule_lamp(2, 2500, 0.7)};
   EXPECT_EQ(identified(lamps, stripes(2000, 0.7)), 1);
 }
 
-TEST(LampRule, KnowsNoLampWithoutAPeriodOrAFrequency) {
+TEST(IdentifyLampByFrequency, ReturnsNulloptWithoutPeriodOrFrequency) {
   EXPECT_EQ(identified({rule_lamp(1, 2000)}, Stripes{}), std::nullopt);
   EXPECT_EQ(identified({{1, {0, 0, 2}, {}, {}, {}}}, stripes(2000)), std::nullopt);
 }

@@ -8,7 +8,7 @@
 namespace vlp {
 namespace {
 
-TEST(LineSignal, IsTheMeanOfEachLineAboveTheDark) {
+TEST(ComputeLineSignal, ReturnsMeanOfEachLineAboveDark) {
   for (const int depth : {CV_8U, CV_16U}) {
     cv::Mat pixels(100, 120, depth, cv::Scalar(10));
     for (int row = 31; row <= 69; ++row) pixels(cv::Rect(40, row, 41, 1)) = 2 * row;
@@ -21,7 +21,7 @@ TEST(LineSignal, IsTheMeanOfEachLineAboveTheDark) {
   }
 }
 
-TEST(LineSignal, OfLightsPastTheImagesEdgeIsThatOfTheirLinesInside) {
+TEST(ComputeLineSignal, IgnoresScanlinesOutsideImage) {
   const cv::Mat pixels(100, 120, CV_8U, cv::Scalar(50));
   const ImageView image = image_view(pixels);
   EXPECT_EQ(line_signal(image, chords_of({40, -20}, {80, 20}, image.size()), 10).size(), 19U);

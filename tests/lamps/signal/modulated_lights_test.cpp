@@ -30,7 +30,7 @@ DrawnLamp make_glow(const Eigen::Vector2d& center, double period_lines) {
           .glow = DrawnGlow{.fall_px = 18, .core_px = 14}};
 }
 
-TEST(FindModulatedLights, IdentifiesGlowsAndTheirCentres) {
+TEST(FindModulatedLights, IdentifiesGlowsAndTheirCenters) {
   for (std::size_t i = 0; i < kLampPeriods_lines.size(); ++i) {
     for (const int depth : {CV_8U, CV_16U}) {
       const Eigen::Vector2d center(203.3, 131.6);
@@ -46,7 +46,7 @@ TEST(FindModulatedLights, IdentifiesGlowsAndTheirCentres) {
   }
 }
 
-TEST(FindModulatedLights, FindsThePeriodWithoutLamps) {
+TEST(FindModulatedLights, FindsPeriodWithoutLampPeriods) {
   const auto lights =
       find_lights(drawn({make_glow({203.3, 131.6}, 13)}, kSearchSize, CV_8U, 1), {});
   ASSERT_EQ(lights.size(), 1U);
@@ -54,7 +54,7 @@ TEST(FindModulatedLights, FindsThePeriodWithoutLamps) {
   EXPECT_NEAR(lights[0].stripes.period_lines, 13, 0.2);
 }
 
-TEST(FindModulatedLights, LeavesAPeriodThatNoLampHasUnknown) {
+TEST(FindModulatedLights, ReportsNoLampForUnknownPeriod) {
   for (const double period : {10.0, 12.6, 16.0, 21.0}) {
     for (const ModulatedLight& light :
          find_lights(drawn({make_glow({203.3, 131.6}, period)}, kSearchSize, CV_8U, 1),
@@ -78,7 +78,7 @@ cv::Mat draw_bars(double period_lines, double tilt_rad) {
   return image;
 }
 
-TEST(FindModulatedLights, FindsNoneInTiltedBars) {
+TEST(FindModulatedLights, RejectsTiltedBars) {
   // Their phase changes by half of a period across the disc, and their mean is still modulated.
   for (const double period : {11.0, 18.0, 24.0}) {
     EXPECT_EQ(find_lights(draw_bars(period, 0), kLampPeriods_lines).size(), 1U) << period;
@@ -88,7 +88,7 @@ TEST(FindModulatedLights, FindsNoneInTiltedBars) {
   }
 }
 
-TEST(FindModulatedLights, HasASigmaThatContainsTheOffsetOfABrightCore) {
+TEST(FindModulatedLights, SigmaCoversOffsetOfBrightCore) {
   double squares = 0;
   int count = 0;
   for (const double angle : {0.3, 1.4, 2.5, 3.6, 4.7, 5.8}) {
@@ -105,7 +105,7 @@ TEST(FindModulatedLights, HasASigmaThatContainsTheOffsetOfABrightCore) {
   EXPECT_LT(squares / count, 1.5);
 }
 
-TEST(FindModulatedLights, FindsNoneInSteadyLightNoiseAndEmptyBoxes) {
+TEST(FindModulatedLights, ReturnsNoneForSteadyLightNoiseAndEmptyBoxes) {
   const DrawnLamp steady{.center = {203.3, 131.6}, .radius_px = 70, .stripes = {.duty = 1}};
   EXPECT_TRUE(find_lights(drawn({steady}, kSearchSize, CV_8U, 1), kLampPeriods_lines).empty());
   EXPECT_TRUE(find_lights(drawn({}, kSearchSize, CV_8U, 2), kLampPeriods_lines).empty());

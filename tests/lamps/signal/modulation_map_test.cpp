@@ -34,7 +34,7 @@ cv::Mat square_wave(double period_lines, double low, double high) {
   return image;
 }
 
-TEST(AverageCells, AveragesPixelsAndLines) {
+TEST(AverageCells, AveragesPixelsAndScanlines) {
   cv::Mat1b image(4, 19, std::uint8_t(10));
   image(0, 0) = 26;
   image(3, 18) = 40;
@@ -46,7 +46,7 @@ TEST(AverageCells, AveragesPixelsAndLines) {
   EXPECT_FLOAT_EQ(cells.row(1)[2], 7 + 5);  // 30 more in the 6 pixels that the last cell has
 }
 
-TEST(MapModulation, HasTheAmplitudeOfTheFundamental) {
+TEST(MapModulation, ReturnsAmplitudeOfFundamental) {
   for (const int lines_per_bin : {1, 2}) {
     const ModulationMap map = make_map(square_wave(12, 20, 100), lines_per_bin);
     const std::size_t middle = map.index(map.steps / 2, map.cells / 2);
@@ -55,14 +55,14 @@ TEST(MapModulation, HasTheAmplitudeOfTheFundamental) {
   }
 }
 
-TEST(MapModulation, IsZeroForSteadyLightAndRamps) {
+TEST(MapModulation, ReturnsZeroForSteadyLightAndRamps) {
   cv::Mat1b image(160, 64);
   for (int row = 0; row < image.rows; ++row) image.row(row).setTo(20 + row);
   const ModulationMap map = make_map(image);
   EXPECT_LT(map.amplitude[map.index(map.steps / 2, map.cells / 2)], 0.5);
 }
 
-TEST(MinSignificantAmplitude, IsExceededByNoiseAsRarelyAsStated) {
+TEST(MinSignificantAmplitude, MatchesFalseAlarmRateOfNoise) {
   // The squared amplitude is exponentially distributed: a threshold lower by a factor has the
   // probability 1e-9 to the power of its square.
   constexpr double noise = 3, fraction = 0.4;
@@ -89,7 +89,7 @@ TEST(MinSignificantAmplitude, IsExceededByNoiseAsRarelyAsStated) {
   EXPECT_NEAR(above / count / expected, 1, 0.2);
 }
 
-TEST(FindModulatedRegions, SeparatesLampsAndLeavesOutSteadyLight) {
+TEST(FindModulatedRegions, SeparatesLampsAndExcludesSteadyLight) {
   const cv::Size size(400, 200);
   const DrawnLamp one{.center = {90, 100}, .stripes = {.period_lines = 12}};
   const DrawnLamp other{.center = {300, 90}, .stripes = {.period_lines = 16}};
@@ -104,7 +104,7 @@ TEST(FindModulatedRegions, SeparatesLampsAndLeavesOutSteadyLight) {
   EXPECT_NEAR(regions[1].box.x + regions[1].box.width / 2.0, 300, 8);
 }
 
-TEST(FindModulatedRegions, FindsNoneInNoise) {
+TEST(FindModulatedRegions, ReturnsNoneForNoise) {
   const cv::Mat image = drawn({}, {400, 300}, CV_8U, 3);
   EXPECT_TRUE(
       find_modulated_regions(make_map(image, 1, 255 * kDark), min_significant_amplitude(3, 12))

@@ -29,7 +29,7 @@ LineProfile make_profile(double period_lines, double sigma_lines, double noise =
   return profile;
 }
 
-TEST(FitPeriod, ExplainsASquareWaveBehindAnEnvelope) {
+TEST(FitPeriod, ExplainsSquareWaveWithEnvelope) {
   for (const double period : {9.0, 15.0, 26.5}) {
     const PeriodFit fit = fit_period(make_profile(period, 2 * period), period);
     EXPECT_LT(fit.unexplained, 0.12) << period;
@@ -38,19 +38,19 @@ TEST(FitPeriod, ExplainsASquareWaveBehindAnEnvelope) {
   }
 }
 
-TEST(FitPeriod, LeavesTheVarianceOfAnotherPeriod) {
+TEST(FitPeriod, LeavesVarianceOfOtherPeriodUnexplained) {
   const LineProfile profile = make_profile(20, 40);
   EXPECT_GT(fit_period(profile, 25).unexplained, 0.6);
   EXPECT_GT(fit_period(profile, 16).unexplained, 0.6);
 }
 
-TEST(FitPeriod, LeavesAllWhereThereIsNothingToFit) {
+TEST(FitPeriod, ReturnsUnexplainedOneWithoutSignal) {
   EXPECT_EQ(fit_period({0, 1, {}}, 10).unexplained, 1);
   EXPECT_EQ(fit_period({0, 1, std::vector<double>(50, 0)}, 10).unexplained, 1);
   EXPECT_EQ(fit_period({0, 1, std::vector<double>(50, 3)}, 100).unexplained, 1) << "half a period";
 }
 
-TEST(FindPeriod, FindsThePeriodInNoise) {
+TEST(FindPeriod, ReturnsPeriodInNoise) {
   for (const double period : {9.0, 15.0, 26.5}) {
     const PeriodFit fit = find_period(make_profile(period, 2 * period, 5), 4);
     EXPECT_NEAR(fit.period_lines / period, 1, 0.01) << period;
@@ -58,7 +58,7 @@ TEST(FindPeriod, FindsThePeriodInNoise) {
   }
 }
 
-TEST(FindPeriod, ExplainsLittleOfNoise) {
+TEST(FindPeriod, LeavesNoiseUnexplained) {
   Random random(3);
   int explained = 0;
   for (int i = 0; i < 50; ++i) {
@@ -69,7 +69,7 @@ TEST(FindPeriod, ExplainsLittleOfNoise) {
   EXPECT_EQ(explained, 0);
 }
 
-TEST(DivideByEnvelope, LeavesTheStripes) {
+TEST(DivideByEnvelope, KeepsStripes) {
   const auto signal = divide_by_envelope(make_profile(15, 40), 15);
   ASSERT_GT(signal.size(), 100U);
   // Away from the ends the brightest lines are at 1 / duty.

@@ -25,7 +25,7 @@ LampMap map_of(const std::vector<double>& frequencies_hz) {
   return map;
 }
 
-/// `count` lights of a lamp, measured with that relative standard deviation.
+/// Adds `count` lights of a lamp, measured with this relative standard deviation.
 void add(std::vector<MeasuredPeriod>& lights, double frequency_hz, int count, double sd,
          Random& random, std::optional<int> lamp = {}) {
   for (int i = 0; i < count; ++i) {
@@ -39,7 +39,7 @@ RowTimeResult row_time_of(const std::vector<MeasuredPeriod>& lights, const LampM
 
 const LampMap kMap = map_of({2000, 2500, 3000, 3500, 4000});
 
-TEST(RowTime, IsExactWithoutNoise) {
+TEST(EstimateRowTime, IsExactWithoutNoise) {
   Random random(1);
   std::vector<MeasuredPeriod> lights;
   for (const Lamp& lamp : kMap.lamps) add(lights, *lamp.frequency_hz, 1, 0, random);
@@ -50,12 +50,12 @@ TEST(RowTime, IsExactWithoutNoise) {
   EXPECT_EQ(result.found->lights, 5);
 }
 
-TEST(RowTime, ScattersAsItSays) {
+TEST(EstimateRowTime, SdMatchesScatter) {
   Random random(2);
   double chi_square = 0;
   constexpr int draws = 300;
   for (int draw = 0; draw < draws; ++draw) {
-    // Lamps are off their frequencies by 0.5 %.
+    // Frequencies of the lamps have errors of 0.5 %.
     std::vector<MeasuredPeriod> lights;
     for (const Lamp& lamp : kMap.lamps) {
       add(lights, *lamp.frequency_hz * std::exp(0.005 * random.normal()), 20, 0.002, random);
@@ -64,13 +64,13 @@ TEST(RowTime, ScattersAsItSays) {
     ASSERT_TRUE(result.found) << result.problem;
     chi_square += std::pow((result.found->row_time_s - kTrue_s) / result.found->sd_s, 2);
   }
-  // Of five lamps the scatter is known to a third: Student's t has a variance of 2.
+  // The scatter of five lamps is known to a third: Student's t has a variance of 2.
   EXPECT_GT(chi_square / draws, 0.7);
   EXPECT_LT(chi_square / draws, 3);
 }
 
-TEST(RowTime, IsNotMisledByALampThatIsOff) {
-  // As measured in a photograph of real lamps: the first is 4.4 % off.
+TEST(EstimateRowTime, IsRobustAgainstWrongLampFrequency) {
+  // Periods measured in a photograph of real lamps: the first has an error of 4.4 %.
   std::vector<MeasuredPeriod> lights;
   for (const double frequency_hz : {2089.0, 2511.0, 3006.0, 3533.0, 4014.0}) {
     lights.push_back({1 / (frequency_hz * kTrue_s), {}});
@@ -81,7 +81,7 @@ TEST(RowTime, IsNotMisledByALampThatIsOff) {
   EXPECT_LT(std::abs(result.found->row_time_s - kTrue_s), 3 * result.found->sd_s);
 }
 
-TEST(RowTime, IsNotMisledByOtherLights) {
+TEST(EstimateRowTime, IsRobustAgainstOtherLights) {
   Random random(3);
   std::vector<MeasuredPeriod> lights;
   for (const Lamp& lamp : kMap.lamps) add(lights, *lamp.frequency_hz, 20, 0.002, random);
@@ -93,7 +93,7 @@ TEST(RowTime, IsNotMisledByOtherLights) {
   EXPECT_EQ(result.found->lamps, 5);
 }
 
-TEST(RowTime, NeedsNoLabelsWhereThereIsOneFrequency) {
+TEST(EstimateRowTime, NeedsNoLabelsForSingleFrequency) {
   const auto result =
       row_time_of(std::vector<MeasuredPeriod>{{1 / (2500 * kTrue_s), {}}}, map_of({2500, 2500}));
   ASSERT_TRUE(result.found) << result.problem;
@@ -109,15 +109,15 @@ void expect_ambiguous(const std::vector<double>& seen_hz, const LampMap& map) {
   EXPECT_THAT(result.problem, HasSubstr("add captures that show more lamps, or a table"));
 }
 
-TEST(RowTime, IsNotGuessed) {
+TEST(ChooseRowTime, ReturnsProblemWhenAmbiguous) {
   expect_ambiguous({2500}, kMap);
-  // All ratios are equal, and one lamp is not seen.
+  // All ratios are equal, and one lamp is not detected.
   const LampMap even = map_of({1600, 2000, 2500, 3125});
   expect_ambiguous({1600, 2000, 2500}, even);
   expect_ambiguous({2000, 2500, 3125}, even);
 }
 
-/// Lights of these lamps of `map`, with their duties.
+/// Returns lights of these lamps of `map`, with their duties.
 std::vector<MeasuredPeriod> with_duties(const LampMap& map, const std::vector<std::size_t>& seen) {
   std::vector<MeasuredPeriod> lights;
   for (const std::size_t i : seen) {
@@ -127,7 +127,7 @@ std::vector<MeasuredPeriod> with_duties(const LampMap& map, const std::vector<st
   return lights;
 }
 
-TEST(EstimateRowTime, ReturnsAllThatFitWithTheirLamps) {
+TEST(EstimateRowTime, ReturnsAllCandidatesWithTheirLamps) {
   const LampMap even = map_of({1600, 2000, 2500, 3125});
   const auto result = estimate_row_time(with_duties(even, {1, 2, 3}), even);
   ASSERT_EQ(result.groups.size(), 3);
@@ -147,25 +147,25 @@ TEST(EstimateRowTime, ReturnsAllThatFitWithTheirLamps) {
   }
 }
 
-TEST(RowTime, IsChosenByDutiesWhereThePeriodsDoNotTell) {
+TEST(EstimateRowTime, ResolvesAmbiguityByDuties) {
   LampMap even = map_of({1600, 2000, 2500, 3125});
   const std::vector duties{0.3, 0.7, 0.4, 0.7};
   for (std::size_t i = 0; i < 4; ++i) even.lamps[i].duty = duties[i];
   auto lights = with_duties(even, {1, 2, 3});
-  // By so much blur and saturation may change them.
+  // Blur and saturation may change duties by this amount.
   for (MeasuredPeriod& light : lights) *light.duty += 0.08;
   const auto result = row_time_of(lights, even);
   ASSERT_TRUE(result.found) << result.problem;
   EXPECT_NEAR(result.found->row_time_s, kTrue_s, 1e-9 * kTrue_s);
-  // One lamp without a duty: none count.
+  // If one lamp has no duty, no duties are used.
   even.lamps[0].duty.reset();
   EXPECT_FALSE(row_time_of(lights, even).found);
-  // Nor do duties decide that are all alike.
+  // Equal duties do not resolve the ambiguity.
   for (Lamp& lamp : even.lamps) lamp.duty = 0.5;
   EXPECT_FALSE(row_time_of(with_duties(even, {1, 2, 3}), even).found);
 }
 
-TEST(ChooseRowTime, AddsTheCostsOfPlaces) {
+TEST(ChooseRowTime, AddsPositionCosts) {
   const LampMap even = map_of({1600, 2000, 2500, 3125});
   const auto found = estimate_row_time(with_duties(even, {1, 2, 3}), even);
   ASSERT_EQ(found.candidates.size(), 2);
@@ -181,7 +181,7 @@ TEST(ChooseRowTime, AddsTheCostsOfPlaces) {
   EXPECT_THAT(undecided.problem, HasSubstr("fit a row time of"));
 }
 
-TEST(RowTime, ComesFromLabelsWhereTheFrequenciesDoNotTell) {
+TEST(EstimateRowTime, ResolvesAmbiguityByLabels) {
   const LampMap even = map_of({1600, 2000, 2500, 3125});
   const std::vector<MeasuredPeriod> lights{{1 / (2000 * kTrue_s), 2}, {1 / (2500 * kTrue_s), 3}};
   const auto result = row_time_of(lights, even);
@@ -189,7 +189,7 @@ TEST(RowTime, ComesFromLabelsWhereTheFrequenciesDoNotTell) {
   EXPECT_NEAR(result.found->row_time_s, kTrue_s, 1e-12);
 }
 
-TEST(RowTime, SaysWhyThereIsNone) {
+TEST(ChooseRowTime, ReportsReasonWithoutRowTime) {
   EXPECT_THAT(row_time_of({}, kMap).problem, HasSubstr("no light has clear stripes"));
   EXPECT_THAT(row_time_of(std::vector<MeasuredPeriod>{{10, 77}}, kMap).problem,
               HasSubstr("no lamp of the map"));
@@ -201,7 +201,7 @@ TEST(RowTime, SaysWhyThereIsNone) {
   EXPECT_NE(result.problem, "");
 }
 
-TEST(PeriodGroups, AreOfOnePeriodEach) {
+TEST(GroupPeriods, ReturnsOneGroupForEachPeriod) {
   Random random(4);
   std::vector<MeasuredPeriod> lights;
   add(lights, 2000, 40, 0.003, random);

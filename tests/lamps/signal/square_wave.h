@@ -10,8 +10,8 @@
 
 namespace vlp {
 
-/// The signal of `lines` lines on a lamp of that period (lines) and duty, exposed for so many
-/// lines, with noise of the stripes' height times `noise`.
+/// Returns the signal of `lines` scanlines on a lamp of this period and duty. The exposure of a
+/// scanline is `exposure_lines` line times; `noise` is a fraction of the stripes' height.
 inline std::vector<double> noisy_square_wave(int lines, double period, double duty,
                                              double exposure_lines, double noise, Random& random) {
   const auto lit_until = [&](double time) {

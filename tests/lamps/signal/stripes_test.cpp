@@ -15,7 +15,8 @@ namespace {
 
 constexpr double kDarkCounts = 10, kBrightCounts = 200;
 
-/// Share of the line from `begin` to `begin` + `exposure` (lines) during which a square wave is on.
+/// Returns the fraction of the time from `begin` to `begin` + `exposure`, in line times, during
+/// which a square wave is on.
 double lit_share(double begin, double exposure, double period, double duty) {
   const auto lit_until = [&](double time) {
     const double whole = std::floor(time / period);
@@ -34,12 +35,12 @@ std::vector<double> square_wave(int lines, double period, double duty, double ph
   return signal;
 }
 
-/// Fewer show a begin or an end but once.
+/// Minimum number of periods: fewer have only one begin or end.
 constexpr double kMinPeriods = 2.2;
 
-class SquareWaves : public testing::TestWithParam<double> {};
+class MeasureStripesOfSquareWave : public testing::TestWithParam<double> {};
 
-TEST_P(SquareWaves, HaveTheirPeriodAndDuty) {
+TEST_P(MeasureStripesOfSquareWave, ReturnsPeriodAndDuty) {
   const double period = GetParam();
   for (const int lines : {40, 55, 70}) {
     if (lines < kMinPeriods * period) continue;
@@ -58,7 +59,7 @@ TEST_P(SquareWaves, HaveTheirPeriodAndDuty) {
   }
 }
 
-TEST_P(SquareWaves, HaveTheirPeriodThroughAnExposure) {
+TEST_P(MeasureStripesOfSquareWave, ReturnsPeriodUnderExposure) {
   const double period = GetParam();
   for (const int lines : {40, 55, 70}) {
     if (lines < kMinPeriods * period) continue;
@@ -77,9 +78,10 @@ TEST_P(SquareWaves, HaveTheirPeriodThroughAnExposure) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Periods, SquareWaves, testing::Values(5, 6.3, 8, 10.7, 13.3, 17.9, 25));
+INSTANTIATE_TEST_SUITE_P(Periods, MeasureStripesOfSquareWave,
+                         testing::Values(5, 6.3, 8, 10.7, 13.3, 17.9, 25));
 
-TEST(Stripes, HaveThePeriodOfASineAndItsClarity) {
+TEST(MeasureStripes, ReturnsPeriodAndClarityOfSine) {
   for (const double period : {2.5, 4.0, 7.3, 20.0}) {
     std::vector<double> signal;
     for (int line = 0; line < 50; ++line) {
@@ -91,7 +93,7 @@ TEST(Stripes, HaveThePeriodOfASineAndItsClarity) {
   }
 }
 
-TEST(Stripes, HaveTheirPeriodInNoise) {
+TEST(MeasureStripes, ReturnsPeriodAndDutyInNoise) {
   Random random(4);
   for (int draw = 0; draw < 100; ++draw) {
     std::vector<double> signal = square_wave(60, 9.3, 0.5, random.uniform(0, 1), 2);
@@ -102,7 +104,7 @@ TEST(Stripes, HaveTheirPeriodInNoise) {
   }
 }
 
-TEST(Stripes, OfSteadyLightHaveLittleContrastAndClarity) {
+TEST(MeasureStripes, ReturnsLowContrastAndClarityForSteadyLight) {
   Random random(8);
   for (int draw = 0; draw < 100; ++draw) {
     std::vector<double> signal(60);
@@ -121,12 +123,12 @@ void expect_no_stripes(const std::vector<double>& signal) {
   EXPECT_TRUE(stripes.duty >= 0 && stripes.duty <= 1) << stripes.duty;
 }
 
-TEST(Stripes, AreNoneInShortSignals) {
+TEST(MeasureStripes, ReturnsNoStripesForShortSignals) {
   for (int lines = 0; lines < 8; ++lines) expect_no_stripes(square_wave(lines, 4, 0.5, 0));
   EXPECT_GT(stripes_of(square_wave(8, 4, 0.5, 0)).contrast, 0.5);
 }
 
-TEST(Stripes, AreNoneInConstantSignals) {
+TEST(MeasureStripes, ReturnsNoStripesForConstantSignals) {
   for (const double level : {0.0, 1e-3, 0.1, 100.1, 200.0 / 3, -5.0}) {
     for (const std::size_t lines : {8U, 41U, 60U, 67U}) {
       SCOPED_TRACE(testing::Message() << level << ", " << lines);
@@ -138,8 +140,8 @@ TEST(Stripes, AreNoneInConstantSignals) {
   }
 }
 
-TEST(Stripes, OfSignalsWithOneOddLineHaveADuty) {
-  // The darkest and brightest lines are left out, and what is left is constant.
+TEST(MeasureStripes, ReturnsFiniteDutyForSignalWithOneOutlier) {
+  // The darkest and brightest lines are excluded, and the others are constant.
   for (const double odd : {0.0, 300.0}) {
     std::vector<double> signal(60, 100);
     signal[20] = odd;

@@ -10,7 +10,7 @@
 namespace vlp {
 namespace {
 
-TEST(MotionOptions, AreOfACameraThatStandsUnlessItHasASpeed) {
+TEST(MotionOptions, ReturnNulloptWithoutSpeed) {
   EXPECT_FALSE(MotionOptions{}.motion());
   const MotionOptions drives{2.0, {}}, straight{2.0, 0.0};
   ASSERT_TRUE(drives.motion());
@@ -19,7 +19,7 @@ TEST(MotionOptions, AreOfACameraThatStandsUnlessItHasASpeed) {
   EXPECT_EQ(straight.motion()->velocity_sd_m_per_s, drives.motion()->velocity_sd_m_per_s);
 }
 
-TEST(EveryFrame, IsOfVideos) {
+TEST(CheckEvery, ThrowsWithoutVideo) {
   check_every(1, {"boards"});
   check_every(5, {"boards", "boards.mp4"});
   EXPECT_EQ(refusal_of<std::invalid_argument>([] { check_every(5, {"boards"}); }),

@@ -34,7 +34,7 @@ HistoryEntry entry_of(const std::string& arguments, const std::vector<std::strin
   return history_entry(app, inputs);
 }
 
-TEST(History, DigestsAreThoseOfTheStandard) {  // FIPS 180-2, appendix B
+TEST(Sha256, MatchesFips180Examples) {  // FIPS 180-2, appendix B
   const TemporaryFolder folder;
   EXPECT_EQ(sha256_of_file(folder.file("abc", "abc")),
             "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
@@ -42,7 +42,7 @@ TEST(History, DigestsAreThoseOfTheStandard) {  // FIPS 180-2, appendix B
             "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0");
 }
 
-TEST(History, AFolderIsWhatSha256sumSaysOfItsImages) {
+TEST(InputDigests, MatchSha256sumForFolder) {
   const TemporaryFolder folder;
   folder.file("b.png", "second");
   folder.file("a.png", "first");
@@ -52,7 +52,7 @@ TEST(History, AFolderIsWhatSha256sumSaysOfItsImages) {
   EXPECT_EQ(InputDigests().of_images(folder / ""), oracle.output.substr(0, 64));
 }
 
-TEST(History, KeepsOptionsAndInputsButNothingOfTheMachine) {
+TEST(HistoryEntry, IsIndependentOfMachine) {
   const TemporaryFolder folder;
   std::filesystem::create_directory(folder / "spot");
   folder.file("spot/0.png", "an image");
@@ -72,7 +72,7 @@ TEST(History, KeepsOptionsAndInputsButNothingOfTheMachine) {
   EXPECT_EQ(entry.inputs[1].sha256, sha256_of_file(lamps));
 }
 
-TEST(History, IsEmptyWithoutOptionsAndRefusesWhatCannotBeRead) {
+TEST(HistoryEntry, IsEmptyWithoutOptionsAndThrowsForUnreadableInput) {
   const TemporaryFolder folder;
   EXPECT_EQ(entry_of("images", {}).options, "");
   const std::string missing = (folder / "missing").string();

@@ -10,7 +10,7 @@
 namespace vlp {
 namespace {
 
-TEST(Require, IsUndeterminedOnlyWhereTheCapturesAreToBlame) {
+TEST(Require, ThrowsUndeterminedOnlyForUndeterminedStep) {
   StepResult result;
   require(result);
   result.fail(StepFailure::undetermined, "add captures");

@@ -11,7 +11,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::Not;
 
-TEST(BudgetPlot, StacksThePartsOfEachFixTheSmallestFirst) {
+TEST(BudgetPlot, StacksContributionsInOrderOfTotal) {
   const BudgetPlot plot{"a", {"noise", "lens", "it's"}, {{1e-6, 0, 3e-6}, {2e-6, 0, 2.5e-7}}};
   EXPECT_THAT(plot.shares(), ElementsAre(testing::DoubleEq(0.48), 0, testing::DoubleEq(0.52)));
   const Drawing drawing = drawing_of(plot);
@@ -24,7 +24,7 @@ TEST(BudgetPlot, StacksThePartsOfEachFixTheSmallestFirst) {
   EXPECT_EQ(svg, svg_of(drawing));
 }
 
-TEST(BudgetPlot, OfManyFixesEndsWithTheLargest) {
+TEST(BudgetPlot, KeepsLargestOfManyFixes) {
   BudgetPlot plot{"a", {"noise"}, {}};
   for (int i = 5000; i > 0; --i) plot.variances_m2.push_back({1e-6 * i});
   const std::string commands = drawing_of(plot).commands;

@@ -28,7 +28,7 @@ class DispersionPlotTest : public testing::Test {
   }
 };
 
-TEST_F(DispersionPlotTest, IsAPngOrAnSvgByItsEndingAndTheSameTwice) {
+TEST_F(DispersionPlotTest, RendersReproduciblePngOrSvgByExtension) {
   EXPECT_THAT(drawn("a.png"), StartsWith("\x89PNG"));
   EXPECT_EQ(drawn("a.png"), drawn("a.png"));
   EXPECT_THAT(drawn("a.svg"), HasSubstr("a 'title'"));
@@ -36,13 +36,13 @@ TEST_F(DispersionPlotTest, IsAPngOrAnSvgByItsEndingAndTheSameTwice) {
               HasSubstr("a.gif: a picture's name should end in"));
 }
 
-TEST_F(DispersionPlotTest, ShowsOutliersWhenThereAreSome) {
+TEST_F(DispersionPlotTest, MarksOutliersIfAny) {
   EXPECT_THAT(drawn("a.svg"), Not(HasSubstr("left out")));
   plot.outliers_m = {{0.05, 0.05}};
   EXPECT_THAT(drawn("a.svg"), HasSubstr("left out"));
 }
 
-TEST_F(DispersionPlotTest, OfOneFixAlone) {
+TEST_F(DispersionPlotTest, RendersSingleFix) {
   plot.before = {{{0.01, 0}}, {{0.01, 0}, 0}};
   plot.after = {{{0, 0}}, {{0, 0}, 0}};
   EXPECT_THAT(drawn("a.svg"), HasSubstr("<svg"));

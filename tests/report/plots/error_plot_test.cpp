@@ -10,7 +10,7 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-/// A metre wide, errors of 1 mm along x.
+/// Plot of a floor one meter wide with errors of 1 mm along x.
 ErrorPlot grid(int fixes) {
   ErrorPlot plot{"a <floor>", {}, {}, {}};
   for (int i = 0; i < fixes; ++i) {
@@ -20,14 +20,14 @@ ErrorPlot grid(int fixes) {
   return plot;
 }
 
-TEST(ErrorMagnification, MakesErrorsATenthToA25thOfTheFloor) {
+TEST(ErrorMagnification, ScalesErrorsTo4To10PercentOfFloor) {
   EXPECT_DOUBLE_EQ(error_magnification(0.001, 1), 100);
   EXPECT_DOUBLE_EQ(error_magnification(0.0011, 1), 50);
   EXPECT_DOUBLE_EQ(error_magnification(0.5, 1), 1) << "never smaller than they are";
   EXPECT_DOUBLE_EQ(error_magnification(0, 1), 1);
 }
 
-TEST(ErrorPlot, DrawsArrowsEnlargedWithTheScale) {
+TEST(ErrorPlot, EnlargesArrowsAndStatesScale) {
   const Drawing drawing = drawing_of(grid(11));
   EXPECT_THAT(drawing.commands, HasSubstr("errors drawn 100 times as long"));
   EXPECT_THAT(drawing.commands, HasSubstr("0.5 0.2 0.1 0 \n"));
@@ -39,7 +39,7 @@ TEST(ErrorPlot, DrawsArrowsEnlargedWithTheScale) {
   EXPECT_EQ(svg_of(drawing), svg);
 }
 
-TEST(ErrorPlot, CutsShortWhatWouldLeaveThePaperAndCountsIt) {
+TEST(ErrorPlot, TruncatesAndCountsLongArrows) {
   ErrorPlot plot = grid(31);
   plot.fixes[3].fix_m.x() += 5;
   plot.fixes[7].fix_m.y() += 5;
@@ -48,7 +48,7 @@ TEST(ErrorPlot, CutsShortWhatWouldLeaveThePaperAndCountsIt) {
   EXPECT_THAT(commands, HasSubstr("0.1 0 0.25 0 \n"));
 }
 
-TEST(ErrorPlot, ShowsWhereFixesAreMissingAndTheLamps) {
+TEST(ErrorPlot, MarksMissingFixesAndLamps) {
   ErrorPlot plot = grid(5);
   plot.missing_m = {{0.3, 0.3}};
   plot.lamps.lamps = {{17, {0.4, 0.2, 2}, {}, {}, {}}};
@@ -57,13 +57,13 @@ TEST(ErrorPlot, ShowsWhereFixesAreMissingAndTheLamps) {
   EXPECT_THAT(svg, HasSubstr(">17<"));
 }
 
-TEST(ErrorPlot, SaysThatNotAllMissingFixesAreDrawn) {
+TEST(ErrorPlot, ReportsThinningOfMissingFixes) {
   ErrorPlot plot = grid(5);
   for (int i = 0; i < 1000; ++i) plot.missing_m.emplace_back(0.001 * i, 0);
   EXPECT_THAT(drawing_of(plot).commands, HasSubstr("no fix: every 5th of 1000 drawn"));
 }
 
-TEST(ErrorPlot, HasATableOfTheTenLargestErrors) {
+TEST(ErrorPlot, ListsTenLargestErrors) {
   ErrorPlot plot = grid(31);
   plot.fixes[7].fix_m.y() += 0.002;
   plot.fixes[7].image = "0007.png";
@@ -75,7 +75,7 @@ TEST(ErrorPlot, HasATableOfTheTenLargestErrors) {
   EXPECT_TRUE(drawing_of(ErrorPlot{"none", {}, {}, {}}).table.empty());
 }
 
-TEST(ErrorPlot, StaysSmallAndKeepsTheLargestErrors) {
+TEST(ErrorPlot, ThinsManyFixesAndKeepsLargestErrors) {
   ErrorPlot plot = grid(100'000);
   plot.fixes[12'345].fix_m.y() += 0.0013;
   const Drawing drawing = drawing_of(plot);
@@ -84,7 +84,7 @@ TEST(ErrorPlot, StaysSmallAndKeepsTheLargestErrors) {
   EXPECT_LT(svg_of(drawing).size(), 350'000u);  // half a kilobyte an arrow
 }
 
-TEST(ErrorPlot, OfOneFixOrNone) {
+TEST(ErrorPlot, RendersOneFixOrNone) {
   ErrorPlot plot = grid(2);
   plot.fixes.pop_back();
   EXPECT_THAT(svg_of(drawing_of(plot)), HasSubstr("<svg"));

@@ -23,7 +23,7 @@ class FloorPlotTest : public testing::Test {
   FloorPlot plot{"a 'title'", "label (mm)", 0.5, {{{0, 0}, 1.0}, {{0.5, 0}, 2.0}, {{1, 0}, {}}}};
 };
 
-TEST_F(FloorPlotTest, IsAPngOrAnSvgByItsEnding) {
+TEST_F(FloorPlotTest, RendersPngOrSvgByExtension) {
   draw_floor_plot(folder / "a.png", plot, lamps);
   EXPECT_THAT(TemporaryFolder::content_of(folder / "a.png"), StartsWith("\x89PNG"));
   draw_floor_plot(folder / "a.svg", plot, lamps);
@@ -33,7 +33,7 @@ TEST_F(FloorPlotTest, IsAPngOrAnSvgByItsEnding) {
   EXPECT_THAT(svg, HasSubstr(">7<"));
 }
 
-TEST_F(FloorPlotTest, IsTheSameBytesTwice) {
+TEST_F(FloorPlotTest, IsReproducible) {
   for (const char* name : {"a.png", "a.svg"}) {
     draw_floor_plot(folder / name, plot, lamps);
     const std::string first = TemporaryFolder::content_of(folder / name);
@@ -42,12 +42,12 @@ TEST_F(FloorPlotTest, IsTheSameBytesTwice) {
   }
 }
 
-TEST_F(FloorPlotTest, RefusesAnotherEnding) {
+TEST_F(FloorPlotTest, RejectsOtherExtension) {
   EXPECT_THAT(refusal_of([&] { draw_floor_plot(folder / "a.gif", plot, lamps); }),
               HasSubstr("a.gif: a picture's name should end in .png or .svg"));
 }
 
-TEST_F(FloorPlotTest, KeepsTheOldPictureWhenGnuplotFails) {
+TEST_F(FloorPlotTest, KeepsExistingFileWhenGnuplotFails) {
   const auto file = folder.file("a.png", "old");
   EXPECT_THAT(refusal_of([&] {
                 draw(file, {"a", 100, 100, "plot nonsense\n"});
@@ -56,7 +56,7 @@ TEST_F(FloorPlotTest, KeepsTheOldPictureWhenGnuplotFails) {
   EXPECT_EQ(TemporaryFolder::content_of(file), "old");
 }
 
-TEST_F(FloorPlotTest, NamesTheReasonWhyNoScriptIsMade) {
+TEST_F(FloorPlotTest, ReportsWhyScriptCannotBeMade) {
   rlimit before{};
   ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &before), 0);
   rlimit none = before;
@@ -68,7 +68,7 @@ TEST_F(FloorPlotTest, NamesTheReasonWhyNoScriptIsMade) {
                                  "Too many open files"));
 }
 
-TEST(GnuplotQuoted, LeavesNothingToInterpret) {
+TEST(GnuplotQuoted, PreventsInterpretation) {
   EXPECT_EQ(gnuplot_quoted("it's `ls` $x"), "'it''s `ls` $x'");
 }
 

@@ -20,7 +20,7 @@ using testing::StartsWith;
 
 class IntrinsicsPlotTest : public testing::Test {
  protected:
-  /// What gnuplot says, on stderr, is for whoever runs the program: nothing.
+  /// gnuplot's stderr is passed through to the user; it has to be empty.
   std::string svg_of(const IntrinsicsPlot& drawn) const {
     testing::internal::CaptureStderr();
     draw(folder / "a.svg", drawing_of(drawn));
@@ -29,7 +29,7 @@ class IntrinsicsPlotTest : public testing::Test {
   }
 
   TemporaryFolder folder;
-  /// Rms per axis 0.1 px.
+  /// RMS per axis: 0.1 px.
   IntrinsicsPlot plot{"a 'title'",
                       {800, 600},
                       {{{100, 50}, {0.1, 0.1}, false},
@@ -39,7 +39,7 @@ class IntrinsicsPlotTest : public testing::Test {
                       {0.4, 0.3, 0.4, 0.2, 0.03, 0.2, 0.4, 0.3, 0.4}};
 };
 
-TEST_F(IntrinsicsPlotTest, SaysWhatIsDrawnAndHowLarge) {
+TEST_F(IntrinsicsPlotTest, ReportsCountsAndMagnification) {
   const std::string svg = svg_of(plot);
   for (const char* text : {"a 'title'", "2 corners", "1 outliers", "200 times as long",
                            "standard deviation (px)", "0.05", "0.1", "0.2", "0.5"}) {
@@ -50,7 +50,7 @@ TEST_F(IntrinsicsPlotTest, SaysWhatIsDrawnAndHowLarge) {
   EXPECT_THAT(svg_of(plot), Not(HasSubstr("outliers")));
 }
 
-TEST_F(IntrinsicsPlotTest, IsAPngOrAnSvgTheSameBytesTwice) {
+TEST_F(IntrinsicsPlotTest, RendersReproduciblePngOrSvgByExtension) {
   draw(folder / "a.png", drawing_of(plot));
   const std::string first = TemporaryFolder::content_of(folder / "a.png");
   EXPECT_THAT(first, StartsWith("\x89PNG"));
@@ -61,7 +61,7 @@ TEST_F(IntrinsicsPlotTest, IsAPngOrAnSvgTheSameBytesTwice) {
               HasSubstr("a.gif: a picture's name should end in .png or .svg"));
 }
 
-TEST_F(IntrinsicsPlotTest, LeavesBlankWhatIsNotKnown) {
+TEST_F(IntrinsicsPlotTest, LeavesUnknownValuesBlank) {
   const std::string whole = svg_of(plot);
   plot.sd_px[0] = std::numeric_limits<double>::infinity();
   const std::string part = svg_of(plot);
@@ -71,13 +71,13 @@ TEST_F(IntrinsicsPlotTest, LeavesBlankWhatIsNotKnown) {
   EXPECT_THAT(svg_of(plot), AllOf(HasSubstr("not determined"), HasSubstr("2 corners")));
 }
 
-TEST_F(IntrinsicsPlotTest, DrawsAMapAllOfOneValueAndCornersWithoutResiduals) {
+TEST_F(IntrinsicsPlotTest, RendersConstantMapAndZeroResiduals) {
   plot.sd_px.assign(9, 0.2);
   for (auto& corner : plot.corners) corner = {corner.seen_px, {0, 0}, false};
   EXPECT_THAT(svg_of(plot), AllOf(HasSubstr("3 corners"), HasSubstr("1 times as long")));
 }
 
-TEST(ResidualMagnification, IsARoundNumberThatShowsTheResiduals) {
+TEST(ResidualMagnification, ReturnsRoundNumberWithinBounds) {
   EXPECT_DOUBLE_EQ(residual_magnification(0.1, 800), 200);
   EXPECT_DOUBLE_EQ(residual_magnification(0.11, 800), 100);
   EXPECT_DOUBLE_EQ(residual_magnification(1, 4000), 100);

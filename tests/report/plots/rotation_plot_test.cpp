@@ -12,7 +12,7 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-TEST(RotationPlot, ShowsLampsCirclesCentreAndPrincipalPoint) {
+TEST(RotationPlot, LabelsLampsRotationCenterAndPrincipalPoint) {
   const TemporaryFolder folder;
   const RotationPlot plot{"unit 'seven'",
                           {{42, {{100, 200}, {300, 200}, {200, 300}}, {200, 200}, {100, 101}},

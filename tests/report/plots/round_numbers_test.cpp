@@ -11,7 +11,7 @@ using testing::DoubleNear;
 using testing::ElementsAre;
 using testing::Pointwise;
 
-TEST(RoundNumbers, AreOneTwoOrFiveTimesAPowerOfTen) {
+TEST(RoundBelow, ReturnsOneTwoOrFiveTimesPowerOfTen) {
   EXPECT_DOUBLE_EQ(round_below(0.9), 0.5);
   EXPECT_DOUBLE_EQ(round_below(1), 1);
   EXPECT_DOUBLE_EQ(round_below(1.99), 1);
@@ -21,7 +21,7 @@ TEST(RoundNumbers, AreOneTwoOrFiveTimesAPowerOfTen) {
   }
 }
 
-TEST(RoundNumbers, ReachBeyondBothEnds) {
+TEST(RoundNumbers, CoversBothEnds) {
   EXPECT_THAT(round_numbers(0.016, 0.158),
               Pointwise(testing::DoubleEq(), {0.01, 0.02, 0.05, 0.1, 0.2}));
   EXPECT_THAT(round_numbers(0.5, 10), Pointwise(testing::DoubleEq(), {0.5, 1.0, 2.0, 5.0, 10.0}));

@@ -9,7 +9,7 @@ namespace {
 
 using testing::ElementsAre;
 
-TEST(Thinning, LeavesNoMoreThanAsked) {
+TEST(ThinningStep, LimitsCountAndReportsStep) {
   EXPECT_EQ(thinning_step(0, 10), 1u);
   EXPECT_EQ(thinning_step(10, 10), 1u);
   EXPECT_EQ(thinning_step(11, 10), 2u);
@@ -20,7 +20,7 @@ TEST(Thinning, LeavesNoMoreThanAsked) {
   EXPECT_EQ(thinning_note(230, 23), "every 23rd of 230 drawn");
 }
 
-TEST(Thinning, KeepsTheLargestInTheirPlace) {
+TEST(Thinned, KeepsLargestValuesInOrder) {
   const std::vector<double> values = {1, 9, 2, 3, 9, 8, 0};
   EXPECT_THAT(thinned(values, 3, 2), ElementsAre(0, 1, 3, 4, 6));
   EXPECT_THAT(thinned(values, 3, 0), ElementsAre(0, 3, 6));

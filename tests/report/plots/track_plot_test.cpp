@@ -9,8 +9,8 @@ namespace {
 
 using testing::HasSubstr;
 
-TEST(TrackPlot, ShowsDistancesToTheLeftOfTheCommandedLine) {
-  // Northwards; a fix 2 mm to the east is to the right.
+TEST(TrackPlot, PlotsDistancesToLeftOfCommandedLine) {
+  // The line runs north; a fix 2 mm to the east is to the right.
   const TrackPlot plot{
       "north", {{{1, 0}, {1, 2}}}, {{1.002, 0.5}, {0.999, 1.5}}, {{{1.001, 0.7}, {1.001, 0.9}}}};
   const Drawing drawing = drawing_of(plot);
@@ -24,7 +24,7 @@ TEST(TrackPlot, ShowsDistancesToTheLeftOfTheCommandedLine) {
   }
 }
 
-TEST(TrackPlot, OfManyFixesStaysSmall) {
+TEST(TrackPlot, ThinsManyFixes) {
   TrackPlot plot{"long", {{{0, 0}, {1, 1}}}, {}, {{{0, 0}, {1, 1}}}};
   for (int i = 0; i < 100'000; ++i) plot.fixes_m.emplace_back(1e-5 * i, 1e-5 * i);
   const Drawing drawing = drawing_of(plot);
@@ -32,7 +32,7 @@ TEST(TrackPlot, OfManyFixesStaysSmall) {
   EXPECT_LT(svg_of(drawing).size(), 700'000u);
 }
 
-TEST(TrackPlot, OfFixesExactlyOnTheLine) {
+TEST(TrackPlot, RendersFixesOnLine) {
   const TrackPlot plot{"", {{{0, 0}, {1, 0}}}, {{0.5, 0}}, {{{0, 0}, {1, 0}}}};
   EXPECT_THAT(svg_of(drawing_of(plot)), HasSubstr("<svg"));
 }

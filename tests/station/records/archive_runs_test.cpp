@@ -21,10 +21,10 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::SizeIs;
 
-/// Results of an archive as reprocessing leaves them.
-class ArchiveRunsOf : public testing::Test {
+/// Results of an archive as written by reprocessing.
+class ArchiveRuns : public testing::Test {
  protected:
-  ArchiveRunsOf() {
+  ArchiveRuns() {
     row("a,s1,look,2026-03-15,,1.2.3,key");
     row("a,s2,pass,2026-03-14T09:30:00,,1.2.3,key");
     row("b,s1,gate,2026-03-16,\"rms_px is 2 px, at most 1 px is asked for\",1.2.3,key");
@@ -71,7 +71,7 @@ class ArchiveRunsOf : public testing::Test {
   std::string summary = "camera,session,verdict,date,reason,version,key\n";
 };
 
-TEST_F(ArchiveRunsOf, AreThoseWithADateInTheirOrder) {
+TEST_F(ArchiveRuns, ReturnsDatedSessionsInChronologicalOrder) {
   const auto archive = sessions_of_archive(folder / "archive");
   EXPECT_EQ(archive.undated, 1U);
   EXPECT_EQ(archive.crashed, 1U);
@@ -98,7 +98,7 @@ TEST_F(ArchiveRunsOf, AreThoseWithADateInTheirOrder) {
   EXPECT_FALSE(runs[2].figures[3].value);
 }
 
-TEST_F(ArchiveRunsOf, AreKeptOnceForTrendsAndCapability) {
+TEST_F(ArchiveRuns, AreStoredOnceIfReadTwice) {
   Records records((folder / "records.db").string());
   for (int time = 0; time < 2; ++time) {
     for (const RunRecord& run : runs()) records.keep(run);
@@ -111,7 +111,7 @@ TEST_F(ArchiveRunsOf, AreKeptOnceForTrendsAndCapability) {
   EXPECT_TRUE(records.check("").problems.empty());
 }
 
-TEST_F(ArchiveRunsOf, OfWhatIsNotWrittenByReprocessingAreRefused) {
+TEST_F(ArchiveRuns, ThrowsForFilesNotWrittenByReprocessing) {
   EXPECT_THAT(refusal_of([&] { sessions_of_archive(folder / "none"); }), HasSubstr("summary.csv"));
   write("archive/sessions/a/s1/session.json", "{\"metrics\": 1}\n");
   EXPECT_THAT(refusal_of([&] { runs(); }),
@@ -120,7 +120,7 @@ TEST_F(ArchiveRunsOf, OfWhatIsNotWrittenByReprocessingAreRefused) {
   EXPECT_THAT(refusal_of([&] { runs(); }), HasSubstr("a/s1/session.json: cannot be opened"));
 }
 
-TEST_F(ArchiveRunsOf, OtherFoldersAreLeftOut) {
+TEST_F(ArchiveRuns, SkipsRowsWithInvalidIds) {
   const std::size_t before = sessions_of_archive(folder / "archive").sessions.size();
   row("..,s1,pass,2026-03-19,,1.2.3,key");
   const ReprocessedArchive archive = sessions_of_archive(folder / "archive");
@@ -129,7 +129,7 @@ TEST_F(ArchiveRunsOf, OtherFoldersAreLeftOut) {
   EXPECT_THAT(archive.refused.front(), HasSubstr("summary.csv:8: '..' is no id of a camera"));
 }
 
-TEST_F(ArchiveRunsOf, LinksOutOfTheArchiveAreRefused) {
+TEST_F(ArchiveRuns, RejectsLinksOutOfArchive) {
   write("secret.yaml", "password: 1\n");
   std::filesystem::remove(folder / "archive/sessions/a/s1/calibration.yaml");
   std::filesystem::create_symlink(folder / "secret.yaml",
@@ -138,7 +138,7 @@ TEST_F(ArchiveRunsOf, LinksOutOfTheArchiveAreRefused) {
 }
 
 /// Comparing all pairs would take minutes.
-TEST_F(ArchiveRunsOf, OfManyMetricsAreReadAtOnce) {
+TEST_F(ArchiveRuns, ReadsManyMetricsInProportionalTime) {
   constexpr std::size_t count = 400'000;
   std::string metrics;
   for (std::size_t i = 0; i < count; ++i) {
@@ -156,7 +156,7 @@ TEST_F(ArchiveRunsOf, OfManyMetricsAreReadAtOnce) {
   EXPECT_LT(taken.count(), 30);
 }
 
-TEST_F(ArchiveRunsOf, NestedWithoutEndAreRefused) {
+TEST_F(ArchiveRuns, RejectsDeeplyNestedJson) {
   write("archive/sessions/a/s1/session.json", std::string(1'000'000, '['));
   EXPECT_THAT(refusal_of([&] { runs(); }), HasSubstr("it has more than 16 levels"));
 }

@@ -18,7 +18,7 @@ using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
 
-/// The example's, with covariances.
+/// Returns the example calibration with covariances.
 Calibration measured() {
   Calibration calibration = read_calibration(kExample + "calibration.yaml");
   const auto size = static_cast<Eigen::Index>(calibration.camera.intrinsics.size());
@@ -50,7 +50,7 @@ RunRecord certified_run() {
   return record;
 }
 
-TEST(CertifiedValue, HasTwoDigitsOfTheExpandedUncertainty) {
+TEST(CertifiedValue, DescribeRoundsExpandedUncertaintyToTwoDigits) {
   const auto words = [](double value, std::optional<double> u) {
     return words_of(CertifiedValue{"", "px", value, u});
   };
@@ -62,7 +62,7 @@ TEST(CertifiedValue, HasTwoDigitsOfTheExpandedUncertainty) {
   EXPECT_EQ(words(520.12345, 0), words(520.12345, std::nullopt));
 }
 
-TEST(CertifiedValues, HaveTheUncertaintiesOfTheCalibration) {
+TEST(CertifiedValues, ReturnsUncertaintiesOfCalibration) {
   const Calibration calibration = measured();
   const auto values = certified_values(calibration);
   ASSERT_EQ(values.size(), 10u);
@@ -72,29 +72,29 @@ TEST(CertifiedValues, HaveTheUncertaintiesOfTheCalibration) {
   }
   EXPECT_EQ(values[0].value, 520);
   EXPECT_EQ(values[3].value, 296);
-  // What the lens does to the zenith is not known.
+  // The effect of the lens on the zenith is unknown.
   EXPECT_FALSE(values[6].standard_uncertainty);
   EXPECT_EQ(values[8].name, "lever arm x");
   EXPECT_NEAR(values[8].value, 1, 1e-12);
   EXPECT_NEAR(values[9].standard_uncertainty.value(), 0.2, 1e-12);
-  // It is now: nothing, so that the part of the captures is all there is.
+  // Now it is known to be zero, so that only the contribution of the captures remains.
   Calibration known = calibration;
   const auto lens = static_cast<Eigen::Index>(known.camera.intrinsics.size());
   known.rotation_center->by_intrinsics = MatrixX::Zero(2, lens);
   const double zenith_deg = 0.05 / 520 * 180 / std::numbers::pi;
   EXPECT_NEAR(certified_values(known)[6].standard_uncertainty.value(), zenith_deg, 1e-12);
-  // The zenith moves with the principal point, of which 0.03 px are not known.
+  // The zenith depends on the principal point, whose standard deviation is 0.03 px.
   known.rotation_center->by_intrinsics->operator()(0, 2) = 1 / 520.0;
   EXPECT_NEAR(certified_values(known)[6].standard_uncertainty.value(),
               std::hypot(0.05, 0.03) / 520 * 180 / std::numbers::pi, 1e-12);
-  // A calibration that states nothing.
+  // A calibration without uncertainties.
   for (const CertifiedValue& value :
        certified_values(read_calibration(kExample + "calibration.yaml"))) {
     EXPECT_FALSE(value.standard_uncertainty) << value.name;
   }
 }
 
-TEST(Certificate, HasWhatARecordHas) {
+TEST(Certificate, ContainsDataOfRecord) {
   const std::string page = certificate(certified_run(), measured());
   EXPECT_EQ(certificate(certified_run(), measured()), page);
   EXPECT_THAT(
@@ -112,7 +112,7 @@ TEST(Certificate, HasWhatARecordHas) {
   EXPECT_THAT(page, HasSubstr("counter(pages)"));
 }
 
-TEST(Certificate, HasThePrintOfTheBoardAsAnInput) {
+TEST(Certificate, ContainsPrintErrorOfBoard) {
   EXPECT_THAT(certificate(certified_run(), measured()),
               HasSubstr("The board and the known points are taken as exact"));
   RunRecord record = certified_run();
@@ -122,7 +122,7 @@ TEST(Certificate, HasThePrintOfTheBoardAsAnInput) {
                     Not(HasSubstr("The board and"))));
 }
 
-TEST(Certificate, SaysThatAUnitDoesNotConform) {
+TEST(Certificate, StatesNonconformityOfFailedUnit) {
   RunRecord record = certified_run();
   record.figures[0].value = 0.4;
   record.judge({{"the lens is poor", true}});
@@ -131,7 +131,7 @@ TEST(Certificate, SaysThatAUnitDoesNotConform) {
                     HasSubstr("<td>no</td>"), Not(HasSubstr("conforms with all"))));
 }
 
-TEST(Certificate, IsRefusedWhereThereCanBeNone) {
+TEST(Certificate, ThrowsForGoldenInvalidOrEditedRuns) {
   const auto refusal = [](const RunRecord& record) {
     return refusal_of([&] { certificate(record, measured()); });
   };

@@ -16,7 +16,7 @@ namespace {
 using testing::HasSubstr;
 using testing::StartsWith;
 
-/// A disk that is full: nothing can be written to a file.
+/// Full disk: no file can be written.
 class FullDisk {
  public:
   FullDisk() {
@@ -36,9 +36,9 @@ class FullDisk {
   void (*handler_)(int) = std::signal(SIGXFSZ, SIG_IGN);
 };
 
-class GoldenDue : public testing::Test {
+class GoldenProblem : public testing::Test {
  protected:
-  GoldenDue() {
+  GoldenProblem() {
     config.station = "a/station";
     config.spool = folder / "spool";
     config.type.imager_px = {800, 600};
@@ -61,7 +61,7 @@ class GoldenDue : public testing::Test {
   StationConfig config{};
 };
 
-TEST_F(GoldenDue, HasToBeMeasuredFirst) {
+TEST_F(GoldenProblem, ReportsUnmeasuredGoldenUnit) {
   note("unit", "PASS");
   EXPECT_THAT(problem(), StartsWith("the golden unit was not measured here yet: "));
   note("golden", "INVALID");
@@ -72,7 +72,7 @@ TEST_F(GoldenDue, HasToBeMeasuredFirst) {
   EXPECT_THAT(problem(), HasSubstr("not measured"));
 }
 
-TEST_F(GoldenDue, AfterSoManyUnitsThatWereJudged) {
+TEST_F(GoldenProblem, ReportsExpiredNumberOfUnits) {
   note("golden", "PASS");
   note("unit", "FAIL");
   note("unit", "INVALID");
@@ -85,17 +85,17 @@ TEST_F(GoldenDue, AfterSoManyUnitsThatWereJudged) {
   EXPECT_EQ(problem(), "");
 }
 
-TEST_F(GoldenDue, AfterSoManyHours) {
+TEST_F(GoldenProblem, ReportsExpiredHours) {
   note("golden", "PASS", "2026-01-01T00:00:00Z");
   EXPECT_THAT(problem(), HasSubstr("measured 2026-01-01T00:00:00Z (run RUN), not within 24 h"));
-  note("golden", "PASS", "9999-01-01T00:00:00Z");  // by a clock that was set back since
+  note("golden", "PASS", "9999-01-01T00:00:00Z");  // with a clock that was set back later
   EXPECT_THAT(problem(), HasSubstr("not within 24 h"));
   config.verify_due->hours.reset();
   EXPECT_EQ(problem(), "");
 }
 
-/// Of a unit that was begun before.
-TEST_F(GoldenDue, NotAtAVerdictForWhatRanOutMeanwhile) {
+/// The unit was started before the limits expired.
+TEST_F(GoldenProblem, IgnoresLimitsExpiredBeforeVerdict) {
   const auto at_verdict = [&] { return golden_problem(config, GoldenAt::verdict); };
   EXPECT_THAT(at_verdict(), HasSubstr("not measured"));
   note("golden", "PASS", "2026-01-01T00:00:00Z");
@@ -112,7 +112,7 @@ TEST_F(GoldenDue, NotAtAVerdictForWhatRanOutMeanwhile) {
   EXPECT_THAT(at_verdict(), StartsWith("the golden unit failed"));
 }
 
-TEST_F(GoldenDue, AfterItFailed) {
+TEST_F(GoldenProblem, ReportsFailedGoldenUnit) {
   note("golden", "PASS");
   note("golden", "FAIL");
   EXPECT_THAT(problem(), StartsWith("the golden unit failed (run RUN): mend the station"));
@@ -120,8 +120,8 @@ TEST_F(GoldenDue, AfterItFailed) {
   EXPECT_THAT(problem(), StartsWith("the golden unit failed"));
 }
 
-/// With another lamp map it measured another station.
-TEST_F(GoldenDue, AfterTheStationWasChanged) {
+/// A golden run with another lamp map does not qualify the station.
+TEST_F(GoldenProblem, ReportsChangedMeasuringSetup) {
   note("golden", "PASS");
   ASSERT_EQ(problem(), "");
   config.sha256 = "of other comments";
@@ -139,8 +139,8 @@ TEST_F(GoldenDue, AfterTheStationWasChanged) {
   EXPECT_EQ(problem(), "");
 }
 
-/// No earlier PASS stands where a later run could not be noted.
-TEST_F(GoldenDue, WhenARunCannotBeNoted) {
+/// An earlier PASS is not valid after a run that could not be noted.
+TEST_F(GoldenProblem, ReportsMissingNoteAfterWriteError) {
   for (const std::string kind : {"golden", "unit"}) {
     note("golden", "PASS");
     ASSERT_EQ(problem(), "");
@@ -152,7 +152,7 @@ TEST_F(GoldenDue, WhenARunCannotBeNoted) {
   }
 }
 
-TEST_F(GoldenDue, WhenItsNoteIsDamaged) {
+TEST_F(GoldenProblem, ReportsDamagedNote) {
   note("golden", "PASS");
   ASSERT_EQ(problem(), "");
   const auto file = std::filesystem::directory_iterator(config.spool)->path();
@@ -162,7 +162,7 @@ TEST_F(GoldenDue, WhenItsNoteIsDamaged) {
     folder.file(name, text);
     EXPECT_THAT(problem(), StartsWith("what the golden unit said is not known")) << text;
   }
-  folder.file(name, "RUN PASS " + now_utc() + "\n");  // an older program's
+  folder.file(name, "RUN PASS " + now_utc() + "\n");  // note of an older program
   EXPECT_EQ(problem(),
             "with which lamp map the golden unit was measured is not known (run RUN): 'vlp-station "
             "verify' is due");
@@ -173,7 +173,7 @@ TEST_F(GoldenDue, WhenItsNoteIsDamaged) {
   EXPECT_THAT(problem(), HasSubstr("what the golden unit said is not known"));
 }
 
-TEST_F(GoldenDue, WritesToNoFileThatALinkLeadsTo) {
+TEST_F(GoldenProblem, RejectsSymbolicLinkAsNote) {
   note("golden", "PASS");
   const auto file = std::filesystem::directory_iterator(config.spool)->path();
   std::filesystem::remove(file);
@@ -188,7 +188,7 @@ TEST_F(GoldenDue, WritesToNoFileThatALinkLeadsTo) {
   EXPECT_EQ(TemporaryFolder::content_of(mine), "mine\n");
 }
 
-TEST_F(GoldenDue, AfterItsRunWasVoided) {
+TEST_F(GoldenProblem, ReportsUnmeasuredGoldenUnitAfterVoiding) {
   note("golden", "PASS");
   forget_golden(config, "another");
   EXPECT_EQ(problem(), "");
@@ -197,7 +197,7 @@ TEST_F(GoldenDue, AfterItsRunWasVoided) {
   forget_golden(config, "RUN");
 }
 
-TEST_F(GoldenDue, IsNothingWithoutTheKey) {
+TEST_F(GoldenProblem, ReturnsEmptyWithoutVerifyDue) {
   config.verify_due.reset();
   note("golden", "FAIL");
   EXPECT_EQ(problem(), "");

@@ -35,7 +35,7 @@ RunRecord judged_run() {
   return run;
 }
 
-class HookTest : public testing::Test {
+class RunHook : public testing::Test {
  protected:
   RunEvent run(const std::string& script, double time_limit_s = 20) {
     const auto begun = std::chrono::steady_clock::now();
@@ -48,7 +48,7 @@ class HookTest : public testing::Test {
   double took_s = 0;
 };
 
-TEST_F(HookTest, GetsTheRunInItsFolder) {
+TEST_F(RunHook, PassesRunOnStdinInHookFolder) {
   const RunEvent event = run("cat >seen.json; echo first; echo label 7; echo");
   EXPECT_EQ(event.what, kHookDone);
   EXPECT_EQ(event.text, "label 7");
@@ -59,15 +59,15 @@ TEST_F(HookTest, GetsTheRunInItsFolder) {
   EXPECT_EQ(json["figures"]["rms_px"]["met"], true);
 }
 
-TEST_F(HookTest, NeedNotReadNorBeSilent) {
+TEST_F(RunHook, SucceedsIfHookIgnoresInputOrLeavesChildren) {
   EXPECT_EQ(run("exec <&-; head -c 3000000 /dev/zero | tr '\\0' '\\n'; echo end >&2").text, "end");
-  // What it leaves running holds nobody up.
+  // Remaining children do not delay the caller.
   EXPECT_EQ(run("sleep 10 & echo printed").text, "printed");
   EXPECT_LT(took_s, 5);
   EXPECT_EQ(run("exec >&- 2>&-; sleep 0.1").what, kHookDone);
 }
 
-TEST_F(HookTest, FailsInWords) {
+TEST_F(RunHook, DescribesFailure) {
   EXPECT_EQ(run("echo the printer is out of labels; exit 3").what, kHookFailed);
   EXPECT_EQ(run("echo the printer is out of labels; exit 3").text,
             "exit code 3: the printer is out of labels");
@@ -79,7 +79,7 @@ TEST_F(HookTest, FailsInWords) {
   EXPECT_THAT(missing.text, HasSubstr("/nowhere/label cannot be started: No such file"));
 }
 
-TEST_F(HookTest, IsKilledWithItsChildrenWhenItTakesTooLong) {
+TEST_F(RunHook, KillsHookAndChildrenAtTimeLimit) {
   const RunEvent event = run("sleep 100 & echo $! >child; echo waits; wait", 0.3);
   EXPECT_EQ(event.what, kHookFailed);
   EXPECT_EQ(event.text, "no end within 0.3 s, killed: waits");
@@ -87,7 +87,7 @@ TEST_F(HookTest, IsKilledWithItsChildrenWhenItTakesTooLong) {
   std::string child = TemporaryFolder::content_of(folder / "child");
   ASSERT_FALSE(child.empty());
   child.pop_back();
-  // A dead process that nobody waited for has no command line.
+  // A zombie process has no command line.
   const std::string its = "/proc/" + child + "/cmdline";
   for (int i = 0; i < 100 && !TemporaryFolder::content_of(its).empty(); ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
@@ -95,7 +95,7 @@ TEST_F(HookTest, IsKilledWithItsChildrenWhenItTakesTooLong) {
   EXPECT_EQ(TemporaryFolder::content_of(its), "");
 }
 
-TEST_F(HookTest, IsKilledThoughItWritesWithoutEndAndLeftItsGroup) {
+TEST_F(RunHook, KillsHookThatFloodsOutputOrLeftItsGroup) {
   EXPECT_EQ(run("exec cat /dev/zero", 0.3).what, kHookFailed);
   EXPECT_LT(took_s, 5);
   const RunEvent event =
@@ -106,7 +106,7 @@ TEST_F(HookTest, IsKilledThoughItWritesWithoutEndAndLeftItsGroup) {
   EXPECT_LT(took_s, 5);
 }
 
-TEST_F(HookTest, IsKilledWithWhatMadeASessionOfItsOwn) {
+TEST_F(RunHook, KillsChildrenInOwnSessions) {
   const RunEvent event = run(
       "setsid sh -c 'sleep 100 & echo $! >child'; setsid sleep 100 & echo $! >other; sleep 100", 1);
   EXPECT_EQ(event.text, "no end within 1 s, killed");
@@ -119,8 +119,8 @@ TEST_F(HookTest, IsKilledWithWhatMadeASessionOfItsOwn) {
   }
 }
 
-/// A station that is killed leaves its hook running: nobody runs it a second time meanwhile.
-TEST_F(HookTest, HoldsItsLockWhenItsStationIsKilled) {
+/// The hook of a killed station continues, and is not run a second time meanwhile.
+TEST_F(RunHook, KeepsLockWhenStationIsKilled) {
   const std::string name = judged_run().run;
   const pid_t station = start_child([&] {
     run_hook({{"sh", "-c", "touch begun; until [ -e end ]; do sleep 0.02; done"}, folder / ".", 20},
@@ -139,8 +139,8 @@ TEST_F(HookTest, HoldsItsLockWhenItsStationIsKilled) {
   EXPECT_TRUE(wait_for([&] { return HookLock(folder / ".", name).held(); }));
 }
 
-/// Whoever started this program may ignore signals, and leave files open.
-TEST_F(HookTest, InheritsNoSignalsAndNoFiles) {
+/// The parent of this program can ignore signals and leave files open.
+TEST_F(RunHook, InheritsNoSignalsOrDescriptors) {
   std::signal(SIGCHLD, SIG_IGN);
   EXPECT_EQ(run("exit 3").text, "exit code 3");
   const auto interrupt = std::signal(SIGINT, SIG_IGN), pipe = std::signal(SIGPIPE, SIG_IGN);
@@ -154,7 +154,7 @@ TEST_F(HookTest, InheritsNoSignalsAndNoFiles) {
   std::signal(SIGPIPE, pipe);
 }
 
-TEST_F(HookTest, IsOpenUntilItIsDone) {
+TEST_F(RunHook, IsOpenUntilHookSucceeds) {
   RunRecord run = judged_run();
   EXPECT_FALSE(hook_is_open(run));
   EXPECT_EQ(hook_problem(run), "");
@@ -168,7 +168,7 @@ TEST_F(HookTest, IsOpenUntilItIsDone) {
   run.events.push_back(new_event(kHookDone, ""));
   EXPECT_FALSE(hook_is_open(run));
   EXPECT_EQ(hook_problem(run), "");
-  // Wanted again, for a run that was voided.
+  // Requested again for a voided run.
   run.events.push_back(new_event(kHookWanted, "label it"));
   EXPECT_TRUE(hook_is_open(run));
   EXPECT_EQ(hook_problem(run), "was not run to its end");
@@ -176,7 +176,7 @@ TEST_F(HookTest, IsOpenUntilItIsDone) {
   EXPECT_FALSE(hook_is_open(run));
 }
 
-TEST_F(HookTest, OfARunIsRunByOneProgram) {
+TEST_F(RunHook, IsCalledByOneProgramAtATime) {
   const std::string name = judged_run().run;
   {
     const HookLock one(folder / ".", name), other(folder / ".", name);
@@ -188,7 +188,7 @@ TEST_F(HookTest, OfARunIsRunByOneProgram) {
   EXPECT_TRUE(std::filesystem::is_empty(folder / "."));
 }
 
-TEST(HookLock, MakesNoFileThatALinkLeadsTo) {
+TEST(HookLock, CreatesNoFileThroughSymbolicLink) {
   const TemporaryFolder folder;
   std::filesystem::create_directory(folder / "spool");
   std::filesystem::create_symlink(folder / "elsewhere", folder / "spool/.hook-run");

@@ -21,7 +21,7 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::SizeIs;
 
-/// A station with a file of records.
+/// Station with a file of records.
 class KnownRunsTest : public testing::Test {
  protected:
   KnownRunsTest() {
@@ -35,7 +35,7 @@ class KnownRunsTest : public testing::Test {
     Records(config.records).keep(run);
     return run.run;
   }
-  /// Where no records are that could take it.
+  /// Makes the records unavailable.
   std::string keep_waiting(int number) const {
     const RunRecord run = sample(run_of(number), "b", 0.1);
     Spool(config.spool, config.records).keep(run);
@@ -54,7 +54,7 @@ class KnownRunsTest : public testing::Test {
   StationConfig config{};
 };
 
-TEST_F(KnownRunsTest, AreThoseOfTheRecordsAndThoseThatWait) {
+TEST_F(KnownRunsTest, ReturnsStoredAndWaitingRuns) {
   const std::string kept = keep(1);
   EXPECT_THAT(KnownRuns(config.records).list({}), ElementsAre(Field(&RunSummary::run, kept)));
   const std::string waits = keep_waiting(2);
@@ -82,13 +82,13 @@ TEST_F(KnownRunsTest, AreThoseOfTheRecordsAndThoseThatWait) {
   EXPECT_THROW(known.whole({}), std::runtime_error);
 }
 
-TEST_F(KnownRunsTest, AreNoneWithoutRecords) {
+TEST_F(KnownRunsTest, ThrowsWithoutRecords) {
   EXPECT_THROW(KnownRuns{config}, std::runtime_error);
   EXPECT_THROW(KnownRuns{config.records}, std::runtime_error);
   EXPECT_FALSE(std::filesystem::exists(config.records)) << "a station makes them";
 }
 
-TEST(RunCounts, LeaveVoidedRunsOutOfTheYield) {
+TEST(CountRuns, ExcludesVoidedRunsFromYield) {
   const std::vector<RunSummary> runs{{"1", "unit", "", "", "", "PASS", "", ""},
                                      {"2", "unit", "", "", "", "PASS", "", ""},
                                      {"3", "unit", "", "", "", "FAIL", "", ""},
@@ -105,7 +105,7 @@ TEST(RunCounts, LeaveVoidedRunsOutOfTheYield) {
   EXPECT_FALSE(count_runs({}).yield());
 }
 
-TEST(RunCounts, HaveAFirstPassYieldAndRework) {
+TEST(CountRuns, ComputesFirstPassYieldAndRework) {
   const std::vector<RunSummary> runs{{"1", "unit", "", "a", "", "PASS", "", ""},
                                      {"2", "unit", "", "b", "", "FAIL", "", ""},
                                      {"3", "unit", "", "b", "", "PASS", "", ""},
@@ -120,7 +120,7 @@ TEST(RunCounts, HaveAFirstPassYieldAndRework) {
   EXPECT_FALSE(count_runs({}).first_pass_yield());
 }
 
-TEST_F(KnownRunsTest, AreFilteredByOperatorAndShift) {
+TEST_F(KnownRunsTest, FiltersByOperatorAndShift) {
   RunRecord night = sample(run_of(1), "a", 0.1), day = sample(run_of(2), "a", 0.1);
   night.operator_name = "Ann";
   night.shift = "night";
@@ -140,7 +140,7 @@ TEST_F(KnownRunsTest, AreFilteredByOperatorAndShift) {
   expect_only_the_night();
 }
 
-TEST_F(KnownRunsTest, AreVoidedByThoseAloneWhoMay) {
+TEST_F(KnownRunsTest, VoidRunRejectsUnauthorizedOperator) {
   const std::string run = keep(1);
   config.void_operators = {"Bea"};
   KnownRuns known(config);
@@ -151,7 +151,7 @@ TEST_F(KnownRunsTest, AreVoidedByThoseAloneWhoMay) {
   EXPECT_THAT(void_run(known, run, "Bea", "wrong serial").run.events, SizeIs(1));
 }
 
-TEST_F(KnownRunsTest, AreVoidedOnceWithWhoAndWhy) {
+TEST_F(KnownRunsTest, VoidRunRecordsOperatorAndReasonOnce) {
   const std::string run = keep(1);
   {
     KnownRuns known(config.records);
@@ -165,7 +165,7 @@ TEST_F(KnownRunsTest, AreVoidedOnceWithWhoAndWhy) {
   EXPECT_THAT(record->events[0].who, testing::StartsWith("Ann ("));
 }
 
-TEST_F(KnownRunsTest, LeaveNoValidCalibrationOfAVoidedPass) {
+TEST_F(KnownRunsTest, VoidRunRenamesCalibrationOfPassedRun) {
   const RunRecord run = sample(run_of(1), "a", 0.1);
   ASSERT_TRUE(run.passed());
   Records(config.records).keep(run);
@@ -179,14 +179,14 @@ TEST_F(KnownRunsTest, LeaveNoValidCalibrationOfAVoidedPass) {
   EXPECT_EQ(TemporaryFolder::content_of(results / "voided-calibration.yaml"), run.calibration);
   EXPECT_THAT(TemporaryFolder::content_of(folder / "told.json"),
               testing::StartsWith("{\n \"event\": \"voided\",\n"));
-  // Where the files are is known to its station only.
+  // Only the station has the location of the files.
   const std::string second = keep(2);
   KnownRuns records(config.records);
   EXPECT_THAT(void_run(records, second, "Ann", "wrong serial").files_problem,
               HasSubstr("keep their names: the same command with --station of station-1"));
 }
 
-TEST_F(KnownRunsTest, FinishAVoidingByRecordsAlone) {
+TEST_F(KnownRunsTest, VoidRunCompletesVoidingByRecordsAlone) {
   config.hook = Hook{{"sh", "-c", "cat >told.json"}, folder / ".", 20};
   const std::string run = keep(1);
   {
@@ -202,8 +202,8 @@ TEST_F(KnownRunsTest, FinishAVoidingByRecordsAlone) {
   EXPECT_THROW(void_run(known, run, "Ben", "again"), std::invalid_argument) << "nothing is left";
 }
 
-/// Labels and the factory's system have to hear of it.
-TEST_F(KnownRunsTest, TellTheHookWhatWasVoided) {
+/// Labels and the factory's system are informed of it.
+TEST_F(KnownRunsTest, VoidRunCallsHook) {
   config.hook = Hook{{"sh", "-c", "cat >told.json; echo taken back"}, folder / ".", 20};
   const std::string run = keep(1);
   {
@@ -219,7 +219,7 @@ TEST_F(KnownRunsTest, TellTheHookWhatWasVoided) {
   const auto record = Records(config.records).find(run);
   ASSERT_THAT(record->events, SizeIs(3));
   EXPECT_EQ(record->events[2].text, "taken back");
-  // One that was done at the verdict is open again when it fails now.
+  // A hook that succeeded at the verdict is open again if it fails now.
   config.hook = Hook{{"false"}, folder / ".", 20};
   RunRecord second = sample(run_of(2), "a", 0.1);
   second.events = {new_event(kHookWanted, "label"), new_event(kHookDone, "")};
@@ -230,7 +230,7 @@ TEST_F(KnownRunsTest, TellTheHookWhatWasVoided) {
   EXPECT_THAT(known.with_open_hook(), ElementsAre(second.run));
 }
 
-TEST_F(KnownRunsTest, TellNoHookOfAnotherStation) {
+TEST_F(KnownRunsTest, VoidRunCallsNoHookOfAnotherStation) {
   const std::string run = keep(1);
   config.station = "station-2";
   config.hook = Hook{{"touch", "told"}, folder / ".", 20};
@@ -239,7 +239,7 @@ TEST_F(KnownRunsTest, TellNoHookOfAnotherStation) {
   EXPECT_FALSE(std::filesystem::exists(folder / "told"));
 }
 
-TEST_F(KnownRunsTest, AreNotVoidedWhileTheirHookIsRun) {
+TEST_F(KnownRunsTest, VoidRunThrowsWhileHookRuns) {
   config.hook = Hook{{"true"}, folder / ".", 20};
   const std::string run = keep(1);
   KnownRuns known(config);

@@ -33,7 +33,7 @@ class MeasuringDigest : public testing::Test {
     folder.file(file, text.replace(at, from.size(), to));
   }
   std::string digest() const { return measuring_digest(read_station(folder / "station.yaml")); }
-  /// With a change, which is taken back.
+  /// Returns the digest with a temporary change.
   std::string digest_with(const std::string& file, const std::string& from, const std::string& to) {
     const std::string before = TemporaryFolder::content_of(folder / file);
     change(file, from, to);
@@ -45,7 +45,7 @@ class MeasuringDigest : public testing::Test {
   TemporaryFolder folder;
 };
 
-TEST_F(MeasuringDigest, IsOfWhatMeasures) {
+TEST_F(MeasuringDigest, ChangesWithMeasuringSetup) {
   std::set<std::string> digests{digest()};
   const auto is_new = [&](const char* file, const char* from, const char* to) {
     EXPECT_TRUE(digests.insert(digest_with(file, from, to)).second) << from << " -> " << to;
@@ -73,7 +73,7 @@ TEST_F(MeasuringDigest, IsOfWhatMeasures) {
   is_new("golden.yaml", "403, 296", "403, 297");
 }
 
-TEST_F(MeasuringDigest, IsNotOfWhatDoesNot) {
+TEST_F(MeasuringDigest, IgnoresOtherSettings) {
   const std::string before = digest();
   const std::string config_sha256 = read_station(folder / "station.yaml").sha256;
   const auto is_same = [&](const char* file, const std::string& from, const std::string& to) {
@@ -100,7 +100,7 @@ TEST_F(MeasuringDigest, IsNotOfWhatDoesNot) {
   EXPECT_EQ(digest(), before);
   EXPECT_NE(read_station(folder / "station.yaml").sha256, config_sha256)
       << "records have the files as they are";
-  // Another name of a file that says the same.
+  // Another name of a file with the same content.
   fs::rename(folder / "lamps.yaml", folder / "ceiling.yaml");
   change("station.yaml", "lamps: lamps.yaml", "lamps: ceiling.yaml");
   EXPECT_EQ(digest(), before);

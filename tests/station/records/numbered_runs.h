@@ -17,7 +17,7 @@ namespace vlp {
 
 inline constexpr std::size_t kImagesOfARun = 30;
 
-/// With digests of its own.
+/// Returns a run with its own digests.
 inline RunRecord numbered_run(int number) {
   RunRecord run;
   run.run = "20261121T134501Z-" + std::to_string(100000 + number);
@@ -40,7 +40,7 @@ inline RunRecord numbered_run(int number) {
   return run;
 }
 
-/// The names of all runs in the records; each is whole.
+/// Returns the ids of all runs in the records, and expects that each is complete.
 inline std::set<std::string> whole_runs(const std::string& where) {
   Records records(where);
   std::set<std::string> names;

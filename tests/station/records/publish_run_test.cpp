@@ -27,13 +27,13 @@ RunRecord passed() {
   return record;
 }
 
-TEST(PublishRun, WritesWhatIsMissing) {
+TEST(PublishRun, WritesMissingFiles) {
   const TemporaryFolder folder;
   const RunRecord record = passed();
   const fs::path results = publish_run(record, {}, folder / "results");
   const std::string report = TemporaryFolder::content_of(results / "report.html");
   EXPECT_EQ(TemporaryFolder::content_of(results / "calibration.yaml"), record.calibration);
-  // The one is written again, the other stays.
+  // The missing file is written again, the other one stays.
   fs::remove(results / "calibration.yaml");
   folder.file((results / "report.html").string(), "with pictures");
   publish_run(record, {}, folder / "results");
@@ -44,7 +44,7 @@ TEST(PublishRun, WritesWhatIsMissing) {
   EXPECT_EQ(TemporaryFolder::content_of(results / "report.html"), report);
 }
 
-TEST(PublishRun, ReplacesAReportThatIsNotTheRecordsIfAskedTo) {
+TEST(PublishRun, ReplacesDifferentReportOnRequest) {
   const TemporaryFolder folder;
   const RunRecord record = passed();
   const fs::path results = publish_run(record, {}, folder / "results");
@@ -62,7 +62,7 @@ TEST(PublishRun, ReplacesAReportThatIsNotTheRecordsIfAskedTo) {
   EXPECT_FALSE(fs::exists(results / "replaced-report.html"));
 }
 
-TEST(PublishRun, WritesNothingOutsideTheResults) {
+TEST(PublishRun, WritesNothingOutsideResults) {
   const TemporaryFolder folder;
   fs::create_directory(folder / "elsewhere");
   RunRecord record = passed();
@@ -87,7 +87,7 @@ TEST(PublishRun, WritesNothingOutsideTheResults) {
   EXPECT_TRUE(fs::is_empty(folder / "elsewhere"));
 }
 
-TEST(CheckResults, OverwritesNoFileThatALinkLeadsTo) {
+TEST(CheckResults, OverwritesNoTargetOfSymbolicLink) {
   const TemporaryFolder folder;
   const fs::path mine = folder.file("mine.txt", "mine");
   fs::create_directories(folder / "results/0001");
@@ -97,7 +97,7 @@ TEST(CheckResults, OverwritesNoFileThatALinkLeadsTo) {
   EXPECT_FALSE(fs::is_symlink(folder / "results/0001/.writable"));
 }
 
-TEST(PublishRun, LeavesAnotherCalibrationAlone) {
+TEST(PublishRun, ThrowsForDifferentCalibration) {
   const TemporaryFolder folder;
   const RunRecord record = passed();
   const fs::path results = publish_run(record, {}, folder / "results");
@@ -117,7 +117,7 @@ TEST(PublishRun, LeavesAnotherCalibrationAlone) {
   EXPECT_FALSE(fs::exists(folder / "mine.yaml"));
 }
 
-TEST(PublishRun, NamesACalibrationByItsVerdict) {
+TEST(PublishRun, NamesCalibrationByVerdict) {
   const TemporaryFolder folder;
   RunRecord record = passed();
   record.judge({{"the lens is decentred", true}});
@@ -126,7 +126,7 @@ TEST(PublishRun, NamesACalibrationByItsVerdict) {
   EXPECT_TRUE(fs::exists(publish_run(record, {}, folder / "b") / "invalid-calibration.yaml"));
 }
 
-TEST(MarkFilesVoided, LeavesNoFileThatSeemsValid) {
+TEST(MarkFilesVoided, RenamesAllFiles) {
   const TemporaryFolder folder;
   RunRecord record = passed();
   const fs::path results = publish_run(record, {}, folder / "results");
@@ -139,16 +139,16 @@ TEST(MarkFilesVoided, LeavesNoFileThatSeemsValid) {
   EXPECT_THAT(names,
               testing::UnorderedElementsAre("voided-calibration.yaml", "voided-certificate.html",
                                             "voided-report.html"));
-  // As after a kill, and before the files are written.
+  // As after a kill before the files are written.
   mark_files_voided(record, folder / "results");
   mark_files_voided(record, folder / "none");
-  // A run that is published when it is voided already.
+  // A run that is published after it was voided.
   record.events.push_back(new_event(kVoided, "wrong serial", "Ann"));
   EXPECT_TRUE(fs::exists(publish_run(record, {}, folder / "a") / "voided-calibration.yaml"));
   EXPECT_FALSE(fs::exists(folder / "a" / record.camera / record.run / "report.html"));
 }
 
-TEST(CheckResults, RefusesAFolderThatCannotBeOne) {
+TEST(CheckResults, ThrowsIfFolderCannotBeCreated) {
   const TemporaryFolder folder;
   EXPECT_EQ(refusal_of([&] { check_results(folder / "results", "0001"); }), "");
   EXPECT_TRUE(fs::is_empty(folder / "results/0001"));

@@ -33,7 +33,7 @@ using testing::Not;
 using testing::SizeIs;
 using testing::StartsWith;
 
-/// A record with another text in each of its fields.
+/// Returns a record with a different text in each of its fields.
 RunRecord with_all_texts() {
   RunRecord record = sample(run_of(7), "a", 0.5);
   for (const RunField& field : run_fields()) {
@@ -52,7 +52,7 @@ void check_all_texts(Records& records) {
   }
 }
 
-/// Events come to a run that is kept, once each, and stay.
+/// Checks that events are added to a stored run once and remain.
 void check_events(Records& records) {
   RunRecord run = sample(run_of(8), "e", 0.5), other = sample(run_of(6), "e", 0.5);
   run.events = {new_event(kHookWanted, "label 'x'")};
@@ -65,7 +65,7 @@ void check_events(Records& records) {
   run.events.push_back(new_event(kHookFailed, "exit code 3"));
   records.keep(run);
   EXPECT_THAT(records.with_open_hook("station-1"), ElementsAre(run.run));
-  run.events = {new_event(kHookDone, "")};  // by a program that knows nothing of the others
+  run.events = {new_event(kHookDone, "")};  // by a program without the other events
   records.keep(run);
   EXPECT_THAT(records.with_open_hook("station-1"), IsEmpty());
   const auto found = records.find(run.run);
@@ -79,7 +79,7 @@ void check_events(Records& records) {
   EXPECT_EQ(found->events[2].what, kHookDone);
 }
 
-/// A run that is voided stays, and counts in nothing. Of check_records().
+/// Part of check_records(): a voided run remains, but is not counted.
 void check_voided(Records& records) {
   const std::size_t before = records.trend("rms_px", {}).size();
   RunRecord run = sample(run_of(0), "a", 0);
@@ -96,13 +96,13 @@ void check_voided(Records& records) {
   EXPECT_EQ(records.owner_of(std::string(64, 'b'), "b"), (ImageOwner{"a", run_of(1)}));
 }
 
-/// What holds in every database.
+/// Checks the properties of records in every database.
 void check_records(const std::string& where) {
   Records records(where);
   for (int i = 0; i < 4; ++i) {
     records.keep(sample(run_of(i), i == 2 ? "b" : "a", i == 3 ? 1.5 : 0.1 * i));
   }
-  // Kept once; another of its name is refused.
+  // Stored once; a different run of its id is rejected.
   records.keep(sample(run_of(0), "a", 0));
   EXPECT_THAT(refusal_of([&] { records.keep(sample(run_of(0), "other", 0.7)); }),
               HasSubstr("has another run " + run_of(0)));
@@ -112,7 +112,7 @@ void check_records(const std::string& where) {
   EXPECT_EQ(all[3].verdict, "FAIL");
   EXPECT_EQ(all[3].station, "station-1");
   EXPECT_THAT(all[3].causes, StartsWith("it's \"blurred\""));
-  // Whose an image is: of the first run that uses it, and of no run of the camera itself.
+  // The owner of an image is the first run that uses it, and no run of the camera itself.
   EXPECT_EQ(records.owner_of(std::string(64, 'b'), "b"), (ImageOwner{"a", run_of(0)}));
   EXPECT_EQ(records.owner_of(std::string(64, 'b'), "a"), (ImageOwner{"b", run_of(2)}));
   EXPECT_EQ(records.owner_of(std::string(64, 'c'), "b"), ImageOwner{}) << "it was refused there";
@@ -160,7 +160,7 @@ void check_records(const std::string& where) {
   EXPECT_EQ(trail.entries, 7U + 6U) << "runs and events";
 }
 
-/// Two programs that write at the same time, the first also makes the tables.
+/// Two programs write at the same time; the first one also creates the tables.
 void check_two_writers(const std::string& where) {
   constexpr int each = 25;
   std::vector<pid_t> children;
@@ -182,7 +182,7 @@ void check_two_writers(const std::string& where) {
   for (const RunSummary& run : runs) EXPECT_THAT(records.find(run.run)->images, SizeIs(2));
 }
 
-/// Records as version 1 of their tables kept them.
+/// Records in the tables of version 1.
 const std::string kVersion1 =
     R"(CREATE TABLE vlp_schema (version INTEGER PRIMARY KEY);
 INSERT INTO vlp_schema (version) VALUES (1);
@@ -208,7 +208,7 @@ INSERT INTO figures VALUES ('20261121T134501Z-0001', 5, 'focal_percent', 1, NULL
 INSERT INTO images VALUES ('20261121T134501Z-0001', 'boards', '0000.png', 'bb', '');
 )";
 
-/// Tables, their columns, the version and the figures.
+/// Returns tables, their columns, the version and the metrics.
 std::string state_of(const std::string& where) {
   const bool is_server = where.starts_with("postgresql://");
   return answer_of(where,
@@ -219,7 +219,7 @@ std::string state_of(const std::string& where) {
                        "\nSELECT * FROM vlp_schema;\nSELECT * FROM figures ORDER BY place;\n");
 }
 
-/// Of a database that holds kVersion1.
+/// Checks the migration of a database with kVersion1.
 void check_migration(const std::string& where) {
   Records records(where);
   const auto found = records.find("20261121T134501Z-0001");
@@ -245,7 +245,8 @@ void check_migration(const std::string& where) {
   EXPECT_THAT(records.check("").problems, IsEmpty());
 }
 
-/// Of a database that holds kVersion1, which another program is about to bring up to date.
+/// Checks that a database with kVersion1 is migrated once, if another program is about to migrate
+/// it.
 void check_migration_by_another(const std::string& where) {
   const TemporaryFolder folder;
   const auto halfway = folder / "halfway";
@@ -268,14 +269,14 @@ void check_migration_by_another(const std::string& where) {
   EXPECT_EQ(Records(where).find("20261121T134501Z-0001")->figures[0].unit, "by another");
 }
 
-/// Of a database that holds kVersion1 and stops what changes its figures.
+/// Checks that a database with kVersion1 is unchanged if its migration fails.
 void check_stopped_migration(const std::string& where) {
   const std::string before = state_of(where);
   EXPECT_THAT(refusal_of([&] { Records records(where); }), HasSubstr("stopped"));
   EXPECT_EQ(state_of(where), before);
 }
 
-/// Of a database that holds kVersion1.
+/// Checks that a database of a later version is rejected and unchanged.
 void check_later_version(const std::string& where) {
   answer_of(where, "UPDATE vlp_schema SET version = 99;\n");
   const std::string before = state_of(where);
@@ -286,7 +287,7 @@ void check_later_version(const std::string& where) {
   EXPECT_EQ(state_of(where), before);
 }
 
-TEST(Utc, OfAFilterIsADayOrAnInstantThatThereIs) {
+TEST(UtcProblem, AcceptsOnlyExistingDaysAndTimes) {
   for (const char* good : {"2026-11-21", "2024-02-29", "2026-11-21T13:45", "2026-11-21T13:45:01",
                            "2026-11-21T13:45:01Z"}) {
     EXPECT_EQ(utc_problem(good), "");
@@ -297,21 +298,21 @@ TEST(Utc, OfAFilterIsADayOrAnInstantThatThereIs) {
   }
 }
 
-TEST(Records, OfVersion1InAFileAreBroughtUpToDate) {
+TEST(Records, MigratesVersion1InFile) {
   const TemporaryFolder folder;
   const std::string file = (folder / "records.db").string();
   answer_of(file, kVersion1);
   check_migration(file);
 }
 
-TEST(Records, OfVersion1InAFileAreBroughtUpToDateOnce) {
+TEST(Records, MigratesVersion1InFileOnce) {
   const TemporaryFolder folder;
   const std::string file = (folder / "records.db").string();
   answer_of(file, kVersion1);
   check_migration_by_another(file);
 }
 
-TEST(Records, ThatCannotBeWrittenAreNoticedBefore) {
+TEST(Records, CheckWritableThrowsForReadOnlyTables) {
   const TemporaryFolder folder;
   const std::string file = (folder / "records.db").string();
   { const Records made(file); }
@@ -322,7 +323,7 @@ TEST(Records, ThatCannotBeWrittenAreNoticedBefore) {
   EXPECT_THAT(refusal_of([&] { records.check_writable(); }), HasSubstr("stopped"));
 }
 
-TEST(Records, OfVersion1InAFileStayAsTheyAreWhenItFails) {
+TEST(Records, KeepsVersion1InFileWhenMigrationFails) {
   const TemporaryFolder folder;
   const std::string file = (folder / "records.db").string();
   answer_of(file, kVersion1 +
@@ -331,14 +332,14 @@ TEST(Records, OfVersion1InAFileStayAsTheyAreWhenItFails) {
   check_stopped_migration(file);
 }
 
-TEST(Records, OfALaterVersionInAFileAreLeftAlone) {
+TEST(Records, RejectsLaterVersionInFile) {
   const TemporaryFolder folder;
   const std::string file = (folder / "records.db").string();
   answer_of(file, kVersion1);
   check_later_version(file);
 }
 
-TEST(Records, OfOtherVersionsInPostgresAreTreatedAlike) {
+TEST(Records, TreatsOtherVersionsInPostgresLikeFiles) {
   if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
   const PostgresServer server;
   ASSERT_NE(server.uri(), "");
@@ -356,27 +357,27 @@ TEST(Records, OfOtherVersionsInPostgresAreTreatedAlike) {
   check_later_version(server.uri());
 }
 
-TEST(Records, AreKeptInAFile) {
+TEST(Records, StoresRunsInFile) {
   const TemporaryFolder folder;
   check_records((folder / "records.db").string());
 }
 
-TEST(Records, OfTwoStationsInOneFileLoseNothing) {
+TEST(Records, KeepsRunsOfTwoConcurrentStationsInFile) {
   const TemporaryFolder folder;
   check_two_writers((folder / "records.db").string());
 }
 
-TEST(Records, AreKeptInPostgres) {
+TEST(Records, StoresRunsInPostgres) {
   if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
   const PostgresServer server;
   ASSERT_NE(server.uri(), "");
   check_two_writers(server.uri());
-  // A connection string without a parameter, as psql takes it.
+  // A connection string without a parameter, as for psql.
   EXPECT_THAT(Records(server.plain_uri()).list({}), SizeIs(50));
   answer_of(server.uri(), kDropAll);
   check_records(server.uri());
 
-  // The server ends the connection, as one that is started anew does.
+  // The server closes the connection, as at a restart.
   Records records(server.uri());
   answer_of(server.uri(),
             "SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE pid <> "
@@ -385,9 +386,9 @@ TEST(Records, AreKeptInPostgres) {
   EXPECT_TRUE(records.find(run_of(9)));
 }
 
-/// Who waited makes nothing beside what it finds then, of which there is one table here: indices of
-/// tables in use would lock their users out.
-TEST(Records, AreMadeByOneAtATimeInPostgres) {
+/// A program that waited creates nothing in addition to what it finds, here a single table: indices
+/// of tables in use would lock out their users.
+TEST(Records, CreatesTablesInPostgresUnderLock) {
   if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
   const PostgresServer server;
   ASSERT_NE(server.uri(), "");
@@ -414,14 +415,14 @@ TEST(Records, AreMadeByOneAtATimeInPostgres) {
   EXPECT_THAT(answer_of(server.uri(), "SELECT COUNT(to_regclass('runs'));"), Not(HasSubstr("1")));
 }
 
-TEST(Records, RefuseAFileThatIsNoDatabase) {
+TEST(Records, ThrowsForFileThatIsNoDatabase) {
   const TemporaryFolder folder;
   const auto file = folder.file("records.db", std::string(5000, 'x'));
   EXPECT_THAT(refusal_of([&] { Records records(file.string()); }),
               testing::AllOf(HasSubstr("records.db"), HasSubstr("not a database")));
 }
 
-TEST(Records, DoNotTellThePasswordOfAServer) {
+TEST(Records, OmitsPasswordOfServerFromErrors) {
   for (const char* where : {"postgresql://vlp:secret@/postgres?host=/nowhere",
                             "postgresql://vlp@/postgres?password=secret&host=/nowhere",
                             "postgresql://vlp@/postgres?host=/nowhere&password=a@secret"}) {
@@ -443,15 +444,15 @@ TEST(Records, DoNotTellThePasswordOfAServer) {
   }
 }
 
-TEST(Records, DoNotTellThePasswordOfKeywords) {
+TEST(Records, OmitsPasswordOfKeywordsFromErrors) {
   EXPECT_THAT(refusal_of([&] { Records records("host=/nowhere user=vlp password=secret"); }),
               AllOf(HasSubstr("is not of the form postgresql://"), Not(HasSubstr("secret"))));
 }
 
-/// The part of a text up to the end of its first line.
+/// Returns the first line of a text.
 std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
 
-TEST(ExportRuns, WritesCsv) {
+TEST(WriteRuns, WritesCsv) {
   const TemporaryFolder folder;
   const auto file = folder / "runs.csv";
   write_runs(file, {sample(run_of(1), "a", 0.25), sample(run_of(2), "b", 1.5), with_all_texts()});
@@ -482,7 +483,7 @@ std::vector<std::string> keys_of(const nlohmann::ordered_json& json) {
   return keys;
 }
 
-TEST(ExportRuns, WritesJson) {
+TEST(WriteRuns, WritesJson) {
   const TemporaryFolder folder;
   const auto file = folder / "runs.json";
   const RunRecord all = with_all_texts();
@@ -513,7 +514,7 @@ TEST(ExportRuns, WritesJson) {
   }
 }
 
-TEST(ExportRuns, AndTheSpoolAreAsTheirSchemasSay) {
+TEST(WriteRuns, MatchesJsonSchemasOfRunsAndSpool) {
   const TemporaryFolder folder;
   const auto file = folder / "runs.json";
   RunRecord golden = sample(run_of(2), "b", 1.5);

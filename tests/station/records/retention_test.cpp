@@ -56,7 +56,7 @@ class RetentionTest : public testing::Test {
   StationConfig config{};
 };
 
-TEST_F(RetentionTest, FindsWhatIsOlderThanItIsKept) {
+TEST_F(RetentionTest, FindsExpiredFolders) {
   keep(kOld, "a.b", "2020-01-01T01:00:00Z");
   const std::string now = new_run(), resumed = "20200101T000000Z-fedcba9876543210";
   keep(now, "a.b", now_utc());
@@ -82,8 +82,8 @@ TEST_F(RetentionTest, FindsWhatIsOlderThanItIsKept) {
   EXPECT_THAT(look_for_expired(config, records).expired, IsEmpty());
 }
 
-/// Stations may share folders and records.
-TEST_F(RetentionTest, LeavesOtherStationsRunsAndLinks) {
+/// Stations can share folders and records.
+TEST_F(RetentionTest, IgnoresOtherStationsAndLinks) {
   const std::string other = "20200101T000000Z-fedcba9876543210";
   keep(kOld, "a", "2020-01-01T01:00:00Z");
   keep(other, "a", "2020-01-01T01:00:00Z", "attic");
@@ -96,7 +96,7 @@ TEST_F(RetentionTest, LeavesOtherStationsRunsAndLinks) {
   EXPECT_THAT(found.without_record, IsEmpty());
 }
 
-TEST_F(RetentionTest, DeletesAFolderAndNoLinksBehindIt) {
+TEST_F(RetentionTest, DeletesFolderWithoutFollowingLinks) {
   keep(kOld, "a", "2020-01-01T01:00:00Z");
   const fs::path images = with_file("captures/a." + kOld), elsewhere = with_file("elsewhere");
   fs::create_directory_symlink(elsewhere, images / "link");
@@ -116,8 +116,8 @@ TEST_F(RetentionTest, DeletesAFolderAndNoLinksBehindIt) {
   EXPECT_THROW(delete_expired(found.expired[0], config, spool), InputError) << "it is not there";
 }
 
-/// A golden unit's calibration among the results of the run that measured it.
-TEST_F(RetentionTest, LeavesAFolderThatTheStationNeeds) {
+/// The golden unit's calibration can be among the results of the run that measured it.
+TEST_F(RetentionTest, KeepsFolderUsedByStation) {
   keep(kOld, "a", "2020-01-01T01:00:00Z");
   const fs::path results = with_file("results/a/" + kOld), images = with_file("captures/a." + kOld);
   config.inputs = {folder.file("station.yaml", ""),
@@ -135,7 +135,7 @@ TEST_F(RetentionTest, LeavesAFolderThatTheStationNeeds) {
   EXPECT_THAT(look_for_expired(config, records).in_use, ElementsAre(images));
 }
 
-TEST_F(RetentionTest, LeavesAFolderThroughWhichALinkLeads) {
+TEST_F(RetentionTest, KeepsFolderUsedThroughLink) {
   keep(kOld, "a", "2020-01-01T01:00:00Z");
   const fs::path results = with_file("results/a/" + kOld);
   const auto expect_in_use = [&](const std::string& why) {
@@ -158,7 +158,7 @@ TEST_F(RetentionTest, LeavesAFolderThroughWhichALinkLeads) {
   expect_in_use("a script of the hook");
 }
 
-TEST_F(RetentionTest, DeletesNothingBehindACameraThatBecameALink) {
+TEST_F(RetentionTest, DeletesNothingIfCameraFolderBecameLink) {
   keep(kOld, "a", "2020-01-01T01:00:00Z");
   with_file("results/a/" + kOld);
   const fs::path kept = with_file("elsewhere/" + kOld);
@@ -172,7 +172,7 @@ TEST_F(RetentionTest, DeletesNothingBehindACameraThatBecameALink) {
   EXPECT_TRUE(fs::exists(kept / "check/0.png"));
 }
 
-TEST_F(RetentionTest, TrustsNoClockYearsAhead) {
+TEST_F(RetentionTest, CheckClockThrowsForClockYearsAhead) {
   const auto refusal = [&] { return refusal_of([&] { check_clock(config, records); }); };
   EXPECT_EQ(refusal(), "") << "no run";
   keep(kOld, "a", "2020-01-01T01:00:00Z");
@@ -189,7 +189,7 @@ TEST_F(RetentionTest, TrustsNoClockYearsAhead) {
   EXPECT_EQ(refusal(), "");
 }
 
-TEST_F(RetentionTest, TrustsNoClockBehindARun) {
+TEST_F(RetentionTest, CheckClockThrowsForClockBehindRun) {
   keep(new_run(), "a", utc_days_ago(0));
   EXPECT_EQ(refusal_of([&] { check_clock(config, records); }), "");
   const std::string run = new_run(), coming = utc_days_ago(-20 * 366);

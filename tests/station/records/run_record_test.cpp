@@ -9,15 +9,15 @@ namespace {
 
 using testing::SizeIs;
 
-TEST(LibraryVersions, NamesThoseThatTheResultRestsOn) {
+TEST(LibraryVersions, ReturnsLibrariesThatAffectResults) {
   for (const char* library : {"OpenCV ", "AprilTag ", "mrcal ", "Ceres ", "Eigen "}) {
     EXPECT_THAT(library_versions(),
                 testing::ContainsRegex(std::string(library) + "[0-9]+\\.[0-9]"));
   }
 }
 
-/// Where a second begins two clocks may differ by a tick.
-TEST(SecondsSince, IsNeverBelow0ForNow) {
+/// At the start of a second, two clocks can differ by a tick.
+TEST(SecondsSince, IsNotNegativeForNow) {
   const std::string begin = now_utc();
   while (seconds_since(begin) < 1) {
     const std::string now = now_utc();
@@ -25,7 +25,7 @@ TEST(SecondsSince, IsNeverBelow0ForNow) {
   }
 }
 
-TEST(RunName, TellsWhenTheRunBegan) {
+TEST(RunName, ContainsStartTime) {
   EXPECT_EQ(begun_utc("20261121T134501Z-0123456789abcdef"), "2026-11-21T13:45:01Z");
   EXPECT_EQ(begun_utc("run"), "");
   const std::string run = new_run();
@@ -39,7 +39,7 @@ TEST(RunName, TellsWhenTheRunBegan) {
   }
 }
 
-TEST(PrintableRun, HasLinesInCausesAndCalibrationOnly) {
+TEST(PrintableRun, KeepsLineBreaksInCausesAndCalibrationOnly) {
   RunRecord run;
   run.operator_name = "J\xf6rg\n";
   run.causes = "first\nsecond\n";
@@ -56,7 +56,7 @@ TEST(PrintableRun, HasLinesInCausesAndCalibrationOnly) {
   EXPECT_EQ(printed.events[0].who, "who\\x0a");
 }
 
-TEST(ClockProblem, IsAnEndBeforeTheBegin) {
+TEST(ClockProblem, ReportsEndBeforeStart) {
   RunRecord run;
   run.begun_utc = run.ended_utc = "2026-11-21T13:45:01Z";
   EXPECT_EQ(clock_problem(run), "");

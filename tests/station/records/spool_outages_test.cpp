@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Of the spool: programs that are killed, records that are locked, full, away or of many stations.
+/// Tests of the spool with killed programs, and with records that are locked, full, offline or
+/// shared by many stations.
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <sys/mount.h>
@@ -31,7 +32,7 @@ using testing::Not;
 using testing::SizeIs;
 using testing::StartsWith;
 
-TEST(Spool, WaitsForALockedFileNotLong) {
+TEST(Spool, LimitsWaitForLockedFile) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   { const Records made(where); }
@@ -62,13 +63,13 @@ TEST(Spool, WaitsForALockedFileNotLong) {
   EXPECT_THAT(whole_runs(where), SizeIs(1));
 }
 
-/// Unmounts, whatever becomes of the test.
+/// Unmounts the disk in any case.
 struct SmallDisk {
   fs::path folder;
   ~SmallDisk() { ::umount2(folder.c_str(), MNT_DETACH); }
 };
 
-TEST(Spool, OutlastsAFullDisk) {
+TEST(Spool, KeepsRunsOnFullDisk) {
   const TemporaryFolder folder;
   const auto small = folder / "small";
   fs::create_directory(small);
@@ -86,7 +87,7 @@ TEST(Spool, OutlastsAFullDisk) {
     EXPECT_LT(there, 40u);
     EXPECT_THAT(spool.waiting(), SizeIs(40 - there));
     EXPECT_THAT(spool.state(), HasSubstr("full"));
-    // Records that are full are read all the same.
+    // Full records are readable.
     EXPECT_EQ(spool.owner_of("digest-0-1", "b"), (ImageOwner{"camera-0", numbered_run(0).run}));
   }
   ASSERT_EQ(::mount("none", small.c_str(), "tmpfs", MS_REMOUNT, "size=8m"), 0);
@@ -94,8 +95,7 @@ TEST(Spool, OutlastsAFullDisk) {
   EXPECT_THAT(whole_runs(where), SizeIs(40));
 }
 
-/// A program that keeps one run after another is killed at random moments, as often as
-/// VLP_STATION_KILLS says.
+/// Kills a program that stores runs, VLP_STATION_KILLS times at random moments.
 void kill_while_keeping(const TemporaryFolder& folder, const std::string& where, int kills) {
   const auto log = folder / "kept";
   if (const char* text = std::getenv("VLP_STATION_KILLS")) kills = std::atoi(text);
@@ -107,7 +107,7 @@ void kill_while_keeping(const TemporaryFolder& folder, const std::string& where,
       const int file = ::open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
       for (int run = 1000 * i; run < 1000 * i + 1000; ++run) {
         spool.keep(numbered_run(run));
-        const std::string line = numbered_run(run).run + "\n";  // kept, as far as anybody is told
+        const std::string line = numbered_run(run).run + "\n";  // reported as kept
         if (::write(file, line.data(), line.size()) < 0) std::abort();
         spool.deliver();
       }
@@ -124,17 +124,17 @@ void kill_while_keeping(const TemporaryFolder& folder, const std::string& where,
   int count = 0;
   for (std::string run; std::getline(kept, run); ++count) EXPECT_TRUE(runs.contains(run)) << run;
   EXPECT_GT(count, 0);
-  // What was killed between keeping and telling may be there, too.
+  // Runs whose program was killed between storing and reporting can exist, too.
   EXPECT_LE(runs.size(), static_cast<std::size_t>(count + kills));
 }
 
-TEST(Spool, LosesNothingWhenItIsKilled) {
+TEST(Spool, KeepsRunsWhenKilled) {
   const TemporaryFolder folder;
   kill_while_keeping(folder, (folder / "records.db").string(), 15);
 }
 
-/// A server that refuses is not away, and somebody has to do something about it; runs are kept.
-TEST(Spool, TellsARefusalFromAServerThatIsAway) {
+/// A server that refuses access is not offline: somebody has to correct it; runs are kept.
+TEST(Spool, DistinguishesRefusedFromUnreachableServer) {
   if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
   const TemporaryFolder folder;
   const PostgresServer server("right");
@@ -158,7 +158,7 @@ TEST(Spool, TellsARefusalFromAServerThatIsAway) {
   EXPECT_THAT(state_with("right", "postgres?sslmode=require", 3),
               AllOf(StartsWith("kept here, 2 waiting: "), HasSubstr(refuses),
                     HasSubstr("server does not support SSL, but SSL was required")));
-  // What waited goes there with the right password.
+  // Waiting runs are delivered with the right password.
   EXPECT_THAT(state_with("right", "postgres", 4), StartsWith("1 here for other records"));
   EXPECT_THAT(whole_runs(server.uri()), SizeIs(3));
   server.stop();
@@ -166,8 +166,8 @@ TEST(Spool, TellsARefusalFromAServerThatIsAway) {
               AllOf(StartsWith("kept here, 1 waiting: "), HasSubstr("cannot be reached")));
 }
 
-/// Whoever reads the screen of a station need not know SQL.
-TEST(Spool, NamesNoSqlToTheOperator) {
+/// Operators need not understand SQL.
+TEST(Spool, OmitsSqlFromNotice) {
   if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
   const TemporaryFolder folder;
   const PostgresServer server("right");
@@ -199,8 +199,8 @@ TEST(Spool, NamesNoSqlToTheOperator) {
   EXPECT_THAT(offline.state(), HasSubstr("cannot be reached"));
 }
 
-/// A server that takes nothing but TLS, with a certificate of its own.
-TEST(Spool, GoesToAServerThroughTls) {
+/// Server that accepts only TLS, with its own certificate.
+TEST(Spool, DeliversThroughTls) {
   if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
   const TemporaryFolder folder;
   const PostgresServer server("right", PostgresServer::Tls::required);
@@ -220,7 +220,7 @@ TEST(Spool, GoesToAServerThroughTls) {
   const std::string refuses = "answers, but refuses 'records' as it is: ";
   EXPECT_THAT(state_with("sslmode=disable"), AllOf(StartsWith("kept here, 1 waiting: "),
                                                    HasSubstr(refuses), HasSubstr("no encryption")));
-  // Another's certificate.
+  // Certificate of another server.
   const PostgresServer other("right", PostgresServer::Tls::required);
   ASSERT_NE(other.uri(), "");
   EXPECT_THAT(state_with("sslmode=verify-full&sslrootcert=" + other.certificate().string()),
@@ -230,9 +230,9 @@ TEST(Spool, GoesToAServerThroughTls) {
   EXPECT_THAT(whole_runs(server.uri()), SizeIs(5));
 }
 
-/// Each with a spool of its own, all at once: as many runs as VLP_STATION_RUNS says, each with a
-/// hook.
-TEST(Spool, OfEightStationsOnOneServerLosesNothing) {
+/// Concurrent stations, each with its own spool. The number of runs is VLP_STATION_RUNS, each with
+/// a hook.
+TEST(Spool, KeepsRunsOfEightStationsOnOneServer) {
   if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
   constexpr int stations = 8;
   int each = 5;
@@ -264,7 +264,7 @@ TEST(Spool, OfEightStationsOnOneServerLosesNothing) {
   }
   EXPECT_TRUE(end_well(children));
   for (int station = 0; station < stations; ++station) {
-    // Nobody had to wait longer than it may, unless this machine has much else to do.
+    // No station waited longer than allowed, unless this machine is busy.
     Spool spool = spool_of(station);
     std::cout << "station-" << station << ": " << spool.waiting().size() << " waited\n";
     spool.deliver();
@@ -279,7 +279,7 @@ TEST(Spool, OfEightStationsOnOneServerLosesNothing) {
   EXPECT_THAT(server.log(), Not(HasSubstr("deadlock")));
 }
 
-TEST(Spool, OutlastsItsServer) {
+TEST(Spool, KeepsRunsWhenServerStops) {
   if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
   const PostgresServer server;
   ASSERT_NE(server.uri(), "");
@@ -309,7 +309,7 @@ TEST(Spool, OutlastsItsServer) {
   server.start();
   deliver_to(2);
 
-  // Frozen, with a connection and without: nobody waits for it without a word, nor twice.
+  // Frozen, with and without a connection: programs wait once, and report it.
   Spool connected = spool();
   connected.prepare();
   EXPECT_EQ(connected.state(), "");
@@ -326,7 +326,7 @@ TEST(Spool, OutlastsItsServer) {
   EXPECT_THAT(fresh.state(), StartsWith("kept here, 1 waiting: "));
   server.thaw();
   deliver_to(3);
-  // Once, too, while several wait.
+  // Once, even if several programs wait.
   Spool several = spool();
   several.prepare();
   server.freeze();

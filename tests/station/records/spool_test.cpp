@@ -37,7 +37,7 @@ using testing::Not;
 using testing::SizeIs;
 using testing::StartsWith;
 
-TEST(SpooledRun, IsReadAsItWasWritten) {
+TEST(ReadRun, ReturnsWrittenRun) {
   const TemporaryFolder folder;
   RunRecord run = numbered_run(1);
   for (const RunField& field : run_fields()) run.*field.text += "\"\\ \xc3\xbc{}";
@@ -63,7 +63,7 @@ TEST(SpooledRun, IsReadAsItWasWritten) {
   EXPECT_EQ(read.images[29].sha256, run.images[29].sha256);
 }
 
-TEST(SpooledRun, MayHaveNamesThatAreNoText) {
+TEST(ReadRun, AcceptsNamesThatAreInvalidText) {
   const TemporaryFolder folder;
   RunRecord run = numbered_run(1);
   run.images[0].name = "\xff\x1b[31m.png";
@@ -71,7 +71,7 @@ TEST(SpooledRun, MayHaveNamesThatAreNoText) {
             "\\xff\\x1b[31m.png");
 }
 
-TEST(SpooledRun, IsRefusedWithItsFile) {
+TEST(ReadRun, ThrowsWithFileForInvalidRun) {
   const TemporaryFolder folder;
   const std::string text = text_of_run({numbered_run(1), "records.db"});
   for (const std::string& bad :
@@ -83,7 +83,7 @@ TEST(SpooledRun, IsRefusedWithItsFile) {
   }
 }
 
-TEST(SpooledRun, IsRefusedWithIdsThatNameOtherFolders) {
+TEST(ReadRun, RejectsIdsOfOtherFolders) {
   const TemporaryFolder folder;
   RunRecord run = numbered_run(1);
   run.camera = "../..";
@@ -99,7 +99,7 @@ TEST(SpooledRun, IsRefusedWithIdsThatNameOtherFolders) {
   EXPECT_THAT(refusal(), HasSubstr("an event is no id"));
 }
 
-TEST(SpooledRun, IsARegularFileOfFewLevels) {
+TEST(ReadRun, RejectsSpecialFilesAndDeepNesting) {
   const TemporaryFolder folder;
   ASSERT_EQ(::mkfifo((folder / "pipe.json").c_str(), 0600), 0);
   EXPECT_THAT(refusal_of([&] { read_run(folder / "pipe.json"); }),
@@ -111,7 +111,7 @@ TEST(SpooledRun, IsARegularFileOfFewLevels) {
               HasSubstr("it has more than 16 levels"));
 }
 
-TEST(Spool, KeepsRunsUntilTheRecordsAreThere) {
+TEST(Spool, KeepsRunsUntilRecordsAreOnline) {
   const TemporaryFolder folder;
   const std::string where = (folder / "away/records.db").string();
   Spool spool(folder / "spool", where);
@@ -122,7 +122,7 @@ TEST(Spool, KeepsRunsUntilTheRecordsAreThere) {
   EXPECT_THAT(spool.state(), AllOf(StartsWith("kept here, 3 waiting: "), HasSubstr("records.db")));
   EXPECT_EQ(spool.find(numbered_run(1).run)->camera, "camera-1");
   EXPECT_FALSE(spool.find("another"));
-  // Guards go on with what is known here.
+  // Checks continue with the locally known runs.
   EXPECT_EQ(spool.owner_of("digest-2-7", "camera-1"),
             (ImageOwner{"camera-2", numbered_run(2).run}));
   EXPECT_EQ(spool.owner_of("digest-2-7", "camera-2"), ImageOwner{});
@@ -139,7 +139,7 @@ TEST(Spool, KeepsRunsUntilTheRecordsAreThere) {
             (ImageOwner{"camera-2", numbered_run(2).run}));
 }
 
-TEST(Spool, KnowsWhichGoldenRunUsedAnImage) {
+TEST(Spool, FindsGoldenRunOfImage) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   Spool spool(folder / "spool", where);
@@ -157,8 +157,8 @@ TEST(Spool, KnowsWhichGoldenRunUsedAnImage) {
   EXPECT_TRUE(fs::is_empty(folder / "spool"));
 }
 
-/// What is measured from the same images is no second measurement.
-TEST(Spool, KnowsWhichRunUsedAllImages) {
+/// Two evaluations of the same images are not two measurements.
+TEST(Spool, FindsRunThatUsedAllImages) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   Spool spool(folder / "spool", where);
@@ -184,7 +184,7 @@ TEST(Spool, KnowsWhichRunUsedAllImages) {
     none.images.clear();
     EXPECT_EQ(spool.repeated_run_of(none), "") << state;
   }
-  // What did not count may be done again.
+  // Images of a run that did not count can be used again.
   RunRecord voided_run = earlier;
   voided_run.events = {new_event(kVoided, "wrong lamps", "Ann")};
   spool.keep(voided_run);
@@ -199,8 +199,8 @@ TEST(Spool, KnowsWhichRunUsedAllImages) {
   EXPECT_EQ(spool.repeated_run_of(invalid_again), "");
 }
 
-/// A run that waits, whatever happened to it since, is one run.
-TEST(Spool, KeepsWhatBecameOfARun) {
+/// A waiting run with later events is one run.
+TEST(Spool, KeepsEventsOfRun) {
   const TemporaryFolder folder;
   const std::string where = (folder / "away/records.db").string();
   Spool spool(folder / "spool", where);
@@ -233,7 +233,7 @@ TEST(Spool, KeepsWhatBecameOfARun) {
   EXPECT_THAT(later.with_open_hook("station-1"), IsEmpty());
 }
 
-TEST(Spool, IsNotHeldUpByWhatIsNoRun) {
+TEST(Spool, DeliversDespiteInvalidFiles) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   Spool spool(folder / "spool", where);
@@ -244,7 +244,7 @@ TEST(Spool, IsNotHeldUpByWhatIsNoRun) {
   spool.deliver();
   EXPECT_THAT(whole_runs(where), SizeIs(1));
   EXPECT_THAT(spool.state(), AllOf(HasSubstr("0.json: is no run"), Not(HasSubstr("waiting"))));
-  fs::remove(where);  // away
+  fs::remove(where);  // offline
   Spool other(folder / "spool", where);
   other.keep(numbered_run(2));
   other.deliver();
@@ -252,7 +252,7 @@ TEST(Spool, IsNotHeldUpByWhatIsNoRun) {
                                    HasSubstr("; "), HasSubstr("0.json: is no run")));
 }
 
-TEST(Spool, ReadsAFileAgainThatCouldNotBeRead) {
+TEST(Spool, RetriesUnreadableFile) {
   const TemporaryFolder folder;
   const std::string where = (folder / "away/records.db").string();
   Spool spool(folder / "spool", where);
@@ -267,7 +267,7 @@ TEST(Spool, ReadsAFileAgainThatCouldNotBeRead) {
   EXPECT_THAT(spool.state(), AllOf(StartsWith("kept here, 1 waiting"), Not(HasSubstr("1.json"))));
 }
 
-TEST(Spool, ThatCannotBeWrittenPassesRunsOn) {
+TEST(Spool, StoresRunsInRecordsIfFolderCannotBeWritten) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   Spool spool(folder.file("spool", ""), where);
@@ -281,7 +281,7 @@ TEST(Spool, ThatCannotBeWrittenPassesRunsOn) {
       AllOf(HasSubstr("spool: neither here can a run be kept"), HasSubstr("away/records.db")));
 }
 
-TEST(Spool, BringsRunsToTheRecordsTheyAreFor) {
+TEST(Spool, DeliversRunsToTheirRecords) {
   const TemporaryFolder folder;
   const std::string a = (folder / "a.db").string(), b = (folder / "b.db").string();
   { const Records made_a(a), made_b(b); }
@@ -302,13 +302,13 @@ TEST(Spool, BringsRunsToTheRecordsTheyAreFor) {
   EXPECT_EQ(of_b.state(), "");
 }
 
-/// Does `action` on a machine of another name; whether there can be one here.
+/// Runs `action` with another host name. Returns false if that is not possible.
 template <typename Action>
 bool on_another_machine(const Action& action) {
   constexpr int not_permitted = 3;
   const std::string name = "another";
   const pid_t child = start_child([&] {
-    // The name of this process alone, or none.
+    // The host name of this process only.
     if (::unshare(CLONE_NEWUTS) != 0) ::_exit(not_permitted);
     if (::sethostname(name.data(), name.size()) != 0) ::_exit(not_permitted);
     action();
@@ -319,8 +319,8 @@ bool on_another_machine(const Action& action) {
   return permitted;
 }
 
-/// Two machines that share the folder, and have records of their own at the same path.
-TEST(Spool, BringsRunsToNoRecordsOfAnotherMachine) {
+/// Two machines that share the folder, with different records at the same path.
+TEST(Spool, DoesNotDeliverToOtherMachinesDatabase) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   { const Records made(where); }
@@ -336,7 +336,7 @@ TEST(Spool, BringsRunsToNoRecordsOfAnotherMachine) {
   EXPECT_EQ(here.state(), "");
 }
 
-TEST(Spool, LosesNoSecondVerdictOfARun) {
+TEST(Spool, KeepsSecondVerdictOfRun) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   Spool spool(folder / "spool", where);
@@ -357,8 +357,8 @@ TEST(Spool, LosesNoSecondVerdictOfARun) {
   EXPECT_EQ(Records(where).find(again.run)->ended_utc, numbered_run(1).ended_utc);
 }
 
-/// What is not there may be on a share that is not mounted.
-TEST(Spool, MakesADatabaseBeforeAUnitOnly) {
+/// A missing file can be on a share that is not mounted.
+TEST(Spool, CreatesDatabaseOnlyInPrepare) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   Spool spool(folder / "spool", where);
@@ -372,12 +372,12 @@ TEST(Spool, MakesADatabaseBeforeAUnitOnly) {
   EXPECT_THAT(whole_runs(where), SizeIs(1));
 }
 
-TEST(Spool, RefusesWhatIsNoConnectionString) {
+TEST(Spool, ThrowsForInvalidConnectionString) {
   EXPECT_THAT(refusal_of([&] { Spool("spool", "postgresql://vlp:a@b@/c"); }),
               HasSubstr("is not of the form"));
 }
 
-TEST(Spool, OfSeveralProgramsLosesNothing) {
+TEST(Spool, KeepsRunsOfConcurrentPrograms) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   Spool spool(folder / "spool", where);

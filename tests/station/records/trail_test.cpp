@@ -25,7 +25,7 @@ const std::string kRun1 = run_of(1), kRun2 = run_of(2), kRun3 = run_of(3);
 const std::string kLabel = "20261121T134505.000000Z-00000001",
                   kDeleted = "20261121T134506.000000Z-00000002";
 
-/// Entries 1 to 5: runs 1 and 2, the label of 2, run 3, that its images were deleted.
+/// Stores entries 1 to 5: runs 1 and 2, the hook of 2, run 3, and the deletion of its images.
 void keep_three(const std::string& where) {
   Records records(where);
   RunRecord first = sample(kRun1, "a", 0.1), second = sample(kRun2, "b", 1.0 / 3),
@@ -81,13 +81,13 @@ const std::vector<Forgery>& forgeries() {
       {"INSERT INTO trail SELECT 6, run, event, content, digest FROM trail WHERE number = 1;\n",
        {"entry 6 of the trail, of run " + kRun1 + ", was changed",
         "entry 6 of the trail was added: run " + kRun1 + " has one already"}},
-      // The end of the trail, with what it is of: an earlier digest tells.
+      // Removal of the last entries with their contents, detected by an earlier digest.
       {without_3 + "DELETE FROM trail WHERE number > 3;\n", {}},
   };
   return all;
 }
 
-/// What was done by hand is found, by name, and nothing else is.
+/// Checks that manual changes are reported by id, and nothing else.
 void check_forgeries(const std::function<std::string()>& new_database) {
   for (const Forgery& forgery : forgeries()) {
     const std::string where = new_database();
@@ -106,13 +106,13 @@ void check_forgeries(const std::function<std::string()>& new_database) {
   }
 }
 
-TEST(Trail, FindsWhatWasChangedInAFile) {
+TEST(CheckTrail, DetectsChangesInFile) {
   const TemporaryFolder folder;
   int count = 0;
   check_forgeries([&] { return (folder / (std::to_string(++count) + ".db")).string(); });
 }
 
-TEST(Trail, FindsWhatWasChangedInPostgres) {
+TEST(CheckTrail, DetectsChangesInPostgres) {
   if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
   const PostgresServer server;
   ASSERT_NE(server.uri(), "");
@@ -122,8 +122,8 @@ TEST(Trail, FindsWhatWasChangedInPostgres) {
   });
 }
 
-/// An earlier last digest is in the trail as long as nobody took it out.
-TEST(Trail, GoesOn) {
+/// An earlier last digest remains in the trail unless it is removed.
+TEST(CheckTrail, AcceptsEarlierDigestAfterNewRuns) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   keep_three(where);
@@ -137,8 +137,8 @@ TEST(Trail, GoesOn) {
   EXPECT_NE(later.last_digest, noted);
 }
 
-/// The same runs have the same digests in every database.
-TEST(Trail, IsTheSameInPostgresAsInAFile) {
+/// Equal runs have equal digests in every database.
+TEST(CheckTrail, ReturnsSameDigestInPostgresAndFile) {
   if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
   const PostgresServer server;
   ASSERT_NE(server.uri(), "");
@@ -149,7 +149,7 @@ TEST(Trail, IsTheSameInPostgresAsInAFile) {
   EXPECT_EQ(Records(file).check("").last_digest, Records(server.uri()).check("").last_digest);
 }
 
-/// Records as version 5 of their tables kept them, which had no trail.
+/// Records in the tables of version 5, which had no trail.
 const std::string kVersion5 =
     R"(CREATE TABLE vlp_schema (version INTEGER PRIMARY KEY);
 INSERT INTO vlp_schema (version) VALUES (5);
@@ -182,7 +182,7 @@ INSERT INTO events VALUES ('20261121T135511.000000Z-00000002', '20261121T134509Z
     R"('hook failed', 'exit code 3');
 )";
 
-/// Of a database that holds kVersion5: what is there is in the trail, as it is, from then on.
+/// Checks that the migration of kVersion5 adds all existing runs to the trail.
 void check_sealing(const std::string& where) {
   Records records(where);
   const TrailCheck sealed = records.check("");
@@ -205,7 +205,7 @@ void check_sealing(const std::string& where) {
                           "changed"));
 }
 
-TEST(Trail, BeginsWithWhatVersion5Kept) {
+TEST(CheckTrail, IncludesRunsOfVersion5) {
   const TemporaryFolder folder;
   const std::string file = (folder / "records.db").string();
   answer_of(file, kVersion5);

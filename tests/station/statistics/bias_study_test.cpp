@@ -49,7 +49,7 @@ std::vector<ReferenceValue> linearity_example() {
 
 /// The regression of the manual and of SPC for Excel's worked example of it ("Linearity and Bias
 /// Study", its biases with the sample's standard deviation), to their printed digits.
-TEST(BiasStudy, HasTheManualsLinearity) {
+TEST(BiasStudy, MatchesLinearityOfAiagManual) {
   const BiasStudy study = bias_study(linearity_example());
   ASSERT_TRUE(study.linearity);
   const Linearity& line = *study.linearity;
@@ -89,7 +89,7 @@ TEST(BiasStudy, HasTheManualsLinearity) {
     EXPECT_EQ(study.units[i].reference, 2 * (static_cast<double>(i) + 1));
     EXPECT_EQ(study.units[i].count, 12U);
   }
-  // And of all together; its interval is that of JMP's documentation on the same data.
+  // Bias of all values together; its interval is that of JMP's documentation on the same data.
   EXPECT_NEAR(study.all.value, -0.0533, 5e-5);
   EXPECT_NEAR(study.all.standard_error, 0.0308, 5e-5);
   EXPECT_NEAR(study.all.t, -1.729, 2e-3);
@@ -97,7 +97,7 @@ TEST(BiasStudy, HasTheManualsLinearity) {
   EXPECT_NEAR(study.all.low, -0.1152, 1e-4);
   EXPECT_NEAR(study.all.high, 0.0085, 1e-4);
   EXPECT_FALSE(study.all.shows());
-  // Narrowest in the middle, and there without the 0 as the manual's picture has it at both ends.
+  // Narrowest at the mean. At both ends 0 is outside the band, as in the manual's figure.
   EXPECT_LT(line.band_at(6), line.band_at(2));
   EXPECT_NEAR(line.band_at(2), line.band_at(10), 1e-12);
   EXPECT_GT(line.bias_at(2), line.band_at(2));
@@ -106,7 +106,7 @@ TEST(BiasStudy, HasTheManualsLinearity) {
 
 /// AIAG, Measurement Systems Analysis, 4th ed., the independent sample method: 15 readings of a
 /// part of 6.00.
-TEST(BiasStudy, HasTheManualsBias) {
+TEST(BiasStudy, MatchesBiasOfAiagManual) {
   const BiasStudy study = bias_study(values_of_unit(
       "part", 6, {5.8, 5.7, 5.9, 5.9, 6.0, 6.1, 6.0, 6.1, 6.4, 6.3, 6.0, 6.1, 6.2, 5.6, 6.0}));
   ASSERT_THAT(study.units, SizeIs(1));
@@ -125,7 +125,7 @@ TEST(BiasStudy, HasTheManualsBias) {
 
 /// NIST, Statistical Reference Datasets, Norris: ozone monitors against NIST's own, with certified
 /// values of the straight line. Here the line is of the differences, one less steep.
-TEST(BiasStudy, HasNistsCertifiedLine) {
+TEST(BiasStudy, MatchesCertifiedLineOfNist) {
   const std::vector<double> reference{0.2,   337.4, 118.2, 884.6, 10.1,  226.5, 666.3, 996.3, 448.6,
                                       777.0, 558.2, 0.4,   0.6,   775.5, 666.9, 338.0, 447.5, 11.6,
                                       556.0, 228.1, 995.8, 887.6, 120.2, 0.3,   0.3,   556.8, 339.1,
@@ -144,7 +144,7 @@ TEST(BiasStudy, HasNistsCertifiedLine) {
   auto twice = values;
   twice.insert(twice.end(), values.begin(), values.end());
   const BiasStudy study = bias_study(twice);
-  // The same line of twice as many: errors are smaller by sqrt(2 (n - 2) / (2 n - 2)).
+  // The same line for twice the values: errors are smaller by sqrt(2 (n - 2) / (2 n - 2)).
   const Linearity& line = study.linearity.value();
   constexpr double n = 36;
   const double of_errors = std::sqrt((2 * n - 2) / (n - 2)),
@@ -156,8 +156,9 @@ TEST(BiasStudy, HasNistsCertifiedLine) {
   EXPECT_NEAR(line.intercept.standard_error * of_errors, 0.232818234301152, 1e-12);
 }
 
-/// Of stations without bias 5 in 100 show one; of one with bias the intervals hold it.
-TEST(BiasStudy, IsRightAsOftenAsItSays) {
+/// Stations without bias are significant in 5 % of studies; with bias, intervals contain it in 95
+/// %.
+TEST(BiasStudy, IntervalsAndTestsHaveNominalRates) {
   Random random(5);
   constexpr int studies = 2000;
   int shown = 0, sloped = 0, held = 0, in_band = 0;
@@ -177,27 +178,27 @@ TEST(BiasStudy, IsRightAsOftenAsItSays) {
     held += some.linearity->slope.low < -0.2 && some.linearity->slope.high > -0.2 ? 1 : 0;
     in_band += std::abs(some.linearity->bias_at(3) + 0.3) < some.linearity->band_at(3) ? 1 : 0;
   }
-  // Standard error of each share: 0.5 %.
+  // Standard error of each fraction: 0.5 %.
   EXPECT_NEAR(double(shown) / studies, 0.05, 0.02);
   EXPECT_NEAR(double(sloped) / studies, 0.05, 0.02);
   EXPECT_NEAR(double(held) / studies, 0.95, 0.02);
   EXPECT_NEAR(double(in_band) / studies, 0.95, 0.02);
 }
 
-TEST(BiasStudy, OfValuesWithoutScatterIsCertain) {
+TEST(BiasStudy, ReturnsZeroPForValuesWithoutScatter) {
   const BiasStudy study = bias_study(values_of_unit("a", 1, {1.5, 1.5, 1.5}));
   EXPECT_EQ(study.all.p, 0);
   EXPECT_EQ(study.all.t, std::numeric_limits<double>::infinity());
   EXPECT_EQ(study.all.low, 0.5);
   EXPECT_TRUE(study.all.shows());
-  // Ten times 0.9 does not sum to 9.
+  // Ten times 0.9 does not add up to 9.
   const BiasStudy none = bias_study(values_of_unit("a", 0.9, std::vector<double>(10, 0.9)));
   EXPECT_EQ(none.units[0].bias.value, 0);
   EXPECT_EQ(none.units[0].bias.p, 1);
   EXPECT_EQ(none.all.p, 1);
 }
 
-TEST(BiasStudy, SaysWhatIsMissing) {
+TEST(BiasStudy, ThrowsForMissingValues) {
   EXPECT_THAT(refusal_of<std::invalid_argument>([] { bias_study({}); }),
               HasSubstr("needs runs of reference units"));
   EXPECT_THAT(refusal_of<std::invalid_argument>([] {
@@ -206,7 +207,7 @@ TEST(BiasStudy, SaysWhatIsMissing) {
               HasSubstr("unit b has one run: a bias study needs two or more of each"));
 }
 
-TEST(BiasStudy, IsDrawn) {
+TEST(DrawBias, WritesPlot) {
   const TemporaryFolder folder;
   const auto values = linearity_example();
   draw_bias(folder / "bias.svg", "tilt_deg", values, bias_study(values));

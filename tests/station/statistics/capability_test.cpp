@@ -14,7 +14,7 @@ namespace {
 
 /// Montgomery, Introduction to Statistical Quality Control, interval of Cp: limits 38 and 62, s
 /// = 1.75 of 20 units; from the 2.29 that is printed before.
-TEST(Capability, HasThePublishedIntervalOfCp) {
+TEST(Capability, MatchesPublishedIntervalOfCp) {
   EXPECT_NEAR(cp_of(62 - 38, 1.75, 19).value, 2.29, 0.005);
   const CapabilityIndex cp = cp_of(2.29 * 6, 1, 19);
   EXPECT_NEAR(cp.low, 1.57, 0.005);
@@ -22,7 +22,7 @@ TEST(Capability, HasThePublishedIntervalOfCp) {
 }
 
 /// NIST/SEMATECH e-Handbook of Statistical Methods, 6.1.6: limits 8 and 20, mean 16, s = 2.
-TEST(Capability, HasThePublishedIndices) {
+TEST(Capability, MatchesPublishedIndices) {
   EXPECT_NEAR(cp_of(20 - 8, 2, 49).value, 1.0, 1e-12);
   EXPECT_NEAR(cpk_of({8, 20}, 16, 2, 49, 50).value, 0.6667, 5e-5);
   EXPECT_NEAR(cpk_of({std::nullopt, 20}, 16, 2, 49, 50).value, 0.6667, 5e-5);
@@ -30,14 +30,14 @@ TEST(Capability, HasThePublishedIndices) {
 }
 
 /// By hand: 1 / (9 * 100) + 1 / (2 * 450) = 1 / 450.
-TEST(Capability, HasBissellsInterval) {
+TEST(Capability, MatchesIntervalOfBissell) {
   const CapabilityIndex cpk = cpk_of({std::nullopt, 3}, 0, 1, 450, 100);
   EXPECT_NEAR(cpk.value, 1, 1e-15);
   EXPECT_NEAR(cpk.high - cpk.value, 1.959964 / std::sqrt(450), 1e-7);
   EXPECT_NEAR(cpk.value - cpk.low, 1.959964 / std::sqrt(450), 1e-7);
 }
 
-TEST(Capability, TellsADriftFromScatter) {
+TEST(Capability, DistinguishesDriftFromScatter) {
   std::vector<double> values;
   for (int i = 0; i < 40; ++i) values.push_back((i % 2 == 0 ? 0.9 : 1.1) + 0.05 * i);
   const auto found = capability(values, {std::nullopt, 5});
@@ -52,14 +52,15 @@ TEST(Capability, TellsADriftFromScatter) {
   EXPECT_NEAR(two->pp->value, 6 / (6 * two->overall_sd), 1e-12);
 }
 
-TEST(Capability, NeedsValuesThatDifferAndALimit) {
+TEST(Capability, ReturnsNulloptForEqualValuesOrWithoutLimit) {
   EXPECT_FALSE(capability(std::vector<double>{1}, {0, 2}));
   EXPECT_FALSE(capability(std::vector<double>{1, 1, 1}, {0, 2}));
   EXPECT_FALSE(capability(std::vector<double>{1, 2}, {}));
 }
 
-/// The true index is in the interval as often as it says; limits at 4 sigmas above, 6 below.
-TEST(Capability, HasIntervalsThatHold) {
+/// Coverage of the true index equals the confidence level; limits 4 sigmas above and 6 below the
+/// mean.
+TEST(Capability, IntervalsHaveNominalCoverage) {
   Random random(11);
   constexpr int trials = 2000;
   constexpr std::size_t count = 50;

@@ -34,7 +34,7 @@ bool holds(const std::string& name, const std::vector<double>& sigmas) {
   return false;
 }
 
-/// `count` times one value.
+/// Returns `count` equal values.
 std::vector<double> times(std::size_t count, double value) {
   return std::vector<double>(count, value);
 }
@@ -48,7 +48,7 @@ std::vector<double> with(std::vector<double> values, std::size_t place, double v
   return values;
 }
 
-TEST(ControlChart, HasLimitsFromTheMovingRange) {
+TEST(ControlChart, ComputesLimitsFromMovingRange) {
   const ControlChart chart = control_chart(std::vector<double>{1, 3, 2, 5});
   const double sigma = (2 + 1 + 3) / 3.0 / 1.128, mean = 11 / 4.0;
   EXPECT_DOUBLE_EQ(chart.mean, mean);
@@ -58,7 +58,7 @@ TEST(ControlChart, HasLimitsFromTheMovingRange) {
 }
 
 /// NIST/SEMATECH e-Handbook of Statistical Methods, 6.3.2.2: flow rates of ten batches.
-TEST(ControlChart, IsThatOfThePublishedIndividuals) {
+TEST(ControlChart, MatchesPublishedIndividualsChart) {
   const std::vector<double> flow{49.6, 47.6, 49.9, 51.3, 47.8, 51.2, 52.6, 52.4, 53.6, 52.1};
   const ControlChart chart = control_chart(flow);
   constexpr double printed = 5e-5;
@@ -70,7 +70,7 @@ TEST(ControlChart, IsThatOfThePublishedIndividuals) {
 }
 
 /// NIST/SEMATECH e-Handbook of Statistical Methods, 6.3.2.4.
-TEST(ControlChart, HasThePublishedMovingAverage) {
+TEST(Ewma, MatchesPublishedMovingAverage) {
   const std::vector<double> values{52.0, 47.0, 53.0, 49.3, 50.1, 47.0, 51.0, 50.1, 51.2, 50.5,
                                    49.6, 47.6, 49.9, 51.3, 47.8, 51.2, 52.6, 52.4, 53.6, 52.1};
   const Ewma average = ewma(values, 50, 2.0539, 0.3);
@@ -90,7 +90,7 @@ struct RuleCase {
   std::vector<double> holds, fails;
 };
 
-TEST(ControlChart, HasTheRulesToTheirLastValue) {
+TEST(ChartRules, DetectPatternsUpToLastValue) {
   const std::vector<double> up{-0.4, -0.2, 0, 0.1, 0.2, 0.3};
   const std::vector<RuleCase> cases{
       {"western-electric-1", {3.01}, {3}},
@@ -123,7 +123,7 @@ TEST(ControlChart, HasTheRulesToTheirLastValue) {
 
 /// Mean values until the first false alarm, of known mean and sigma: Champ and Woodall 1987,
 /// Technometrics 29, 393-399, table 1.
-TEST(ControlChart, HasThePublishedRunLengths) {
+TEST(ChartRules, MatchPublishedRunLengths) {
   const std::vector<std::pair<std::string, double>> published{
       {"1", 370.40}, {"12", 225.44}, {"13", 166.05}, {"14", 152.73}, {"1234", 91.75}};
   Random random(5);
@@ -142,12 +142,12 @@ TEST(ControlChart, HasThePublishedRunLengths) {
                             [&](const ChartRule& rule) { return rule.holds(sigmas); }));
       total += static_cast<double>(sigmas.size());
     }
-    // Of a length that is as good as geometric, the standard error is 1.8 %.
+    // For an approximately geometric run length the standard error is 1.8 %.
     EXPECT_NEAR(total / trials / expected, 1, 0.06) << numbers;
   }
 }
 
-TEST(ControlChart, NamesWhatIsOutside) {
+TEST(ChartAlarms, ReportsValueOutsideLimits) {
   std::vector<double> values;
   for (int i = 0; i < 20; ++i) values.push_back(i % 2 == 0 ? 1.0 : 1.1);
   values[13] = 3;
@@ -155,11 +155,11 @@ TEST(ControlChart, NamesWhatIsOutside) {
   EXPECT_THAT(places_of(chart_alarms(values, {"nelson-1"})), ElementsAre(13));
 }
 
-TEST(ControlChart, NamesADriftBeforeItIsOutside) {
+TEST(ChartAlarms, ReportsDriftInsideLimits) {
   std::vector<double> values;
   for (int i = 0; i < 24; ++i) values.push_back((i % 2 == 0 ? 1.0 : 1.1) + (i < 12 ? 0 : 0.3));
   EXPECT_THAT(chart_alarms(values, {"western-electric-1"}), IsEmpty());
-  // Of the first twelve values the eighth and on are the eighth in a row below the mean, too.
+  // From the eighth on, the first twelve values are also eight in a row below the mean.
   EXPECT_THAT(places_of(chart_alarms(values, {"western-electric-4"})),
               ElementsAre(7, 8, 9, 10, 11, 19, 20, 21, 22, 23));
   const auto by_average = chart_alarms(values, {"ewma"});
@@ -167,7 +167,7 @@ TEST(ControlChart, NamesADriftBeforeItIsOutside) {
   EXPECT_EQ(by_average.back().index, 23u);
 }
 
-TEST(ControlChart, TakesAllRulesOfASet) {
+TEST(ChartAlarms, AppliesAllRulesOfSet) {
   const std::vector<double> values{0, 0.1, 0, 0.1, 0, 0.1, 0, 0.1, 5};
   std::vector<std::string> names;
   for (const ChartAlarm& alarm : chart_alarms(values, {"western-electric", "nelson-1", "ewma"})) {
@@ -178,15 +178,15 @@ TEST(ControlChart, TakesAllRulesOfASet) {
               HasSubstr("there is no rule western; there are western-electric-1 to -4"));
 }
 
-TEST(ControlChart, OfEqualValuesHasNoAlarm) {
+TEST(ChartAlarms, ReturnsNoneForEqualValues) {
   for (const double value : {1.0, 0.1, 0.3, 1e-7}) {
-    const std::vector<double> values(20, value);  // more than any rule looks back
+    const std::vector<double> values(20, value);  // more than any rule uses
     EXPECT_EQ(control_chart(values).mean, value);
     EXPECT_THAT(chart_alarms(values, {"western-electric", "nelson", "ewma"}), IsEmpty());
   }
 }
 
-TEST(ControlChart, CountsAValueAtTheMeanOnNeitherSide) {
+TEST(ChartAlarms, CountsValueAtMeanOnNeitherSide) {
   // Mean 1: seven below it, one at it, seven above.
   std::vector<double> values(7, 0.5);
   values.push_back(1);
@@ -195,7 +195,7 @@ TEST(ControlChart, CountsAValueAtTheMeanOnNeitherSide) {
   EXPECT_THAT(chart_alarms(values, {"western-electric-4"}), IsEmpty());
 }
 
-TEST(ControlChart, DrawsAPicture) {
+TEST(DrawTrend, WritesPlot) {
   const TemporaryFolder folder;
   std::vector<TrendPoint> points;
   std::vector<double> values;

@@ -10,7 +10,7 @@ namespace vlp {
 namespace {
 
 /// The table of NIST/SEMATECH e-Handbook of Statistical Methods, 1.3.6.7.4.
-TEST(ChiSquare, HasThePublishedQuantiles) {
+TEST(ChiSquareQuantile, MatchesPublishedTables) {
   constexpr double printed = 5e-4;
   EXPECT_NEAR(chi_square_quantile(0.95, 1), 3.841, printed);
   EXPECT_NEAR(chi_square_quantile(0.95, 10), 18.307, printed);
@@ -19,8 +19,8 @@ TEST(ChiSquare, HasThePublishedQuantiles) {
   EXPECT_NEAR(chi_square_quantile(0.95, 100), 124.342, printed);
 }
 
-/// Values of SciPy 1.10, which has them from Cephes and Boost.
-TEST(ChiSquare, HasThoseOfAnotherProgram) {
+/// Values of SciPy 1.10, computed by Cephes and Boost.
+TEST(ChiSquareQuantile, MatchesOtherImplementation) {
   const auto expect = [](double probability, double dof, double quantile) {
     EXPECT_NEAR(chi_square_quantile(probability, dof) / quantile, 1, 1e-11);
   };
@@ -33,13 +33,13 @@ TEST(ChiSquare, HasThoseOfAnotherProgram) {
 }
 
 /// With two degrees of freedom P(X <= x) is 1 - exp(-x / 2).
-TEST(ChiSquare, IsExactWhereItIsSimple) {
+TEST(ChiSquareQuantile, MatchesClosedFormForTwoDegreesOfFreedom) {
   for (const double probability : {1e-3, 0.5, 0.975, 0.999999}) {
     EXPECT_NEAR(chi_square_quantile(probability, 2), -2 * std::log1p(-probability), 1e-13);
   }
 }
 
-TEST(FisherF, HasThoseOfAnotherProgram) {
+TEST(FUpperTail, MatchesOtherImplementation) {
   const auto expect = [](double x, double above, double below, double tail) {
     EXPECT_NEAR(f_upper_tail(x, above, below) / tail, 1, 1e-11);
   };
@@ -53,7 +53,7 @@ TEST(FisherF, HasThoseOfAnotherProgram) {
 
 /// The table of NIST/SEMATECH e-Handbook of Statistical Methods, 1.3.6.7.2, and of 58 degrees of
 /// freedom AIAG's MSA, 4th ed.
-TEST(StudentT, HasThePublishedQuantiles) {
+TEST(TQuantile, MatchesPublishedTables) {
   constexpr double printed = 5e-4;
   EXPECT_NEAR(t_quantile(0.05, 1), 12.706, printed);
   EXPECT_NEAR(t_quantile(0.05, 10), 2.228, printed);
@@ -63,8 +63,8 @@ TEST(StudentT, HasThePublishedQuantiles) {
   EXPECT_NEAR(t_quantile(0.05, 100), 1.984, printed);
 }
 
-/// Of one degree of freedom it is Cauchy's.
-TEST(StudentT, IsExactWhereItIsSimple) {
+/// With one degree of freedom it is the Cauchy distribution.
+TEST(TTwoTails, MatchesClosedForm) {
   const double pi = std::acos(-1);
   for (const double t : {0.0, 1e-3, 0.5, -2.0, 40.0}) {
     EXPECT_NEAR(t_two_tails(t, 1), 1 - 2 / pi * std::atan(std::abs(t)), 1e-13);

@@ -30,7 +30,7 @@ std::vector<StudyValue> crossed(std::size_t stations, std::size_t repeats,
 
 /// AIAG, Measurement Systems Analysis, 4th ed., tables III-B 6 (values), A 3 (analysis of variance)
 /// and A 4 (parts of the variation): 10 parts, 3 appraisers, 3 trials.
-TEST(MeasurementStudy, HasTheManualsResults) {
+TEST(MeasurementStudy, MatchesAiagManual) {
   const MeasurementStudy study = measurement_study(
       crossed(3, 3, {0.29,  0.41,  0.64,  0.08,  0.25,  0.07,  0.04,  -0.11, -0.15,     // 1
                      -0.56, -0.68, -0.58, -0.47, -1.22, -0.68, -1.38, -1.13, -0.96,     // 2
@@ -71,7 +71,7 @@ TEST(MeasurementStudy, HasTheManualsResults) {
 
 /// Montgomery, Design and Analysis of Experiments, gauge study of 20 parts, 3 operators, 2
 /// measurements: the analysis of variance, and the parts of the reduced model.
-TEST(MeasurementStudy, HasTheTextbooksResults) {
+TEST(MeasurementStudy, MatchesTextbook) {
   const MeasurementStudy study = measurement_study(crossed(
       3, 2, {21, 20, 20, 20, 19, 21, 24, 23, 24, 24, 23, 24, 20, 21, 19, 21, 20, 22, 27, 27,
              28, 26, 27, 28, 19, 18, 19, 18, 18, 21, 23, 21, 24, 21, 23, 22, 22, 21, 22, 24,
@@ -95,8 +95,8 @@ TEST(MeasurementStudy, HasTheTextbooksResults) {
   EXPECT_NEAR(std::pow(study.measuring, 2), 0.89, 0.005);
 }
 
-/// No published values: those of the same equations in NumPy and SciPy.
-TEST(MeasurementStudy, KeepsAnInteractionThatShows) {
+/// Values of the same equations in NumPy and SciPy, because none are published.
+TEST(MeasurementStudy, KeepsSignificantInteraction) {
   const MeasurementStudy study = measurement_study(
       crossed(2, 2, {10, 10.2, 12, 12.2, 11, 11.4, 10, 10.4, 15, 15.2, 14, 14.6}));
   EXPECT_FALSE(study.pooled);
@@ -109,7 +109,7 @@ TEST(MeasurementStudy, KeepsAnInteractionThatShows) {
 }
 
 /// By hand: two units at 0 and 10, each measured twice, 1 apart: MS_e = 0.5, MS_unit = 100.
-TEST(MeasurementStudy, OfOneStationKnowsItsRepeatability) {
+TEST(MeasurementStudy, ComputesRepeatabilityForOneStation) {
   const MeasurementStudy study = measurement_study(crossed(1, 2, {-0.5, 0.5, 9.5, 10.5}));
   EXPECT_EQ(study.stations, 1u);
   EXPECT_FALSE(study.interaction_p);
@@ -129,7 +129,7 @@ TEST(MeasurementStudy, OfOneStationKnowsItsRepeatability) {
   EXPECT_FALSE(study.percent_of_tolerance({11, std::nullopt}));
 }
 
-TEST(MeasurementStudy, FindsWhatWasPutIn) {
+TEST(MeasurementStudy, RecoversSimulatedVarianceComponents) {
   Random random(3);
   constexpr int studies = 400;
   constexpr std::size_t units = 10, stations = 3, repeats = 3;
@@ -154,7 +154,7 @@ TEST(MeasurementStudy, FindsWhatWasPutIn) {
   EXPECT_NEAR(station, 4, 4 * 0.16);
 }
 
-TEST(MeasurementStudy, SaysWhatIsMissing) {
+TEST(MeasurementStudy, ThrowsForMissingValues) {
   EXPECT_THAT(refusal_of<std::invalid_argument>([] { measurement_study({}); }),
               HasSubstr("two units"));
   EXPECT_THAT(refusal_of<std::invalid_argument>([] {

@@ -18,10 +18,10 @@ using testing::Field;
 using testing::HasSubstr;
 using testing::SizeIs;
 
-/// Records of four runs: of camera a three, of which the last is INVALID, and one of b that failed.
-class RunFigures : public testing::Test {
+/// Records of four runs: three of camera a, of which the last is INVALID, and a failed one of b.
+class RunMetrics : public testing::Test {
  protected:
-  RunFigures() {
+  RunMetrics() {
     keep(1, "a", 0.1);
     keep(2, "b", 2);
     keep(3, "a", 0.3);
@@ -40,7 +40,7 @@ class RunFigures : public testing::Test {
   Records records{(folder / "records.db").string()};
 };
 
-TEST_F(RunFigures, AreOfRunsThatWereJudged) {
+TEST_F(RunMetrics, JudgedValuesExcludesInvalidRuns) {
   EXPECT_THAT(values_of(judged()), ElementsAre(0.1, 2, 0.3));
   RunFilter two, invalid;
   two.last = 2;
@@ -49,7 +49,7 @@ TEST_F(RunFigures, AreOfRunsThatWereJudged) {
   EXPECT_THAT(values_of(judged(invalid)), ElementsAre(0.4));
 }
 
-TEST_F(RunFigures, HaveTheGateOfTheStationOrOfTheLastRun) {
+TEST_F(RunMetrics, FindGateReturnsGateOfStationOrLastRun) {
   EXPECT_EQ(gate_of("rms_px", nullptr, records, judged()), 1);
   EXPECT_FALSE(gate_of("coverage", nullptr, records, judged())) << "a figure without a gate";
   EXPECT_FALSE(gate_of("rms_px", nullptr, records, {}));
@@ -62,7 +62,7 @@ TEST_F(RunFigures, HaveTheGateOfTheStationOrOfTheLastRun) {
   EXPECT_EQ(limits_of(run_figure("coverage"), 0.7).lower, 0.7);
 }
 
-TEST_F(RunFigures, OfTwoStationsAreNotMixed) {
+TEST_F(RunMetrics, CheckOneStationThrowsForTwoStations) {
   auto points = judged();
   EXPECT_NO_THROW(check_one_station(points));
   EXPECT_NO_THROW(check_one_station({}));
@@ -70,7 +70,7 @@ TEST_F(RunFigures, OfTwoStationsAreNotMixed) {
   EXPECT_THROW(check_one_station(points), std::invalid_argument);
 }
 
-TEST_F(RunFigures, OfAStudyAreOfUnitsThatWereRunMoreThanOnce) {
+TEST_F(RunMetrics, StudyValuesSelectsUnitsWithRepeatedRuns) {
   EXPECT_THAT(study_values(judged(), {}),
               AllOf(SizeIs(2), testing::Each(Field(&StudyValue::unit, "a"))));
   EXPECT_THAT(study_values(judged(), {"b"}), ElementsAre(Field(&StudyValue::unit, "b")));
@@ -85,7 +85,7 @@ TEST_F(RunFigures, OfAStudyAreOfUnitsThatWereRunMoreThanOnce) {
   EXPECT_THROW(reference_values(judged(), {{"c", 0.2}}), std::invalid_argument);
 }
 
-TEST(RunFigure, IsNamedAmongThoseThereAre) {
+TEST(RunMetric, ThrowsWithListOfMetricsForUnknownName) {
   EXPECT_STREQ(run_figure("check_mean_mm").unit, "mm");
   EXPECT_THAT([] { run_figure("rms_um"); },
               testing::ThrowsMessage<std::invalid_argument>(
@@ -93,7 +93,7 @@ TEST(RunFigure, IsNamedAmongThoseThereAre) {
 }
 
 /// sample() has the same images in each run.
-TEST_F(RunFigures, OfTheSameImagesAreNoRepetition) {
+TEST_F(RunMetrics, CheckRepetitionsThrowsForSameImages) {
   const auto points = judged();
   const auto values = study_values(points, {});
   ASSERT_THAT(values, SizeIs(2));

@@ -19,11 +19,11 @@ using testing::IsEmpty;
 
 struct LampFaults : ExampleRig {};
 
-TEST_F(LampFaults, AreNoneWhereTheMapFits) {
+TEST_F(LampFaults, ReturnsNoneForCorrectMap) {
   EXPECT_THAT(lamp_faults(frames, map, calibration), IsEmpty());
 }
 
-TEST_F(LampFaults, NameTwoThatAreSwapped) {
+TEST_F(LampFaults, ReportsSwappedLamps) {
   for (std::size_t a = 0; a < map.lamps.size(); ++a) {
     for (std::size_t b = a + 1; b < map.lamps.size(); ++b) {
       LampMap swapped = map;
@@ -36,7 +36,7 @@ TEST_F(LampFaults, NameTwoThatAreSwapped) {
   }
 }
 
-TEST_F(LampFaults, NameOneThatHangsElsewhere) {
+TEST_F(LampFaults, ReportsDisplacedLamp) {
   for (std::size_t i = 0; i < map.lamps.size(); ++i) {
     LampMap moved = map;
     moved.lamps[i].position_m += Eigen::Vector3d(0.02, -0.01, 0);
@@ -47,7 +47,7 @@ TEST_F(LampFaults, NameOneThatHangsElsewhere) {
   }
 }
 
-TEST_F(LampFaults, NameOneThatIsNeverSeen) {
+TEST_F(LampFaults, ReportsUndetectedLamp) {
   const int id = map.lamps[2].id;
   for (Frame& frame : frames) {
     std::erase_if(frame.detections, [&](const Detection& lamp) { return lamp.lamp == id; });
@@ -58,8 +58,8 @@ TEST_F(LampFaults, NameOneThatIsNeverSeen) {
   EXPECT_THAT(unseen_lamps(std::span(frames).first(2), map), IsEmpty()) << "too few to tell";
 }
 
-/// Of a camera that is known.
-TEST_F(LampFaults, NameOneThatMovedAFewMillimetres) {
+/// For a known camera.
+TEST_F(LampFaults, ReportsSmallDisplacementWithSmallMinOffset) {
   constexpr double fits_px = 0.25;
   EXPECT_THAT(lamp_faults(frames, map, calibration, fits_px), IsEmpty());
   for (std::size_t i = 0; i < map.lamps.size(); ++i) {
@@ -70,9 +70,9 @@ TEST_F(LampFaults, NameOneThatMovedAFewMillimetres) {
   }
 }
 
-/// A light that is taken for a lamp is rejected, and its capture counts as one that does not fit at
-/// all: no reason to call the lamp loose unless many say so.
-TEST_F(LampFaults, HoldNoSingleReflectionAgainstALamp) {
+/// A light that is mistaken for a lamp is rejected, and its capture has a large residual. That does
+/// not mark the lamp as loose unless many captures agree.
+TEST_F(LampFaults, IgnoresSingleReflection) {
   constexpr double fits_px = 0.25;
   const int id = map.lamps[2].id;
   std::vector<Detection*> seen;
@@ -96,9 +96,9 @@ TEST_F(LampFaults, HoldNoSingleReflectionAgainstALamp) {
   }
 }
 
-/// Places as the fixes have them, in the table of a check.
-struct PlaceFaults : LampFaults {
-  PlaceFaults() {
+/// Positions equal to the fixes, in the table of a check.
+struct PlaceFault : LampFaults {
+  PlaceFault() {
     const Positioner positioner(map, calibration);
     for (const Frame& frame : frames) {
       const Fix fix = positioner.locate(frame.detections);
@@ -111,7 +111,7 @@ struct PlaceFaults : LampFaults {
   CapturesTable places;
 };
 
-TEST_F(PlaceFaults, NameTheOnePointThatIsElsewhere) {
+TEST_F(PlaceFault, ReportsSingleWrongPosition) {
   EXPECT_EQ(place_fault(frames, map, calibration, places), "");
   for (const std::size_t which : {std::size_t{0}, std::size_t{17}, frames.size() - 1}) {
     CapturesTable wrong = places;
@@ -122,7 +122,7 @@ TEST_F(PlaceFaults, NameTheOnePointThatIsElsewhere) {
   }
 }
 
-TEST_F(PlaceFaults, NameSeveralThatAreElsewhere) {
+TEST_F(PlaceFault, ReportsSeveralWrongPositions) {
   ASSERT_GT(frames.size(), 12U);
   CapturesTable wrong = places;
   for (std::size_t i = 0; i < 5; ++i) wrong.at(frames[i].image).y_m.value() += 0.052;
@@ -134,8 +134,8 @@ TEST_F(PlaceFaults, NameSeveralThatAreElsewhere) {
                           "their table says, or by another camera"));
 }
 
-/// Half of them say nothing of the others.
-TEST_F(PlaceFaults, NameNoneWhereMostAreElsewhere) {
+/// If half or more are wrong, the others are not reliable.
+TEST_F(PlaceFault, ReturnsEmptyIfMostPositionsAreWrong) {
   CapturesTable wrong = places;
   for (std::size_t i = 0; i < frames.size(); ++i) {
     if (i % 4 != 0) wrong.at(frames[i].image).y_m.value() += 0.02;
@@ -143,8 +143,8 @@ TEST_F(PlaceFaults, NameNoneWhereMostAreElsewhere) {
   EXPECT_EQ(place_fault(frames, map, calibration, wrong), "");
 }
 
-/// A zenith of another camera moves all fixes by one offset in the frame of the camera.
-TEST_F(PlaceFaults, NameTheFrameOfACommonOffset) {
+/// The zenith of another camera displaces all fixes by one offset in the frame of the camera.
+TEST_F(PlaceFault, FindCommonOffsetReturnsFrame) {
   EXPECT_FALSE(find_common_offset(frames, map, calibration, places));
   const Positioner positioner(map, calibration);
   CapturesTable rotating = places, constant = places, scattered = places;

@@ -19,18 +19,18 @@ using testing::AllOf;
 using testing::HasSubstr;
 using testing::StartsWith;
 
-struct LensFaultTest : ExampleRig {};
+struct LensFault : ExampleRig {};
 
-TEST_F(LensFaultTest, IsNoneOfTheLensThatTheLampsWereSeenThrough) {
+TEST_F(LensFault, ReturnsEmptyForCorrectLens) {
   EXPECT_EQ(lens_fault(frames, map, calibration), "");
-  // What is a little off is not another lens.
+  // A slightly different lens is not another lens.
   calibration.camera.intrinsics[0] *= 1.0005;
   calibration.camera.intrinsics[2] += 0.3;
   EXPECT_EQ(lens_fault(frames, map, calibration), "");
 }
 
-/// As when the boards are of another unit.
-TEST_F(LensFaultTest, NamesTheLensThatTheLampsShow) {
+/// As if the boards were of another unit.
+TEST_F(LensFault, ReportsLensEstimatedFromLamps) {
   auto& lens = calibration.camera.intrinsics;
   const double shown_px = std::sqrt(lens[0] * lens[1]);
   for (const double focal : {0.98, 1.02}) {
@@ -55,8 +55,8 @@ TEST_F(LensFaultTest, NamesTheLensThatTheLampsShow) {
   }
 }
 
-/// That is the map's fault.
-TEST_F(LensFaultTest, IsNoneOfALampThatHangsElsewhere) {
+/// A displaced lamp is an error of the map.
+TEST_F(LensFault, ReturnsEmptyForDisplacedLamp) {
   for (Lamp& lamp : map.lamps) {
     const Eigen::Vector3d kept_m = lamp.position_m;
     lamp.position_m += Eigen::Vector3d(0.02, -0.01, 0);
@@ -65,14 +65,14 @@ TEST_F(LensFaultTest, IsNoneOfALampThatHangsElsewhere) {
   }
 }
 
-TEST_F(LensFaultTest, IsNoneOfCapturesThatTellNothing) {
+TEST_F(LensFault, ReturnsEmptyForTooFewCaptures) {
   calibration.camera.intrinsics[0] *= 1.02;
   EXPECT_EQ(lens_fault({}, map, calibration), "");
   EXPECT_EQ(lens_fault(std::span(frames).first(1), map, calibration), "");
 }
 
-/// Captures at known heights, as the fixes of the true camera give them.
-struct OtherCamera : LensFaultTest {
+/// Captures at known heights, equal to the fixes of the true camera.
+struct OtherCamera : LensFault {
   OtherCamera() {
     const Positioner positioner(map, calibration);
     for (std::size_t i = 0; i < frames.size(); ++i) {
@@ -83,7 +83,7 @@ struct OtherCamera : LensFaultTest {
       captures.frames.push_back(frames[i]);
     }
   }
-  /// Moves the detections of the check to where a camera of another lens or tilt has them.
+  /// Replaces the detections of the check by those of a camera with another lens or tilt.
   void look_through(const Lens& other, const Eigen::Matrix3d& other_from_camera) {
     const Lens lens(calibration.camera.lens_model, calibration.camera.intrinsics);
     for (Frame& frame : check.frames) {
@@ -99,7 +99,7 @@ struct OtherCamera : LensFaultTest {
   PlacedCaptures own, check;
 };
 
-TEST_F(OtherCamera, IsNoneIfTheUnitTilted) {
+TEST_F(OtherCamera, IsNotReportedForTiltedUnit) {
   ASSERT_GT(check.frames.size(), 10U);
   look_through(Lens(calibration.camera.lens_model, calibration.camera.intrinsics),
                Eigen::AngleAxisd(0.005, Eigen::Vector3d(1, 2, 0).normalized()).toRotationMatrix());
@@ -107,7 +107,7 @@ TEST_F(OtherCamera, IsNoneIfTheUnitTilted) {
   EXPECT_EQ(find_other_lens(check.frames, own.frames, map, calibration), "");
 }
 
-TEST_F(OtherCamera, HasAnotherFocalLength) {
+TEST_F(OtherCamera, IsReportedForDifferentFocalLength) {
   auto intrinsics = calibration.camera.intrinsics;
   intrinsics[0] *= 0.99;
   intrinsics[1] *= 0.99;
@@ -118,7 +118,7 @@ TEST_F(OtherCamera, HasAnotherFocalLength) {
   EXPECT_EQ(find_other_focal_length(check, own, map, calibration), "") << "no heights to compare";
 }
 
-TEST_F(OtherCamera, HasAnotherCenter) {
+TEST_F(OtherCamera, IsReportedForDifferentCenter) {
   auto intrinsics = calibration.camera.intrinsics;
   intrinsics[2] += 12;
   intrinsics[3] -= 8;

@@ -23,14 +23,14 @@ struct StationSteps : testing::Test {
   CapturesTable places = read_captures(kExample + "truth.csv");
 };
 
-TEST_F(StationSteps, CheckTheFixesAtKnownPoints) {
+TEST_F(StationSteps, CheckFixesLocatesAllKnownPoints) {
   const StepResult result = check_fixes(config, calibration, frames, places);
   EXPECT_TRUE(result.ok()) << result.why;
   EXPECT_EQ(result.metrics[0].name, "check_fixes");
   EXPECT_EQ(result.metrics[0].value, 1);
 }
 
-TEST_F(StationSteps, WantAsManyPlacesAsTheStationWantsCaptures) {
+TEST_F(StationSteps, FailForTooFewKnownPositions) {
   places.erase(places.begin());
   EXPECT_THAT(check_fixes(config, calibration, frames, places).why,
               HasSubstr("1 of the 36 captures"));
@@ -41,8 +41,8 @@ TEST_F(StationSteps, WantAsManyPlacesAsTheStationWantsCaptures) {
   EXPECT_THAT(check_fixes(config, calibration, {}, places).why, HasSubstr("nothing tells"));
 }
 
-/// Lamps that hang lower than their map says: places are right, heights are not.
-TEST_F(StationSteps, TellTheHeightError) {
+/// Lamps below their heights in the map: horizontal positions are right, heights are wrong.
+TEST_F(StationSteps, CheckFixesComputesHeightError) {
   const auto height_mm = [&] {
     const StepResult result = check_fixes(config, calibration, frames, places);
     for (const auto& [name, value] : result.metrics) {

@@ -15,7 +15,7 @@ namespace {
 using testing::Each;
 using testing::SizeIs;
 
-/// The example's turn: 12 captures at each of two heights, 30 degrees apart.
+/// The example's rotation: 12 captures at each of two heights, 30 degrees apart.
 struct TurnMapTest : testing::Test {
   TurnMapTest() {
     config.lamps = read_lamp_map(kExample + "lamps.yaml");
@@ -27,7 +27,7 @@ struct TurnMapTest : testing::Test {
   std::vector<Frame> frames = read_detections(kExample + "turning.csv");
 };
 
-TEST_F(TurnMapTest, IsWhole) {
+TEST_F(TurnMapTest, IsCompleteForAllCaptures) {
   const TurnMap map = turn_map(frames, config, calibration);
   ASSERT_THAT(map.heights, SizeIs(2));
   for (const auto& height : map.heights) {
@@ -38,7 +38,7 @@ TEST_F(TurnMapTest, IsWhole) {
   EXPECT_TRUE(map.enough);
 }
 
-TEST_F(TurnMapTest, ShowsTheAnglesThatAreMissing) {
+TEST_F(TurnMapTest, ReportsMissingAngles) {
   frames.erase(frames.begin() + 4, frames.begin() + 7);
   const TurnMap map = turn_map(frames, config, calibration);
   ASSERT_THAT(map.heights, SizeIs(2));
@@ -47,8 +47,8 @@ TEST_F(TurnMapTest, ShowsTheAnglesThatAreMissing) {
   EXPECT_FALSE(map.enough);
 }
 
-// Not from the lowest, which hangs on the fixes' last micrometres.
-TEST_F(TurnMapTest, CountsFromTheCaptureThatCameFirst) {
+// Not from the lowest capture, which depends on the last micrometers of the fixes.
+TEST_F(TurnMapTest, StartsAtYawOfFirstCapture) {
   frames.resize(3);
   const auto forwards = turn_map(frames, config, calibration).heights.at(0).parts;
   std::reverse(frames.begin(), frames.end());
@@ -59,7 +59,7 @@ TEST_F(TurnMapTest, CountsFromTheCaptureThatCameFirst) {
   EXPECT_NE(forwards[11], backwards[11]);
 }
 
-TEST_F(TurnMapTest, HasAsManyHeightsAsThereAre) {
+TEST_F(TurnMapTest, ReturnsAllHeights) {
   frames.erase(frames.begin() + 12, frames.end());
   EXPECT_THAT(turn_map(frames, config, calibration).heights, SizeIs(1));
   EXPECT_FALSE(turn_map(frames, config, calibration).enough);

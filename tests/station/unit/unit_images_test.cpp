@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Images that come, are overwritten and are taken away again.
+/// Tests of images that arrive, are overwritten and are removed.
 #include <gmock/gmock.h>
 
 #include "station/unit/unit.h"
@@ -15,13 +15,13 @@ using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-/// One view is enough for the boards, though not for a lens.
+/// One view completes the boards but does not determine a lens.
 struct UnitImages : testing::Test {
   UnitImages() {
     config.enough.board_views = 1;
     config.enough.board_coverage = 0;
   }
-  /// The one view there is, or no image, under this name.
+  /// Adds the only view, or an invalid file, under this name.
   void come(const std::string& name, bool good) {
     const auto file = folder / name;
     if (good) {
@@ -40,7 +40,7 @@ struct UnitImages : testing::Test {
   Unit unit{config, "unit", {"test", "0"}, 1};
 };
 
-TEST_F(UnitImages, ThatShowTheSameGetTheirTurnWhenTheFirstGoes) {
+TEST_F(UnitImages, DuplicateIsUsedWhenFirstIsRemoved) {
   come("a.png", true);
   come("b.png", true);
   EXPECT_EQ(refusal("a.png"), "");
@@ -51,7 +51,7 @@ TEST_F(UnitImages, ThatShowTheSameGetTheirTurnWhenTheFirstGoes) {
   EXPECT_EQ(refusal("a.png"), "is the same image as b.png");
 }
 
-TEST_F(UnitImages, ThatAreOverwrittenCountNoMore) {
+TEST_F(UnitImages, OverwrittenImageIsReplaced) {
   come("a.png", true);
   unit.advance(false);
   ASSERT_TRUE(boards().result);  // a problem: one view makes no lens
@@ -63,7 +63,7 @@ TEST_F(UnitImages, ThatAreOverwrittenCountNoMore) {
   EXPECT_EQ(refusal("b.png"), "");
 }
 
-TEST_F(UnitImages, OfACameraThatAreRefusedStayAsRefusals) {
+TEST_F(UnitImages, DiscardedImageStaysRejected) {
   come("a.png", true);
   for (const char* name : {"b.png", "c.png"}) {
     come(name, false);
@@ -81,7 +81,7 @@ TEST_F(UnitImages, OfACameraThatAreRefusedStayAsRefusals) {
                                                              HasSubstr("2 of 2 images refused")))));
 }
 
-TEST_F(UnitImages, AreRejectedIfTheyCannotBeRead) {
+TEST_F(UnitImages, UnreadableImageIsRejected) {
   fs::create_directory(folder / "a.png");
   unit.add(StationStep::boards, {folder / "a.png", folder / "gone.png"});
   EXPECT_EQ(refusal("a.png"), "cannot be read as an image");

@@ -22,7 +22,7 @@ using testing::Not;
 namespace fs = std::filesystem;
 constexpr const char* kView = VLP_SOURCE_DIR "/datasets/paper-rig/rendered/sample-boards/0000.png";
 
-/// A unit of the station in datasets/station, without images at first.
+/// Unit of the station in datasets/station, initially without images.
 struct UnitTest : testing::Test {
   StationConfig config = read_station(VLP_SOURCE_DIR "/datasets/station/station.yaml");
   TemporaryFolder folder;
@@ -34,7 +34,7 @@ struct UnitTest : testing::Test {
   }
 };
 
-TEST_F(UnitTest, BeginsWithTheBoards) {
+TEST_F(UnitTest, StartsWithBoards) {
   EXPECT_EQ(unit.current(), StationStep::boards);
   EXPECT_FALSE(unit.calibration());
   EXPECT_THAT(find_causes(unit),
@@ -42,7 +42,7 @@ TEST_F(UnitTest, BeginsWithTheBoards) {
   EXPECT_EQ(verdict_of(find_causes(unit)), Verdict::invalid);
 }
 
-TEST_F(UnitTest, IsHopelessAfterSoManyBadImagesInARow) {
+TEST_F(UnitTest, IsHopelessAfterMaxConsecutiveRejections) {
   for (int i = 0; i < config.max_rejected_in_a_row; ++i) {
     EXPECT_FALSE(unit.hopeless()) << i;
     add_bad(i);
@@ -59,26 +59,26 @@ TEST_F(UnitTest, IsHopelessAfterSoManyBadImagesInARow) {
   EXPECT_FALSE(unit.hopeless());
 }
 
-/// As when a program that was killed goes on: all that is there comes at once, by name.
-TEST_F(UnitTest, IsNotHopelessForTheOrderOfNames) {
+/// As after a restart of a killed program: all images arrive at once, by name.
+TEST_F(UnitTest, IsNotHopelessIfOneImageOfBatchIsUsed) {
   const auto good = folder / "000.png";
   fs::copy_file(kView, good);
   std::vector<fs::path> together{good};
   for (int i = 0; i < config.max_rejected_in_a_row + 1; ++i) {
     together.push_back(folder.file(std::to_string(100 + i) + ".png", "no image"));
   }
-  // In two parts, as the station takes them.
+  // In two batches, as at the station.
   unit.add(StationStep::boards, std::vector<fs::path>(together.begin(), together.end() - 1), true);
   EXPECT_FALSE(unit.hopeless());
   unit.add(StationStep::boards, {together.back()});
   EXPECT_FALSE(unit.hopeless());
   EXPECT_EQ(unit.step(StationStep::boards).refused_in_a_row, 0);
-  // One by one their order is known.
+  // Added one by one, their order is known.
   for (int i = 0; i < config.max_rejected_in_a_row; ++i) add_bad(100 + i);
   EXPECT_TRUE(unit.hopeless());
 }
 
-TEST_F(UnitTest, IsHopelessWhenAllThatIsThereIsBad) {
+TEST_F(UnitTest, IsHopelessIfAllImagesOfBatchAreRejected) {
   std::vector<fs::path> together;
   for (int i = 0; i < config.max_rejected_in_a_row; ++i) {
     together.push_back(folder.file(std::to_string(100 + i) + ".png", "no image"));
@@ -87,7 +87,7 @@ TEST_F(UnitTest, IsHopelessWhenAllThatIsThereIsBad) {
   EXPECT_TRUE(unit.hopeless());
 }
 
-TEST_F(UnitTest, IsNotJudgedWhenItEndsEarly) {
+TEST_F(UnitTest, IsInvalidIfEndedEarly) {
   unit.end_early("the operator ended the run");
   EXPECT_THAT(
       find_causes(unit),
@@ -104,8 +104,8 @@ TEST_F(UnitTest, IsNotJudgedWhenItEndsEarly) {
                     HasSubstr("Cause    boards: the operator ended"), Not(HasSubstr("NOT MET"))));
 }
 
-/// What is missing is named by the step that did not finish, or by its name.
-TEST(VerdictScreen, SaysWhyGatesAreNotMeasured) {
+/// Missing gates are described by the unfinished step, or by their names.
+TEST(VerdictScreen, ReturnsReasonForUnmeasuredGates) {
   const auto gates_line = [](const RunRecord& record) {
     for (const ScreenLine& line : verdict_screen(record)) {
       if (line.text.starts_with("Gates")) return line.text;
@@ -125,7 +125,7 @@ TEST(VerdictScreen, SaysWhyGatesAreNotMeasured) {
   record.judge({{"boards: no image can be used"}});
   measure({{"blur_px", 0.5}});
   EXPECT_EQ(gates_line(record), "Gates    not measured: 4 gates, because boards did not finish");
-  // A figure of a step that failed, and one that a step has before it is solved.
+  // A metric of a failed step, and one available before a step is solved.
   record.judge({{"boards (36/36): two halves"}});
   measure({{"blur_px", 0.5}, {"rms_px", 0.1}});
   EXPECT_EQ(gates_line(record), "Gates    not measured: 3 gates, because boards did not finish");
@@ -150,7 +150,7 @@ TEST(VerdictScreen, SaysWhyGatesAreNotMeasured) {
             "Gates    not measured: blur_px, rms_px, rotation_px, dispersion_mm");
 }
 
-TEST_F(UnitTest, TakesNoImageOfAnother) {
+TEST_F(UnitTest, RejectsImageOfAnotherUnit) {
   unit.refuse_images_of_others([](const std::string&) { return ImageOwner{"0001", "R"}; });
   fs::copy_file(kView, folder / "0.png");
   unit.add(StationStep::boards, {folder / "0.png"});
@@ -166,7 +166,7 @@ TEST_F(UnitTest, TakesNoImageOfAnother) {
   EXPECT_EQ(verdict_of(find_causes(unit)), Verdict::invalid);
 }
 
-TEST(RejectRepetition, NamesTheEarlierRun) {
+TEST(RejectRepetition, ReportsEarlierRun) {
   RunRecord record;
   record.judge({});
   ASSERT_TRUE(record.passed());
@@ -178,13 +178,13 @@ TEST(RejectRepetition, NamesTheEarlierRun) {
             "should not count");
 }
 
-TEST(VerdictOf, IsDecidedByTheFirstCause) {
+TEST(DecideVerdict, ReturnsVerdictOfFirstCause) {
   EXPECT_EQ(verdict_of({}), Verdict::pass);
   EXPECT_EQ(verdict_of({{"decentred", true}, {"the operator left"}}), Verdict::fail);
   EXPECT_EQ(verdict_of({{"lamp 5 is loose"}, {"the fixes are off", true}}), Verdict::invalid);
 }
 
-TEST_F(UnitTest, KeepsLaterImagesUntilTheStepBeforeIsDone) {
+TEST_F(UnitTest, QueuesImagesUntilPreviousStepIsComplete) {
   const auto file = folder.file("0.png", "no image");
   unit.add(StationStep::check, {file});
   unit.advance(false);
@@ -193,7 +193,7 @@ TEST_F(UnitTest, KeepsLaterImagesUntilTheStepBeforeIsDone) {
   EXPECT_TRUE(unit.step(StationStep::check).waiting.empty());
 }
 
-TEST_F(UnitTest, IsShownIn80Columns) {
+TEST_F(UnitTest, ScreenFits80Columns) {
   add_bad(1);
   add_bad(2);
   for (const ScreenLine& line : station_screen(unit)) EXPECT_LE(line.text.size(), 80u) << line.text;
@@ -204,7 +204,7 @@ TEST_F(UnitTest, IsShownIn80Columns) {
   }
 }
 
-TEST_F(UnitTest, HasAReportOfItsVerdict) {
+TEST_F(UnitTest, ReportContainsVerdict) {
   RunRecord record = make_unit_record(unit, new_run(), {"test", "0"});
   EXPECT_THAT(unit_report(record, "", {}),
               AllOf(HasSubstr("<strong>INVALID</strong><p>boards: not enough"),
@@ -218,10 +218,10 @@ TEST_F(UnitTest, HasAReportOfItsVerdict) {
   EXPECT_THAT(unit_report(record, "", {}),
               AllOf(HasSubstr("<strong>PASS"), HasSubstr("at least\u00a00.7"), HasSubstr("0.75"),
                     Not(HasSubstr("is not met")), Not(HasSubstr("confidence interval"))));
-  // Once: with its meaning, among the gates.
+  // Once, with its meaning, among the gates.
   const std::string page = unit_report(record, "", {});
   EXPECT_EQ(page.find("coverage: share"), page.rfind("coverage: share"));
-  // Changed in the database by hand.
+  // Edited in the database.
   record.figures[1].value = 0.5;
   EXPECT_THAT(why_no_verdict(record), HasSubstr("rms_px is 0.5 px, at most 0.3 px is asked for"));
   EXPECT_THAT(unit_report(record, "", {}),

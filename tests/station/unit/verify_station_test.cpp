@@ -14,7 +14,7 @@ namespace {
 
 using testing::SizeIs;
 
-TEST(VerifyStation, BeganWhenItsRunWasNamed) {
+TEST(VerifyStation, StartsAtTimeOfRunName) {
   const TemporaryFolder folder;
   std::filesystem::create_directory(folder / "check");
   folder.file("check/0000.png", "no image");

@@ -18,7 +18,7 @@ std::vector<std::string> names(const std::vector<std::filesystem::path>& files) 
   return all;
 }
 
-TEST(WatchedFolder, TakesAnImageOnceItIsNoLongerWritten) {
+TEST(WatchedFolder, ReportsImageAfterWritingEnds) {
   const TemporaryFolder folder;
   WatchedFolder watched(folder / "");
   EXPECT_THAT(watched.look().came, IsEmpty());
@@ -30,7 +30,7 @@ TEST(WatchedFolder, TakesAnImageOnceItIsNoLongerWritten) {
   EXPECT_THAT(watched.look().came, IsEmpty());
 }
 
-TEST(WatchedFolder, TellsWhatIsOverwrittenAndWhatIsGone) {
+TEST(WatchedFolder, ReportsOverwrittenAndRemovedImages) {
   const TemporaryFolder folder;
   WatchedFolder watched(folder / "");
   folder.file("a.png", "one");
@@ -43,7 +43,7 @@ TEST(WatchedFolder, TellsWhatIsOverwrittenAndWhatIsGone) {
   EXPECT_THAT(names(watched.look().came), ElementsAre("a.png"));
 }
 
-TEST(WatchedFolder, DoesNotMindOtherFiles) {
+TEST(WatchedFolder, IgnoresOtherFiles) {
   const TemporaryFolder folder;
   folder.file(".a.png", "in the making");
   folder.file("captures.csv", "image\n");
@@ -54,7 +54,7 @@ TEST(WatchedFolder, DoesNotMindOtherFiles) {
   EXPECT_THAT(watched.look().came, IsEmpty());
 }
 
-TEST(WatchedFolder, WaitsForItsFolder) {
+TEST(WatchedFolder, AcceptsMissingFolder) {
   const TemporaryFolder folder;
   WatchedFolder watched(folder / "later");
   EXPECT_THAT(watched.look().came, IsEmpty());

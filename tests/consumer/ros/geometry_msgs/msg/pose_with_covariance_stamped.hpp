@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// The fields of ROS 2's messages that the sketch of lib/README.md fills in, without ROS.
+/// Fields of ROS 2's messages that the sketch of lib/README.md sets, without ROS.
 #pragma once
 
 #include <array>
