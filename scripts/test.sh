@@ -2,15 +2,73 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
 #
-# Sets up, builds and runs every test. In CI (the variable CI is set) warnings are errors, and a
+# Builds and tests.
+#
+#   scripts/test.sh                      sets up, builds and runs every test
+#   scripts/test.sh FOLDER...            builds and runs the tests of these folders of tests/
+#   scripts/test.sh --quick [FOLDER...]  leaves out slow tests; without folders: the tests of lib/ alone
+#
+# FOLDER is, for example, positioning. With --quick or folders, the variable PRESET chooses a preset
+# (dev: a changed file is compiled alone). In CI (the variable CI is set) warnings are errors, and a
 # process runs a share of a folder's tests.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-scripts/setup.sh --tests
-cmake --preset release -DVLP_TOOLBOX=ON -DBUILD_TESTING=ON \
-  -DVLP_WARNINGS_AS_ERRORS="${CI:+ON}" -DVLP_TESTS_IN_SHARDS="${CI:+ON}"
-cmake --build --preset release
-ctest --preset release --parallel $(($(nproc) + 1)) || code=$?  # some wait for others
-grep --no-filename --after-context=1 ': Skipped$' build/Testing/Temporary/LastTest.log || true
-exit "${code:-0}"
+quick=
+folders=()
+for argument; do
+  case "$argument" in
+    -h | --help)
+      sed -n '5,/^set /{/^set /d; s/^# \?//p}' "$0"
+      exit 0
+      ;;
+    --quick) quick=yes ;;
+    *)
+      if [ ! -f "tests/$argument/CMakeLists.txt" ]; then
+        echo "test.sh: tests/$argument is no folder of tests; there are:" tests/*/CMakeLists.txt |
+          sed 's#tests/\([a-z]*\)/CMakeLists.txt#\1#g' >&2
+        exit 2
+      fi
+      folders+=("$argument")
+      ;;
+  esac
+done
+
+# Configures with tests; further arguments are options of CMake.
+configure() { cmake --preset "$preset" -DVLP_TOOLBOX=ON -DBUILD_TESTING=ON "$@"; }
+# Runs the tests below a folder of the build, then names those that were skipped.
+run_tests() {
+  local code=0
+  ctest --test-dir "$1" --output-on-failure --no-tests=error \
+    --parallel $(($(nproc) + 1)) "${@:2}" || code=$?  # some tests wait for others
+  grep --no-filename --after-context=1 ': Skipped$' "$1/Testing/Temporary/LastTest.log" || true
+  return "$code"
+}
+
+if [ -z "$quick" ] && [ ${#folders[@]} = 0 ]; then
+  preset=release
+  scripts/setup.sh --tests
+  configure -DVLP_WARNINGS_AS_ERRORS="${CI:+ON}" -DVLP_TESTS_IN_SHARDS="${CI:+ON}"
+  cmake --build --preset release
+  run_tests build
+  exit
+fi
+
+preset=${PRESET:-release}
+build=build
+[ "$preset" = release ] || build=build-$preset
+# A process for each test, so that slow ones can be left out; Ninja configures again when that is due.
+if ! grep -qs '^VLP_TESTS_IN_SHARDS:BOOL=OFF' "$build/CMakeCache.txt" || [ ! -f "$build/tests/CTestTestfile.cmake" ]; then
+  configure -DVLP_TESTS_IN_SHARDS=OFF
+fi
+choice=()
+[ -z "$quick" ] || choice=(--label-exclude '^slow$')
+if [ ${#folders[@]} = 0 ]; then
+  cmake --build "$build" --target vlp_library_tests
+  run_tests "$build" --label-regex '^unit$' "${choice[@]}"
+else
+  cmake --build "$build" --target $(printf "tests/%s/all " "${folders[@]}")
+  for folder in "${folders[@]}"; do
+    run_tests "$build/tests/$folder" "${choice[@]}"
+  done
+fi
