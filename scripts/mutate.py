@@ -1,0 +1,176 @@
+#!/usr/bin/env python3
+# SPDX-FileCopyrightText: The VLP calibration toolbox authors
+# SPDX-License-Identifier: Apache-2.0
+"""Changes the code of a folder of lib/ in small ways and reports which changes its tests do not notice.
+
+    scripts/mutate.py FOLDER [--count N] [--seed S] [--jobs N] [--preset P]
+
+Each mutant changes one operator, constant, sign, statement or pair of arguments. It is compiled to an object of its own
+and linked before the folder's library; neither the sources nor the build folder change. Mutants that do not compile are
+drawn again. A mutant is detected if a test of tests/FOLDER fails, crashes or takes ten times as long as without it; the
+slow tests run only if the others pass. Prints each survivor as FILE:LINE with both lines, then the score. Exit code 0;
+2 for bad usage or tests that fail without a mutant.
+
+Build the tests first: PRESET=dev scripts/test.sh FOLDER.
+"""
+import argparse
+import concurrent.futures
+import json
+import os
+import pathlib
+import random
+import re
+import shlex
+import subprocess
+import sys
+import tempfile
+import time
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+SKIPPED = re.compile(r'R"(\w*)\((?:.|\n)*?\)\1"|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])+\'|//[^\n]*|/\*(?:.|\n)*?\*/'
+                     r"|^[ \t]*#[^\n]*|\bstatic_assert\b[^;]*;|\btemplate\s*<[^;{]*?>\s*(?=\w)", re.M)
+OPERATORS = {" + ": [" - "], " - ": [" + "], " * ": [" / "], " / ": [" * "], " < ": [" <= ", " > "], " > ": [" >= ", " < "],
+             " <= ": [" < ", " >= "], " >= ": [" > ", " <= "], " == ": [" != "], " != ": [" == "], " && ": [" || "],
+             " || ": [" && "], " += ": [" -= "], " -= ": [" += "], " *= ": [" /= "], "++": ["--"], "std::min(": ["std::max("],
+             "std::max(": ["std::min("], "true": ["false"], "false": ["true"], "std::sin(": ["std::cos("],
+             "std::cos(": ["std::sin("], "transpose()": ["eval()"]}
+NUMBER = re.compile(r"(?<![\w.])(?:\d+\.?\d*(?:e[+-]?\d+)?)(?![\w.])")
+STATEMENT = re.compile(r"^[ \t]*(?!return\b|const\b|using\b|auto\b|break\b|case\b|throw\b|[\w:<>, ]+ \w+(?: =|;|\{|\())"
+                       r"[\w\[\]().>:*-]+(?:\([^;{}]*\)| [-+*/]?= [^;{}]*);[ \t]*$", re.M)
+ARGUMENTS = re.compile(r"\b[a-z]\w*\(([\w.]+), ([\w.]+)\)")
+MINUS = re.compile(r"(?<=[(=,] )-(?=[a-z(])|(?<=\()-(?=[a-z(])|(?<=return )-(?=[a-z(])")
+CONDITION = re.compile(r"\bif \((?=[^;{}]*\))")
+
+
+def find_mutations(text):
+    """(begin, end, replacement) of each place outside comments, text and preprocessor lines."""
+    masked = SKIPPED.sub(lambda m: re.sub(r"[^\n]", "\0", m[0]), text)
+    found = []
+    for old, news in OPERATORS.items():
+        for match in re.finditer((r"\b" if old[0].isalpha() else "") + re.escape(old), masked):
+            if re.search(r"template|operator", masked[masked.rfind("\n", 0, match.start()) + 1:match.start()]):
+                continue
+            found += [(match.start(), match.end(), new) for new in news]
+    for match in NUMBER.finditer(masked):
+        value = match[0]
+        found.append((match.start(), match.end(), str(int(value) + 1) if value.isdigit() else f"(1.5 * {value})"))
+    for match in STATEMENT.finditer(masked):
+        found.append((match.start(), match.end(), ""))
+    for match in ARGUMENTS.finditer(masked):
+        if match[1] != match[2]:
+            found.append((match.start(1), match.end(2), f"{match[2]}, {match[1]}"))
+    for match in MINUS.finditer(masked):
+        found.append((match.start(), match.end(), ""))
+    for match in CONDITION.finditer(masked):
+        end, depth = match.end(), 1
+        while depth:
+            depth += {"(": 1, ")": -1}.get(masked[end], 0)
+            end += 1
+        condition = text[match.end():end - 1]
+        if ";" not in condition and " = " not in condition:
+            found.append((match.end(), end - 1, f"!({condition})"))
+    return found
+
+
+class Folder:
+    """Commands that compile, link and run the tests of a folder."""
+
+    def __init__(self, name, preset):
+        self.build = ROOT / ("build" if preset == "release" else f"build-{preset}")
+        self.test = self.build / "tests" / name / f"test_{name}"
+        if not self.test.exists():
+            sys.exit(f"mutate.py: {self.test} is missing; build it: PRESET={preset} scripts/test.sh {name}")
+        commands = json.loads((self.build / "compile_commands.json").read_text())
+        self.compile = {pathlib.Path(c["file"]): c["command"] for c in commands
+                        if pathlib.Path(c["file"]).is_relative_to(ROOT / "lib" / name) and c["file"].endswith(".cpp")}
+        if not self.compile:
+            sys.exit(f"mutate.py: no source of lib/{name} is compiled alone; use a preset without unity builds (dev)")
+        link = subprocess.run(["ninja", "-C", str(self.build), "-t", "commands", f"tests/{name}/test_{name}"],
+                              check=True, capture_output=True, text=True).stdout.rstrip().split("\n")[-1]
+        self.link = re.search(r"&& (\S*c\+\+ .*? -o \S+)(.*?)(?: && |$)", link).groups()
+        self.scratch = self.build / "tests" / name / "scratch"
+        slow = (ROOT / "tests/slow_tests.txt").read_text().split("\n")
+        self.slow = ":".join(line for line in slow if line and not line.startswith("#"))
+
+    def run(self, program, pattern, limit_s):
+        with tempfile.TemporaryDirectory() as scratch:
+            try:
+                done = subprocess.run([program, "--gtest_brief=1", "--gtest_fail_fast", f"--gtest_filter={pattern}"],
+                                      cwd=scratch, capture_output=True, timeout=limit_s, check=False)
+            except subprocess.TimeoutExpired:
+                return False
+        return done.returncode == 0
+
+    def passes(self, program, limits_s):
+        return (self.run(program, "-" + self.slow, limits_s[0])
+                and (not self.slow or self.run(program, self.slow, limits_s[1])))
+
+    def measure(self):
+        """Ten times the seconds of the quick and of the slow tests; exits if one fails."""
+        limits = []
+        for pattern in ("-" + self.slow, self.slow or "-*"):
+            begin = time.monotonic()
+            if not self.run(self.test, pattern, 3600):
+                sys.exit("mutate.py: the tests fail without a mutant")
+            limits.append(10 * (time.monotonic() - begin) + 10)
+        return limits
+
+    def judge(self, file, text, limits_s):
+        """None if the text does not compile; else whether the tests pass."""
+        with tempfile.TemporaryDirectory() as scratch:
+            source, mutant = pathlib.Path(scratch, file.name), pathlib.Path(scratch, "mutant.o")
+            source.write_text(text)
+            command = re.sub(r" -o \S+ -c \S+$", f" -o {mutant} -c {source}", self.compile[file])
+            command = command.replace(" -Werror", "") + f" -w -iquote {file.parent}"
+            if subprocess.run(shlex.split(command), cwd=self.build, capture_output=True, check=False).returncode:
+                return None
+            program = pathlib.Path(scratch, "test")
+            head, tail = self.link
+            link = re.sub(r" -o \S+$", f" {mutant} -o {program}", head) + tail
+            if subprocess.run(link, shell=True, cwd=self.build, capture_output=True, check=False).returncode:
+                return None
+            return self.passes(program, limits_s)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
+    parser.add_argument("folder")
+    parser.add_argument("--count", type=int, default=75, help="mutants that compile (75)")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--jobs", type=int, default=os.cpu_count())
+    parser.add_argument("--preset", default="dev")
+    options = parser.parse_args()
+    folder = Folder(options.folder, options.preset)
+    limits_s = folder.measure()
+    draw = random.Random(options.seed)
+    texts = {file: file.read_text() for file in sorted(folder.compile)}
+    sites = [(file, *place) for file, text in texts.items() for place in find_mutations(text)]
+    draw.shuffle(sites)
+    judged = survived = 0
+    with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
+        def judge(site):
+            file, begin, end, new = site
+            text = texts[file]
+            return site, folder.judge(file, text[:begin] + new + text[end:], limits_s)
+
+        while judged < options.count and sites:
+            batch = [sites.pop() for _ in range(min(len(sites), options.count - judged))]
+            for (file, begin, end, new), passed in pool.map(judge, batch):
+                if passed is None:
+                    continue
+                judged += 1
+                if not passed:
+                    continue
+                survived += 1
+                text = texts[file]
+                line = text.count("\n", 0, begin) + 1
+                first, last = text.rfind("\n", 0, begin) + 1, text.find("\n", end)
+                print(f"{file.relative_to(ROOT)}:{line}: {text[first:last].strip()}\n"
+                      f"    {(text[first:begin] + new + text[end:last]).strip() or '(removed)'}", flush=True)
+    if not judged:
+        sys.exit("mutate.py: no mutant compiled")
+    print(f"{judged - survived} of {judged} mutants detected ({100 * (judged - survived) / judged:.0f} %)")
+
+
+if __name__ == "__main__":
+    main()
