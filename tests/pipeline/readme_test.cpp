@@ -1,17 +1,19 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// What the pages of the tree (*.md) say holds: their commands work as typed, their links and paths
-/// lead somewhere, the messages that they explain are those of the programs.
+/// Checks of the pages of the tree (*.md): commands run as typed, links and paths have targets, and
+/// the explained messages are those of the programs.
 #include <gmock/gmock.h>
 
 #include <algorithm>
 #include <cctype>
 #include <fstream>
+#include <map>
 #include <regex>
 #include <set>
 #include <sstream>
 #include <vector>
 
+#include "evaluation/metric.h"
 #include "support/program.h"
 #include "support/schema.h"
 #include "support/temporary_folder.h"
@@ -23,7 +25,7 @@ namespace fs = std::filesystem;
 
 const fs::path kSource = VLP_SOURCE_DIR;
 
-/// Folders of the tree; others there, such as build and out, are nobody's but the user's.
+/// Folders of the tree; other folders, such as build and out, belong to the user.
 constexpr const char* kFolders[] = {"apps", "datasets", "lib", "scripts", "tests"};
 
 /// The files of the tree whose names end like this, in order; those at the top first.
@@ -89,7 +91,7 @@ std::string prose_of(const fs::path& page) {
   return prose;
 }
 
-/// What a pattern's first group matches.
+/// Returns the matches of the first group of a pattern.
 std::vector<std::string> matches(const std::string& text, const char* pattern) {
   const std::regex expression(pattern);
   std::vector<std::string> found;
@@ -97,6 +99,23 @@ std::vector<std::string> matches(const std::string& text, const char* pattern) {
     found.push_back((*at)[1]);
   }
   return found;
+}
+
+/// Returns all pages in the order in which their commands are run: apps/README.md is followed by
+/// the pages of its folder that it links to, in the order of its links.
+std::vector<fs::path> pages_in_reading_order() {
+  std::vector<fs::path> ordered;
+  const auto add = [&](const fs::path& page) {
+    if (std::find(ordered.begin(), ordered.end(), page) == ordered.end()) ordered.push_back(page);
+  };
+  for (const fs::path& page : pages()) {
+    add(page);
+    if (name_of_page(page) != "apps/README.md") continue;
+    for (const std::string& link : matches(prose_of(page), "\\]\\(([^)#/\\s]+\\.md)")) {
+      add(page.parent_path() / link);
+    }
+  }
+  return ordered;
 }
 
 std::vector<std::string> headings_of(const fs::path& page) {
@@ -128,7 +147,7 @@ bool has_anchor(const fs::path& page, const std::string& anchor) {
                      [&](const std::string& heading) { return anchor_of(heading) == anchor; });
 }
 
-/// Whether a page may name this file so: from the top, from its own folder, or from lib.
+/// Returns true if a page may use this path: relative to the top, to its own folder, or to lib.
 bool is_there(const fs::path& page, const std::string& path) {
   const fs::path folders[] = {kSource, page.parent_path(), kSource / "lib"};
   return std::any_of(std::begin(folders), std::end(folders),
@@ -155,7 +174,7 @@ void expect_formats_to_name_the_columns_of(const fs::path& results) {
   EXPECT_GT(tables, 10U);
 }
 
-TEST(Pages, CommandsWorkAsTyped) {
+TEST(Pages, CommandsRunAsTyped) {
 #ifdef __SANITIZE_ADDRESS__
   GTEST_SKIP() << "hundreds of images; the programs' own tests run under the sanitizers";
 #endif
@@ -167,7 +186,7 @@ TEST(Pages, CommandsWorkAsTyped) {
     fs::create_directory_symlink(kSource / name, folder / name);
   }
   std::set<std::string> ran, programs;
-  for (const fs::path& page : pages()) {
+  for (const fs::path& page : pages_in_reading_order()) {
     for (const std::string& command : commands_in(page)) {
       if (!ran.insert(command).second) continue;
       const auto result = run_program("cd '" + (folder / "").string() + "' && " + command);
@@ -183,18 +202,115 @@ TEST(Pages, CommandsWorkAsTyped) {
   expect_formats_to_name_the_columns_of(folder / "out");
 }
 
-TEST(Pages, HaveASectionForEachProgram) {
-  const auto headings = headings_of(kSource / "apps/README.md");
+/// Names of the programs, such as "vlp-locate".
+std::vector<std::string> program_names() {
+  std::vector<std::string> names;
   for (const auto& program : fs::directory_iterator(VLP_PROGRAMS_DIR)) {
-    const std::string name = program.path().filename().string();
-    EXPECT_THAT(headings, testing::Contains(name));
-    EXPECT_THAT(prose_of(kSource / "README.md"), testing::HasSubstr("apps/README.md#" + name));
+    names.push_back(program.path().filename().string());
+  }
+  return names;
+}
+
+TEST(Pages, ExistForEachProgram) {
+  const auto names = program_names();
+  ASSERT_THAT(names, testing::Contains("vlp-locate"));
+  for (const std::string& name : names) {
+    const fs::path page = kSource / "apps" / (name + ".md");
+    ASSERT_TRUE(fs::exists(page)) << page;
+    EXPECT_THAT(headings_of(page), testing::Contains(name));
+    EXPECT_THAT(prose_of(kSource / "apps/README.md"), testing::HasSubstr("(" + name + ".md)"));
+    EXPECT_THAT(prose_of(kSource / "README.md"), testing::HasSubstr("(apps/" + name + ".md)"));
   }
 }
 
-TEST(Pages, ReadmeIsOfOnePage) { EXPECT_LE(fs::file_size(kSource / "README.md"), 6000U); }
+/// Returns the --help of a program and of its subcommands.
+std::string help_with_subcommands(const std::string& program) {
+  std::string help = run_program(program + " --help").output;
+  const auto list = help.find("\nSubcommands:\n");
+  if (list == std::string::npos) return help;
+  for (const std::string& command : matches(help.substr(list), "\n  ([a-z-]+) ")) {
+    help += run_program(program + " " + command + " --help").output;
+  }
+  return help;
+}
 
-TEST(Pages, LinksLeadSomewhere) {
+/// Returns the options that --help lists, such as "--output", at the beginning of their lines.
+std::set<std::string> listed_options(const std::string& help) {
+  const auto options = matches(help, "\n  (?:-[a-z],)?(--[a-z][a-z0-9-]*)");
+  return {options.begin(), options.end()};
+}
+
+/// Returns the options named in a piece of code, such as `--gate mean_mm=0.2` or
+/// `vlp-locate FOLDER --captures`, without those of programs that follow.
+std::vector<std::string> named_options(const std::string& code) {
+  return matches(code, "(?:^|[ |])(--[a-z][a-z0-9-]*)");
+}
+
+TEST(Pages, NameOptionsOfTheirPrograms) {
+  std::set<std::string> names;
+  std::map<std::string, std::set<std::string>> options;
+  for (const std::string& name : program_names()) {
+    names.insert(name);
+    options[name] = listed_options(help_with_subcommands(name));
+    ASSERT_THAT(options[name], testing::Contains("--help")) << name;
+  }
+  ASSERT_THAT(options["vlp-station"], testing::Contains("--camera-id")) << "of a subcommand";
+  std::size_t checked = 0;
+  for (const fs::path& page : pages()) {
+    if (page.parent_path() != kSource / "apps" || page.stem() == "MESSAGES") continue;
+    const std::string prose = std::regex_replace(prose_of(page), std::regex("\n"), " ");
+    for (const std::string& code : matches(prose, "`([^`]+)`")) {
+      // On a program's page an option alone is its own; elsewhere only those with a program count.
+      const std::string first = code.substr(0, code.find(' '));
+      const std::string program = code.starts_with("--") ? page.stem().string() : first;
+      if (!names.contains(program)) continue;
+      for (const std::string& option : named_options(code)) {
+        ++checked;
+        EXPECT_THAT(options[program], testing::Contains(option))
+            << name_of_page(page) << ": " << program << ": `" << code << "`";
+      }
+    }
+  }
+  EXPECT_GT(checked, 60U);
+}
+
+TEST(Pages, NamedOptionsAreFoundInCode) {
+  EXPECT_THAT(named_options("vlp-locate FOLDER --camera-on-robot"),
+              testing::ElementsAre("--camera-on-robot"));
+  EXPECT_THAT(named_options("--gate missing=0 --json=out/no--option.json"),
+              testing::ElementsAre("--gate", "--json"));
+  EXPECT_THAT(listed_options("\n  -o,--output TEXT\n  --row-time-s FLOAT\n      as --other\n"),
+              testing::ElementsAre("--output", "--row-time-s"));
+}
+
+/// Each metric has one row in "Choosing gates", marked if its gate is a minimum or not of the
+/// camera.
+TEST(Pages, DefineEachMetricOnce) {
+  std::vector<std::string> defined, kinds;
+  for (const std::string& line : lines_in(kSource / "apps/choosing-gates.md")) {
+    if (!line.starts_with("| `")) continue;
+    const std::string cell = line.substr(0, line.find(" | "));
+    const bool at_least = cell.find("\u2265") != std::string::npos;
+    const bool of_camera = cell.find("\u2020") == std::string::npos;
+    for (const std::string& name : matches(cell, "`([a-z0-9_]+)`")) {
+      defined.push_back(name);
+      const auto kind = metric_kind(name);
+      ASSERT_TRUE(kind) << name;
+      EXPECT_EQ(kind->asked == Direction::at_least, at_least) << name;
+      EXPECT_EQ(kind->of_camera, of_camera) << name;
+    }
+  }
+  for (const MetricKind& kind : metric_kinds({MetricSource::station, MetricSource::lens,
+                                              MetricSource::rotation, MetricSource::dispersion,
+                                              MetricSource::evaluation, MetricSource::reference})) {
+    kinds.emplace_back(kind.name);
+  }
+  EXPECT_THAT(defined, testing::UnorderedElementsAreArray(kinds));
+}
+
+TEST(Pages, ReadmeFitsOnOnePage) { EXPECT_LE(fs::file_size(kSource / "README.md"), 6000U); }
+
+TEST(Pages, LinksHaveTargets) {
   std::size_t links = 0;
   for (const fs::path& page : pages()) {
     for (const std::string& link : matches(prose_of(page), "\\]\\(([^)\\s]+)\\)")) {
@@ -210,7 +326,7 @@ TEST(Pages, LinksLeadSomewhere) {
   EXPECT_GT(links, 100U);
 }
 
-TEST(Pages, PathsAreThere) {
+TEST(Pages, PathsExist) {
   // A file of source, with a folder, or anything in a folder of the tree; not with * or such.
   const char* path =
       "`([A-Za-z0-9_.-]+/[A-Za-z0-9_./-]*\\.(?:h|cpp|md|py|sh)"
@@ -226,8 +342,8 @@ TEST(Pages, PathsAreThere) {
   EXPECT_GT(paths, 50U);
 }
 
-/// What users of calibration and positioning tools ask, and where the pages answer it: the words
-/// that do, in a section.
+/// Question of users of calibration and positioning tools, with the section of the pages that
+/// answers it and the words of the answer.
 struct Question {
   const char *asked, *page, *section, *words;
 };
@@ -235,7 +351,7 @@ constexpr Question kQuestions[] = {
     {"What is VLP?", "README.md", "VLP: positions from light", "visible light positioning"},
     {"May I use it in a product?", "README.md", "Read on", "Apache-2.0"},
     {"How do I install and remove it?", "apps/README.md", "Install", "apt purge"},
-    {"Does it run on Ubuntu, or in Docker?", "apps/README.md", "Install", "Ubuntu among them"},
+    {"Does it run on Ubuntu, or in Docker?", "apps/README.md", "Install", "Ubuntu and other"},
     {"Which camera do I need?", "apps/ROOM.md", "Camera and exposure", "rolling shutter"},
     {"Which exposure?", "apps/ROOM.md", "Camera and exposure", "0.05 ms"},
     {"Which frequencies have the lamps?", "apps/ROOM.md", "Lamps", "> 1425 Hz"},
@@ -244,16 +360,16 @@ constexpr Question kQuestions[] = {
     {"How many images of it?", "apps/ROOM.md", "Board", "36 images"},
     {"I have no turntable.", "apps/ROOM.md", "Turn on the spot", "By hand"},
     {"What goes into a session's folder?", "apps/ROOM.md", "The folder", "gates.yaml"},
-    {"I have a Kalibr board.", "apps/README.md", "vlp-intrinsics", "Kalibr AprilGrid"},
-    {"I have a fisheye lens.", "apps/README.md", "vlp-intrinsics", "OPENCV_FISHEYE"},
-    {"I have a calibration from ROS.", "apps/README.md", "vlp-convert", "--to ros"},
-    {"I do not know the row time.", "apps/README.md", "vlp-train", "--row-time"},
+    {"I have a Kalibr board.", "apps/vlp-intrinsics.md", "vlp-intrinsics", "Kalibr AprilGrid"},
+    {"I have a fisheye lens.", "apps/vlp-intrinsics.md", "Lens models", "OPENCV_FISHEYE"},
+    {"I have a calibration from ROS.", "apps/vlp-convert.md", "vlp-convert", "--to ros"},
+    {"I do not know the row time.", "apps/vlp-train.md", "Row time", "--row-time"},
     {"Why is no lamp found?", "apps/MESSAGES.md", "Lamps in images", "wrong row time"},
     {"Why is there no fix?", "apps/MESSAGES.md", "Fixes", "Hang more lamps"},
-    {"My lamp map is not exact.", "apps/README.md", "vlp-adjust", "--refine-map"},
-    {"Does it work while driving, or in a hand?", "apps/README.md", "vlp-locate",
-     "of a camera in a hand"},
-    {"What do exit codes mean?", "apps/README.md", "The programs", "Exit code 0: done"},
+    {"My lamp map is not exact.", "apps/vlp-adjust.md", "vlp-adjust", "--refine-map"},
+    {"Does it work while driving, or in a hand?", "apps/vlp-locate.md", "Inclination and motion",
+     "hand-held camera"},
+    {"What do exit codes mean?", "apps/README.md", "Conventions", "Exit code 0: done"},
     {"What is in fixes.csv?", "datasets/README.md", "Formats", "sd_yaw_rad"},
     {"Where is pixel (0, 0), and how is yaw counted?", "datasets/README.md", "Formats",
      "counter-clockwise"},
@@ -265,9 +381,13 @@ constexpr Question kQuestions[] = {
     {"How do I use it from Rust, C or ROS 2?", "lib/README.md", "On a robot", "C++17, Rust"},
     {"May several threads use it?", "lib/README.md", "On a robot", "any number of threads"},
     {"How do I call it from Python?", "apps/README.md", "Python", "import vlp"},
-    {"What do FAIL and INVALID mean?", "apps/README.md", "vlp-station", "INVALID (3) is"},
-    {"How do I guard an accuracy in a CI?", "apps/README.md", "In your CI",
+    {"What do FAIL and INVALID mean?", "apps/vlp-station.md", "Verdicts", "| INVALID | 3 |"},
+    {"How do I guard an accuracy in a CI?", "apps/ci.md", "Accuracy checks in CI",
      "scripts/ci/action.yml"},
+    {"How do I set up a station for a new product?", "apps/new-product.md",
+     "A new product at the station", "Golden unit"},
+    {"Which limits do I set?", "apps/choosing-gates.md", "Gates of a station", "1.67 and 3"},
+    {"What is a line delay?", "apps/GLOSSARY.md", "Glossary", "row time"},
     {"How do I run an archive on a cluster?", "scripts/reprocess/README.md", "How it runs",
      "sbatch"},
 };
@@ -287,7 +407,7 @@ std::string section_of(const fs::path& page, const std::string& heading) {
   return std::regex_replace(text, std::regex(" +"), " ");
 }
 
-TEST(Pages, AnswerWhatIsAskedWithinTwoClicks) {
+TEST(Pages, AnswerQuestionsWithinTwoClicks) {
   std::set<std::string> reached{"README.md"};
   for (int click = 0; click < 2; ++click) {
     for (const std::string& page : std::set(reached)) {
@@ -304,7 +424,7 @@ TEST(Pages, AnswerWhatIsAskedWithinTwoClicks) {
   }
 }
 
-TEST(Pages, EachDocumentOfJsonHasASchema) {
+TEST(Pages, EachJsonDocumentHasSchema) {
   std::set<std::string> writers, have_schemas;
   for (const fs::path& file : files_of({".cpp", ".h", ".py", ".sh"})) {
     const std::string name = name_of_page(file);
@@ -330,7 +450,7 @@ TEST(Pages, EachDocumentOfJsonHasASchema) {
   EXPECT_EQ(writers, have_schemas);
 }
 
-TEST(Pages, TestsAndBenchmarksThatTheyNameAreThere) {
+TEST(Pages, NamedTestsAndBenchmarksExist) {
   std::string tests;
   for (const fs::path& file : files_of({".cpp", ".txt", ".sh"})) {
     if (name_of_page(file).starts_with("tests/")) tests += TemporaryFolder::content_of(file);
@@ -351,7 +471,7 @@ TEST(Pages, TestsAndBenchmarksThatTheyNameAreThere) {
   EXPECT_GT(programs, 5U);
 }
 
-TEST(Pages, TheoryHasWhatTheSourcesCite) {
+TEST(Pages, TheoryHasCitedSections) {
   const auto headings = headings_of(kSource / "lib/THEORY.md");
   std::size_t citations = 0;
   for (const fs::path& file : files_of({".h", ".cpp"})) {
@@ -412,9 +532,9 @@ std::size_t words_in(const std::string& text) {
   return matches(std::regex_replace(text, std::regex("[.]{3}"), " "), "([^ ]+)").size();
 }
 
-/// What the sources say of errors and doubts: in a statement that throws, fails or warns, and, in
-/// the library below programs, whatever asks or advises. What stands between the literals of a
-/// message is "...".
+/// Returns the messages of a source about errors and doubts: literals in statements that throw,
+/// fail or warn, and, in the library below programs, questions and advice. Values between the
+/// literals of a message are "...".
 std::vector<std::string> messages_in(const fs::path& file) {
   static const std::regex tells(
       "\\bthrow\\b|\\bfail\\(|\\berror\\(|\\bwarn\\(|\\bwarnings\\b|Error\\(");
@@ -452,8 +572,8 @@ std::vector<fs::path> scripts_of_programs() {
   return files;
 }
 
-/// What a script says of errors: the words of a line that refuses or speaks in its name. Values are
-/// "...".
+/// Returns the error messages of a script: the literals of lines that print an error in its name.
+/// Values are "...".
 std::vector<std::string> messages_in_script(const fs::path& file) {
   static const std::regex tells("\\b(refuse|usage|fail)\\b|ValueError\\(|reprocess\\.sh: |>&2");
   static const std::regex python_value("\\{\\{|\\}\\}|\\{[^{}]*\\}");
@@ -470,7 +590,7 @@ std::vector<std::string> messages_in_script(const fs::path& file) {
   return messages;
 }
 
-/// Whether the parts of a message, "..." between them, stand there in their order.
+/// Returns true if the parts of a message, separated by "...", occur in their order.
 bool is_said_in(const std::string& text, const std::string& message) {
   std::size_t at = 0;
   for (std::size_t begin = 0; begin <= message.size();) {
@@ -503,7 +623,7 @@ std::vector<fs::path> sources_of_programs() {
   return files;
 }
 
-TEST(Messages, ThatAreExplainedCanOccur) {
+TEST(Messages, ExplainedOnesCanOccur) {
   std::vector<std::string> sources;  // the literals of each
   for (const fs::path& file : sources_of_programs()) {
     sources.emplace_back();
