@@ -40,15 +40,18 @@ AdjustSet read_set(const Options& options, const std::string& set, bool turn, co
                    const Calibration& calibration) {
   const fs::path path(set);
   const bool folder = fs::is_directory(path);
-  AdjustSet read{last_name(path), {}, {}, turn || last_name(path) == "rotation"};
+  AdjustSet read{
+      last_path_component(path), {}, {}, turn || last_path_component(path) == "rotation"};
   if (folder) {
     CaptureOptions images = options.images;
     images.images = set;
-    read.frames = kept_frames(observe_captures(images, ImageUse::fixes, lamps, calibration).images);
-    read.captures = options.place_sd_m ? captures_in(path) : captures_table(path);
+    read.frames =
+        collect_kept_frames(observe_captures(images, ImageUse::fixes, lamps, calibration).images);
+    read.captures =
+        options.place_sd_m ? read_captures_with_truth(path) : read_captures_of_folder(path);
   } else {
     read.frames = read_detections(path);
-    read.captures = captures_table(path.parent_path());
+    read.captures = read_captures_of_folder(path.parent_path());
   }
   return read;
 }
@@ -89,11 +92,11 @@ void run(const CLI::App& app, const Options& options) {
   }
   std::vector<std::string> paths = options.sets;
   paths.insert(paths.end(), options.turns.begin(), options.turns.end());
-  name_apart(input.sets, paths);
+  make_set_names_unique(input.sets, paths);
   for (const AdjustSet& set : input.sets) check_lamps(set.frames, input.lamps, input.lamps_file);
-  const AdjustStepResult result = solve_adjustment(input, history_entry(app, inputs));
-  tell(result);
-  require(result);
+  const AdjustStepResult result = solve_adjustment(input, make_program_history_entry(app, inputs));
+  print_remarks(result);
+  throw_if_failed(result);
   if (input.refine_map) {
     write_refined_map(options.refined_map, result.found.refined, images.frontend.room);
   }

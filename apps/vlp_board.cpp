@@ -41,7 +41,7 @@ Board board_of_squares(const Options& options) {
   return board;
 }
 
-Board board_of(const Options& options) {
+Board make_board(const Options& options) {
   if (options.chessboard || options.charuco) return board_of_squares(options);
   constexpr int cols = 6, rows = 5;
   constexpr double lattice = 1, kalibr = 0.3;
@@ -58,18 +58,19 @@ Board board_of(const Options& options) {
 }
 
 void run(const Options& options) {
-  constexpr int least = 4;
+  constexpr int min_squares = 4;
   const bool squares = options.chessboard || options.charuco;
-  if (squares && std::min(options.cols.value_or(least), options.rows.value_or(least)) < least) {
+  if (squares && std::min(options.cols.value_or(min_squares), options.rows.value_or(min_squares)) <
+                     min_squares) {
     throw std::invalid_argument("a board of squares has 4 x 4 of them or more");
   }
   if (!squares && options.square_mm) {
     throw std::invalid_argument("--square-mm is for --chessboard and --charuco");
   }
-  const Paper& paper = paper_named(options.paper);
-  Board board = board_of(options);
+  const PageSize& paper = find_page_size(options.paper);
+  Board board = make_board(options);
   if (board.has_squares() ? !options.square_mm : !options.tag_mm) {
-    const auto largest_m = largest_size_m(board, paper);
+    const auto largest_m = find_largest_size_m(board, paper);
     if (!largest_m) {
       throw std::invalid_argument(std::string("so many ") +
                                   (board.has_squares() ? "squares" : "tags") + " do not fit on " +
@@ -81,7 +82,7 @@ void run(const Options& options) {
     constexpr double um_per_m = 1e6;
     board.tag_size_m = std::round(options.marker_share * board.square_size_m * um_per_m) / um_per_m;
   }
-  const std::string pdf = board_pdf(board, paper);
+  const std::string pdf = render_board_pdf(board, paper);
   const std::string yaml =
       std::filesystem::path(options.output).replace_extension(".yaml").string();
   write_file(options.output, pdf);

@@ -27,7 +27,7 @@ struct Options {
 };
 
 void run(Options options) {
-  options.how.choose_lens_model = options.lens == kChosenLens;
+  options.how.choose_lens_model = options.lens == kAutomaticLens;
   if (const auto model = lens_model_from_name(options.lens)) options.how.lens_model = *model;
   options.how.program = {kName, VLP_VERSION};
   SessionLog log;
@@ -66,7 +66,7 @@ int calibrate(int argc, char** argv) {
       kName);
   Options options;
   auto& how = options.how;
-  how.frontend = default_frontend();
+  how.frontend = make_default_frontend();
   app.add_option("session", options.session, "Folder of the captures")->required();
   app.add_option("-o,--output", options.results,
                  "Folder for calibration.yaml, check-fixes.csv, evaluation.json, report.html, "

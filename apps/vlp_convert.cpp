@@ -23,14 +23,15 @@ struct Options {
   std::string input, output, to = "calibration", lens, camera_id;
 };
 
-std::string text_of(const Options& options, const Camera& camera, const ImageRegion& region) {
-  if (options.to == "mrcal") return mrcal_cameramodel(camera, region);
-  if (options.to == "opencv") return opencv_camera(camera);
-  return options.to == "ros" ? ros_camera_info(camera) : kalibr_camchain(camera);
+std::string format_camera_file(const Options& options, const Camera& camera,
+                               const ImageRegion& region) {
+  if (options.to == "mrcal") return format_mrcal_cameramodel(camera, region);
+  if (options.to == "opencv") return format_opencv_camera(camera);
+  return options.to == "ros" ? format_ros_camera_info(camera) : format_kalibr_camchain(camera);
 }
 
 /// Returns a report with the calibrated region of the lens only; std::nullopt without a region.
-std::optional<IntrinsicsReport> report_of(const ImageRegion& region) {
+std::optional<IntrinsicsReport> make_region_report(const ImageRegion& region) {
   if (region.empty()) return std::nullopt;
   IntrinsicsReport report{};
   report.region_px = region;
@@ -41,7 +42,7 @@ void print_region(const Options& options, const Camera& camera, const ImageRegio
   if (region.empty()) return;
   const bool kept = options.to == "calibration" || options.to == "mrcal";
   fmt::print("known         in {:.1f} % of the image, which {}\n",
-             100 * share_of_image(region, camera.imager_px),
+             100 * compute_image_fraction(region, camera.imager_px),
              kept ? "is kept" : "the format cannot say");
 }
 
@@ -49,29 +50,30 @@ void run(const CLI::App& app, const Options& options) {
   check_output(options.output, {options.input});
   const auto [read, region] = read_any_camera(options.input);
   FittedCamera fitted{read, 0, 1};
-  const std::string was(name_of(fitted.camera.lens_model));
+  const std::string was(to_string(fitted.camera.lens_model));
   if (!options.lens.empty()) {
-    fitted = with_lens_model(fitted.camera, *lens_model_from_name(options.lens));
+    fitted = fit_lens_model(fitted.camera, *lens_model_from_name(options.lens));
   }
   Camera& camera = fitted.camera;
   if (!options.camera_id.empty()) camera.id = options.camera_id;
   if (options.to == "calibration") {
     write_calibration(options.output,
-                      with_camera(camera, report_of(region), history_entry(app, {options.input})));
+                      with_camera(camera, make_region_report(region),
+                                  make_program_history_entry(app, {options.input})));
   } else {
-    write_file(options.output, text_of(options, camera, region));
+    write_file(options.output, format_camera_file(options, camera, region));
   }
   if (options.to == "calibration") {
     fmt::print("kept          the camera alone; vlp-rotation and vlp-dispersion add the rest\n");
   }
   fmt::print("camera        {}, {} x {} px\n", printable_line(camera.id), camera.imager_px[0],
              camera.imager_px[1]);
-  if (was == name_of(camera.lens_model)) {
+  if (was == to_string(camera.lens_model)) {
     fmt::print("lens          {}, unchanged\n", was);
   } else {
     fmt::print(
         "lens          {}, fitted to {}: {:.3g} px apart at worst, over {:.1f} % of the image\n",
-        name_of(camera.lens_model), was, fitted.worst_px, 100 * fitted.share);
+        to_string(camera.lens_model), was, fitted.worst_px, 100 * fitted.common_fraction);
   }
   print_region(options, camera, region);
 }

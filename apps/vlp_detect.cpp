@@ -31,7 +31,7 @@ std::map<std::string, double> frame_times(const std::vector<Observation>& images
 }
 
 void run(const CaptureOptions& options, const std::string& captures) {
-  const std::vector<std::string> inputs = inputs_of(options);
+  const std::vector<std::string> inputs = list_inputs(options);
   check_outputs(
       {{"--output", options.output}, {"--lights", options.lights}, {"--captures", captures}},
       inputs);
@@ -48,21 +48,21 @@ void run(const CaptureOptions& options, const std::string& captures) {
   const Observations found =
       observe_captures(options, ImageUse::fixes,
                        read_lamps_of_room(options.lamps, options.frontend.room), calibration);
-  const std::vector<Frame> frames = kept_frames(found.images);
+  const std::vector<Frame> frames = collect_kept_frames(found.images);
   write_detections(options.output, frames);
   if (!captures.empty()) write_times(captures, frame_times(found.images));
   const auto empty = std::count_if(frames.begin(), frames.end(),
                                    [](const Frame& frame) { return frame.detections.empty(); });
-  const auto count = [&](LightKind kind) { return count_of(found.images, kind); };
+  const auto count = [&](LightKind kind) { return count_lights(found.images, kind); };
   fmt::print("images      {}\n  skipped   {}\n  no lamp   {}\n", found.images.size(),
              found.images.size() - frames.size(), empty);
   fmt::print("lamps       {}\n", count(LightKind::lamp));
   fmt::print("left out    {} cut by the image's edge, {} unknown, {} steady, {} without form\n",
              count(LightKind::cut), count(LightKind::unknown), count(LightKind::steady),
              count(LightKind::formless));
-  for (const auto& [kind, reason, lights] : reasons_of(found.images)) {
-    fmt::print("  {:<8}  {}, {}: {}\n", lights, name_of(kind), name_of(reason),
-               explanation_of(reason));
+  for (const auto& [kind, reason, lights] : count_reasons(found.images)) {
+    fmt::print("  {:<8}  {}, {}: {}\n", lights, to_string(kind), to_string(reason),
+               describe(reason));
   }
 }
 

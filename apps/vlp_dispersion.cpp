@@ -39,24 +39,24 @@ struct Options {
 };
 
 /// Reads the table of the captures, without their places if --station gives them.
-CapturesTable captures_of(const Options& options) {
+CapturesTable read_captures_table(const Options& options) {
   CapturesTable captures;
   if (!options.captures.empty()) {
     captures = read_captures(options.captures);
   } else if (std::filesystem::is_directory(options.images.images)) {
-    captures = captures_in(options.images.images);
+    captures = read_captures_with_truth(options.images.images);
   }
   if (!options.station_m) return captures;
   for (auto& [image, capture] : captures) capture.x_m = capture.y_m = std::nullopt;
   return captures;
 }
 
-KnownPlaces places_of(const Options& options, const std::vector<Frame>& frames,
-                      const CapturesTable& captures) {
+KnownPlaces find_places(const Options& options, const std::vector<Frame>& frames,
+                        const CapturesTable& captures) {
   std::optional<Eigen::Vector2d> station_m;
   if (options.station_m) station_m = Eigen::Vector2d(options.station_m->data());
-  KnownPlaces places = at_known_places(frames, captures, station_m,
-                                       options.of == "axis" ? PlaceOf::axis : PlaceOf::camera);
+  KnownPlaces places = collect_known_places(frames, captures, station_m,
+                                            options.of == "axis" ? PlaceOf::axis : PlaceOf::camera);
   if (places.captures.empty() && captures.empty()) {
     throw std::invalid_argument("where is the station? Give --station or --captures");
   }
@@ -74,23 +74,23 @@ KnownPlaces places_of(const Options& options, const std::vector<Frame>& frames,
 }
 
 void run(const CLI::App& app, Options options) {
-  std::vector<std::string> inputs = inputs_of(options.images);
+  std::vector<std::string> inputs = list_inputs(options.images);
   if (!options.captures.empty()) inputs.push_back(options.captures);
   for (const char* table : {"captures.csv", "truth.csv"}) {
     const auto beside = std::filesystem::path(options.images.images) / table;
     if (options.captures.empty() && std::filesystem::exists(beside)) inputs.push_back(beside);
   }
   check_outputs({{"--output", options.images.output}, {"--plot", options.plot}}, inputs);
-  const CapturesTable captures = captures_of(options);
+  const CapturesTable captures = read_captures_table(options);
   options.images.captures = captures;
-  const LampCaptures input = read_captures_of(options.images, ImageUse::places);
+  const LampCaptures input = read_lamp_captures(options.images, ImageUse::places);
   check_lamps(input.frames, input.lamps, input.lamps_file);
-  const KnownPlaces places = places_of(options, input.frames, captures);
+  const KnownPlaces places = find_places(options, input.frames, captures);
   const DispersionResult found =
       solve_dispersion(input, places, kMethods.at(options.method), kCircles.at(options.circle),
-                       history_entry(app, inputs));
-  tell(found);
-  require(found);
+                       make_program_history_entry(app, inputs));
+  print_remarks(found);
+  throw_if_failed(found);
   if (!options.plot.empty()) draw(options.plot, found.drawing());
   write_calibration(options.images.output, found.calibration);
   print_dispersion(found.fit, input.calibration.camera.focal_px(), places.captures.size());

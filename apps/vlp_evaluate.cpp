@@ -51,7 +51,7 @@ struct Options {
   std::vector<std::string> gates;
   double noise_px = 0;
   std::optional<double> station_mm;
-  int threads = all_cores();
+  int threads = count_cores();
   ReportOption report;
 };
 
@@ -61,7 +61,7 @@ void check_line(const std::string& option, const std::array<double, 4>& line_m) 
     throw std::invalid_argument(option + ": the line begins where it ends");
   }
   for (const double value_m : line_m) {
-    if (std::abs(value_m) > kFarthest_m) {
+    if (std::abs(value_m) > kMaxCoordinate_m) {
       throw std::invalid_argument(option + ": should be within 1,000 km, in metres");
     }
   }
@@ -72,21 +72,21 @@ std::vector<MetricKind> known_metrics() {
 }
 
 /// Returns the gates of the file and of the command line, which takes precedence.
-std::vector<Gate> gates_of(const Options& options) {
+std::vector<Gate> parse_gates(const Options& options) {
   std::vector<Gate> gates;
   if (!options.gates_file.empty()) gates = read_gates(options.gates_file, known_metrics());
-  return with_changes(std::move(gates), gates_of(options.gates, known_metrics()));
+  return with_changes(std::move(gates), parse_gates(options.gates, known_metrics()));
 }
 
 /// Returns the input files, without those of the report; names may be empty.
-std::vector<std::string> inputs_of(const Options& options) {
+std::vector<std::string> list_input_files(const Options& options) {
   return {options.fixes, options.truth,       options.path,      options.compare,
           options.lamps, options.calibration, options.gates_file};
 }
 
 /// Checks that no output is given twice or is also an input.
 void check_files(const Options& options) {
-  std::vector<std::string> inputs = inputs_of(options);
+  std::vector<std::string> inputs = list_input_files(options);
   const ReportOption& report = options.report;
   inputs.insert(inputs.end(), report.pictures.begin(), report.pictures.end());
   for (const auto& track : report.tracks) {
@@ -125,11 +125,11 @@ void check_options(const Options& options, const std::vector<Gate>& gates) {
 
 double station_m(const Options& options) {
   if (options.station_mm) return 1e-3 * *options.station_mm;
-  return place_radius_m(options.calibration.empty() ? Calibration{}
-                                                    : read_calibration(options.calibration));
+  return compute_place_radius_m(
+      options.calibration.empty() ? Calibration{} : read_calibration(options.calibration));
 }
 
-EvaluationInput input_of(const Options& options) {
+EvaluationInput read_input(const Options& options) {
   EvaluationInput input;
   // The two large tables are read in parallel; if both are bad, the error is that of the fixes.
   auto truth = std::async(options.threads > 1 ? std::launch::async : std::launch::deferred, [&] {
@@ -151,11 +151,11 @@ EvaluationInput input_of(const Options& options) {
   return input;
 }
 
-std::string report_of(const CLI::App& app, const Options& options, const EvaluationInput& input,
-                      const EvaluateResult& found) {
+std::string render_report(const CLI::App& app, const Options& options, const EvaluationInput& input,
+                          const EvaluateResult& found) {
   EvaluationReport report{input, found, {}, {}, {}};
   report.page.gates = found.gates;
-  std::vector<std::string> inputs = inputs_of(options);
+  std::vector<std::string> inputs = list_input_files(options);
   if (!options.lamps.empty()) report.lamps = read_lamps_of_room(options.lamps, options.room);
   if (!options.calibration.empty()) report.page.calibration = read_calibration(options.calibration);
   for (const auto& [fixes, x0_m, y0_m, x1_m, y1_m] : options.report.tracks) {
@@ -164,11 +164,11 @@ std::string report_of(const CLI::App& app, const Options& options, const Evaluat
     inputs.push_back(fixes);
   }
   for (const std::string& picture : options.report.pictures) {
-    report.page.pictures.push_back(read_report_picture(picture));
+    report.page.pictures.push_back(read_report_plot(picture));
     inputs.push_back(picture);
   }
-  report.page.evaluation = history_entry(app, inputs);
-  return report_page(std::move(report));
+  report.page.evaluation = make_program_history_entry(app, inputs);
+  return render_report_page(std::move(report));
 }
 
 /// Returns the text of the file of proposed gates. Throws Undetermined if there are too few units.
@@ -178,7 +178,7 @@ std::string make_proposed_gates(const EvaluationInput& input, const Evaluation& 
     throw Undetermined(
         fmt::format("--propose-gates: too few stations or captures to propose gates from: at least "
                     "{} are needed",
-                    kFewestUnits));
+                    kMinClusters));
   }
   return format_gates(gates, evaluation);
 }
@@ -197,26 +197,26 @@ std::vector<JUnitTest> make_evaluation_tests(const EvaluateResult& found) {
 }
 
 void run_evaluation(const CLI::App& app, const Options& options, const std::vector<Gate>& gates) {
-  const EvaluationInput input = input_of(options);
+  const EvaluationInput input = read_input(options);
   const EvaluateResult found = evaluate_fixes(input, gates);
-  require(found);
+  throw_if_failed(found);
   for (const CheckedMetric& gate : found.gates) {
     if (gate.value) continue;
     throw std::invalid_argument("gate '" + gate.name + "': there is no such figure here: " +
                                 metric_kind(gate.name)->meaning);
   }
   std::string report, proposed;
-  if (!options.report.file.empty()) report = report_of(app, options, input, found);
+  if (!options.report.file.empty()) report = render_report(app, options, input, found);
   if (!options.proposed_gates.empty()) proposed = make_proposed_gates(input, found.evaluation);
-  if (!options.json.empty()) write_file(options.json, json_of(found.evaluation, found.gates));
+  if (!options.json.empty()) write_file(options.json, to_json(found.evaluation, found.gates));
   if (!options.junit.empty()) {
     write_file(options.junit, format_junit(kName, make_evaluation_tests(found)));
   }
   if (!report.empty()) write_file(options.report.file, report);
   if (!proposed.empty()) write_file(options.proposed_gates, proposed);
-  tell(found);
+  print_remarks(found);
   print_evaluation(found.evaluation, found.gates);
-  const std::string failed = words_of_missed(found.gates);
+  const std::string failed = describe_failed_gates(found.gates);
   if (!failed.empty()) throw GateNotMet(failed);
 }
 
@@ -231,7 +231,7 @@ void write_junit_error(const std::string& file, const char* type, const char* me
 void run(const CLI::App& app, const Options& options) {
   check_files(options);
   try {
-    const std::vector<Gate> gates = gates_of(options);
+    const std::vector<Gate> gates = parse_gates(options);
     check_options(options, gates);
     run_evaluation(app, options, gates);
   } catch (const GateNotMet&) {

@@ -39,7 +39,7 @@ struct Options {
   std::string board, output, corners, ros, kalibr, opencv, plot;
   std::optional<std::array<int, 2>> imager_px;
   std::string camera_id = "camera", lens = "LENSMODEL_OPENCV8";
-  FrontendOptions frontend = default_frontend();
+  FrontendOptions frontend = make_default_frontend();
   std::optional<double> pixel_pitch_m;
   int held_out = 0;
   WarpChoice warp = WarpChoice::automatic;
@@ -60,7 +60,7 @@ Camera known_camera(const Options& options) {
 /// Returns the file of corners that is given instead of images; empty if images are given.
 std::string corner_file(const CLI::App& app, const Options& options) {
   const auto found = std::find_if(options.images.begin(), options.images.end(),
-                                  [](const auto& name) { return holds_corners(name); });
+                                  [](const auto& name) { return is_corner_file(name); });
   if (found == options.images.end()) {
     if (options.imager_px) {
       throw std::invalid_argument("--imager-px is for files of corners: images tell their size");
@@ -77,10 +77,10 @@ std::string corner_file(const CLI::App& app, const Options& options) {
     throw std::invalid_argument(
         *found + " holds corners, but not the size of their images: --imager-px has to tell it");
   }
-  for (const char* of_images :
+  for (const char* digest_images :
        {"--cache", "--threads", "--max-mpx", "--max-blur-px", "--max-white-fraction", "--every"}) {
-    if (app.count(of_images) == 0) continue;
-    throw std::invalid_argument(std::string(of_images) + " is for images: " + *found +
+    if (app.count(digest_images) == 0) continue;
+    throw std::invalid_argument(std::string(digest_images) + " is for images: " + *found +
                                 " holds corners");
   }
   return *found;
@@ -97,17 +97,17 @@ Observations observe(const std::vector<std::filesystem::path>& images, const Boa
 }
 
 /// Replaces the extension: camera.yaml and ".cameramodel" give camera.cameramodel.
-std::string beside(const std::string& output, const char* ending) {
+std::string replace_extension(const std::string& output, const char* ending) {
   return std::filesystem::path(output).replace_extension(ending).string();
 }
 
 void write_exports(const Options& options, const Camera& camera) {
-  if (!options.ros.empty()) write_file(options.ros, ros_camera_info(camera));
-  if (!options.kalibr.empty()) write_file(options.kalibr, kalibr_camchain(camera));
-  if (!options.opencv.empty()) write_file(options.opencv, opencv_camera(camera));
+  if (!options.ros.empty()) write_file(options.ros, format_ros_camera_info(camera));
+  if (!options.kalibr.empty()) write_file(options.kalibr, format_kalibr_camchain(camera));
+  if (!options.opencv.empty()) write_file(options.opencv, format_opencv_camera(camera));
 }
 
-bool chooses_lens(const Options& options) { return options.lens == kChosenLens; }
+bool chooses_lens(const Options& options) { return options.lens == kAutomaticLens; }
 
 /// Throws std::invalid_argument if two images have the same name, which identifies an image in a
 /// table of corners.
@@ -125,26 +125,27 @@ void check_names(const std::vector<std::filesystem::path>& images) {
 void check_exports(const Options& options, Camera camera) {
   camera.imager_px = {1, 1};
   camera.intrinsics.assign(parameter_count(camera.lens_model), 1);
-  if (!options.ros.empty()) ros_camera_info(camera);
-  if (!options.kalibr.empty()) kalibr_camchain(camera);
-  if (!options.opencv.empty()) opencv_camera(camera);
+  if (!options.ros.empty()) format_ros_camera_info(camera);
+  if (!options.kalibr.empty()) format_kalibr_camchain(camera);
+  if (!options.opencv.empty()) format_opencv_camera(camera);
 }
 
 /// Returns the default gates with the changes of the command line.
-std::vector<Gate> gates_of(const Options& options) {
-  return with_changes(lens_gates(), gates_of(options.gates, metric_kinds({MetricSource::lens})));
+std::vector<Gate> parse_gates(const Options& options) {
+  return with_changes(default_lens_gates(),
+                      parse_gates(options.gates, metric_kinds({MetricSource::lens})));
 }
 
 /// Returns true if a gate of the lens fails, not only gates of the views.
-bool fits_badly(const std::vector<CheckedMetric>& gates) {
+bool has_failed_lens_gate(const std::vector<CheckedMetric>& gates) {
   return std::ranges::any_of(gates, [](const CheckedMetric& gate) {
-    return !gate.met() &&
+    return !gate.passed() &&
            (gate.name == "rms_px" || gate.name == "uncertainty_px" || gate.name == "halves_px");
   });
 }
 
 void run(const CLI::App& app, const Options& options) {
-  const std::vector<Gate> gates = gates_of(options);
+  const std::vector<Gate> gates = parse_gates(options);
   if (!chooses_lens(options)) check_exports(options, known_camera(options));
   const std::string corners = corner_file(app, options);
   check_every(options.frontend.every, options.images);
@@ -153,8 +154,8 @@ void run(const CLI::App& app, const Options& options) {
   std::vector<std::string> inputs{options.board};
   for (const auto& image : images) inputs.push_back(image.string());
   check_outputs({{"--output", options.output},
-                 {"--output's .cameramodel", beside(options.output, ".cameramodel")},
-                 {"--output's .corners.vnl", beside(options.output, ".corners.vnl")},
+                 {"--output's .cameramodel", replace_extension(options.output, ".cameramodel")},
+                 {"--output's .corners.vnl", replace_extension(options.output, ".corners.vnl")},
                  {"--ros", options.ros},
                  {"--kalibr", options.kalibr},
                  {"--opencv", options.opencv},
@@ -163,7 +164,7 @@ void run(const CLI::App& app, const Options& options) {
                 inputs);
   if (!options.corners.empty()) check_names(images);
   const Board board = read_board(options.board);
-  possible_warp(board, options.warp);  // throws before the images are read
+  select_warp(board, options.warp);  // throws before the images are read
   LensInput input{observe(images, board, corners, options),
                   board,
                   options.board,
@@ -172,38 +173,39 @@ void run(const CLI::App& app, const Options& options) {
                   options.warp,
                   chooses_lens(options)};
   // After the images: unusable files are not read for their digests.
-  const LensResult result = solve_lens(std::move(input), history_entry(app, inputs));
-  tell(result);
+  const LensResult result = solve_lens(std::move(input), make_program_history_entry(app, inputs));
+  print_remarks(result);
   const LensEstimate& lens = result.lens;
   if (!options.corners.empty() && !lens.views.empty()) {
     write_corner_table(options.corners, lens.views, board);
   }
-  require(result);
+  throw_if_failed(result);
   check_exports(options, result.calibration.camera);  // the selected lens model
   write_calibration(options.output, result.calibration);
   if (has_mrcal(result.calibration.camera.lens_model)) {
-    write_cameramodel(beside(options.output, ".cameramodel"), lens.solution);
+    write_cameramodel(replace_extension(options.output, ".cameramodel"), lens.solution);
   } else {
     // A file of an earlier run would belong to another lens.
-    std::filesystem::remove(beside(options.output, ".cameramodel"));
+    std::filesystem::remove(replace_extension(options.output, ".cameramodel"));
   }
-  write_corners(beside(options.output, ".corners.vnl"), lens.solution, lens.images);
+  write_corners(replace_extension(options.output, ".corners.vnl"), lens.solution, lens.images);
   write_exports(options, result.calibration.camera);
   if (!options.plot.empty()) draw(options.plot, result.drawing());
-  if (lens.choice) fmt::print("lens model    {}\n", words_of(*lens.choice));
+  if (lens.choice) fmt::print("lens model    {}\n", describe(*lens.choice));
   print_summary(lens.solution, lens.report, lens.coverage, lens.held_out);
   if (lens.print_px) {
     fmt::print("board print   {:.3f} px, in the covariance and not in the uncertainty above\n",
                *lens.print_px);
   }
   const auto checked = check_gates(gates, result.metrics);
-  const std::string failed = words_of_missed(checked);
+  const std::string failed = describe_failed_gates(checked);
   if (failed.empty()) return;
-  if (lens.better_model && fits_badly(checked)) {
-    throw GateNotMet(fmt::format("{}; take --lens {}", failed, name_of(*lens.better_model)));
+  if (lens.better_model && has_failed_lens_gate(checked)) {
+    throw GateNotMet(fmt::format("{}; take --lens {}", failed, to_string(*lens.better_model)));
   }
   if (std::isfinite(lens.report.uncertainty_worst_px)) {
-    throw GateNotMet(fmt::format("{}; add views, next {}", failed, next_view(lens.coverage)));
+    throw GateNotMet(
+        fmt::format("{}; add views, next {}", failed, recommend_next_view(lens.coverage)));
   }
   throw GateNotMet(
       fmt::format("{}; the lens that was found has no rays in part of the image: take "
@@ -273,7 +275,7 @@ void add_output_options(CLI::App& app, Options& options) {
   app.add_option("--plot", options.plot,
                  "Draw the corners, their residuals and the uncertainty over the image, .png or "
                  ".svg")
-      ->check(is_picture());
+      ->check(is_plot_file());
   app.add_option("--cache", options.frontend.corner_cache,
                  "Folder to keep the corners of each image in, for the next time");
   add_every_option(app, options.frontend.every);

@@ -38,7 +38,7 @@ struct Options {
   std::vector<double> floor_m;  // x_min x_max y_min y_max
 };
 
-std::string title_of(const Options& options) {
+std::string make_title(const Options& options) {
   std::string title = fmt::format("Camera at {} m, yaw {} deg", options.height_m, options.yaw_deg);
   if (const auto& speed = options.motion.max_speed_m_per_s) {
     title += fmt::format(", up to {} m/s", *speed);
@@ -57,11 +57,11 @@ UnitErrors stated_errors(const Options& options, const LampMap& lamps,
                          " no sd_m: state them with --center-px, --tilt-deg, --lamp-map-mm in "
                          "place of --stated, or calibrate again");
   }
-  constexpr std::array<const char*, kCommonParts.size()> names{"lens", "zenith", "offset",
-                                                               "lamp map"};
+  constexpr std::array<const char*, kCommonErrorSources.size()> names{"lens", "zenith", "offset",
+                                                                      "lamp map"};
   std::string unstated;
   for (std::size_t i = 0; i < names.size(); ++i) {
-    if (unit.common().stated(kCommonParts[i])) continue;
+    if (unit.common().stated(kCommonErrorSources[i])) continue;
     unstated.append(unstated.empty() ? "" : ", ").append(names[i]);
   }
   if (!unstated.empty()) {
@@ -74,7 +74,7 @@ UnitErrors stated_errors(const Options& options, const LampMap& lamps,
 }
 
 /// Returns the prior of velocity, yaw rate, roll and pitch.
-BodyPrior prior_of(const Options& options, const Camera& camera) {
+BodyPrior make_body_prior(const Options& options, const Camera& camera) {
   BodyPrior prior;
   if (const auto motion = options.motion.motion()) {
     check_row_time(camera);
@@ -85,29 +85,29 @@ BodyPrior prior_of(const Options& options, const Camera& camera) {
   return prior;
 }
 
-FloorLimits limits_of(const Options& options, const LampMap& lamps, const FloorGrid& grid) {
+FloorLimits find_floor_limits(const Options& options, const LampMap& lamps, const FloorGrid& grid) {
   const Calibration calibration = read_calibration(options.calibration);
-  const BodyPrior prior = prior_of(options, calibration.camera);
+  const BodyPrior prior = make_body_prior(options, calibration.camera);
   const double yaw_rad = rad_from_deg(options.yaw_deg);
   if (options.stated) {
-    return floor_limits(stated_errors(options, lamps, calibration), grid, options.height_m, yaw_rad,
-                        options.noise_px, prior);
+    return compute_floor_limits(stated_errors(options, lamps, calibration), grid, options.height_m,
+                                yaw_rad, options.noise_px, prior);
   }
-  return floor_limits(lamps, calibration.camera, grid, options.height_m, yaw_rad,
-                      {options.noise_px, options.center_px, rad_from_deg(options.tilt_deg),
-                       1e-3 * options.lamp_map_mm},
-                      prior);
+  return compute_floor_limits(lamps, calibration.camera, grid, options.height_m, yaw_rad,
+                              {options.noise_px, options.center_px, rad_from_deg(options.tilt_deg),
+                               1e-3 * options.lamp_map_mm},
+                              prior);
 }
 
 void run(const Options& options) {
   check_outputs({{"--map", options.map}, {"--picture", options.picture}},
                 {options.lamps, options.calibration});
   const LampMap lamps = read_lamps_of_room(options.lamps, options.room);
-  FloorGrid grid = floor_under(lamps, options.step_m);
+  FloorGrid grid = make_floor_grid(lamps, options.step_m);
   if (const auto& floor = options.floor_m; !floor.empty()) {
     grid = {floor[0], floor[1], floor[2], floor[3], options.step_m};
   }
-  const FloorLimits limits = limits_of(options, lamps, grid);
+  const FloorLimits limits = find_floor_limits(options, lamps, grid);
   const auto summary = summarize(limits);
   const bool is_free = options.motion.max_speed_m_per_s || options.lean_sd_deg > 0;
   if (!summary && is_free && std::any_of(limits.places.begin(), limits.places.end(), [](auto& one) {
@@ -125,7 +125,7 @@ void run(const Options& options) {
   }
   if (!options.map.empty()) write_limits(options.map, limits);
   if (!options.picture.empty()) {
-    draw_floor_plot(options.picture, plot_of(limits, title_of(options), options.step_m), lamps);
+    draw_floor_plot(options.picture, make_plot(limits, make_title(options), options.step_m), lamps);
   }
   print_limits(*summary, limits, is_free);
   if (options.stated) print_advice(*summary);
@@ -178,7 +178,7 @@ void add_options(CLI::App& app, Options& options) {
   app.add_option("--map", options.map, "Write the figures of every place to this CSV file");
   app.add_option("--picture", options.picture,
                  "Draw the horizontal standard deviation over the floor, .png or .svg")
-      ->check(is_picture());
+      ->check(is_plot_file());
 }
 
 }  // namespace

@@ -43,39 +43,42 @@ struct Options {
   MotionOptions motion;
   std::optional<double> yaw_rate_sd_deg_per_s;
   std::optional<double> lean_sd_deg, height_sd_m, yaw_sd_deg;
-  int frames_together = 1;
+  int window_size = 1;
 };
 
 /// Reads the table of the captures: the named file, or the one in the folder of images.
-CapturesTable captures_of(const Options& options) {
+CapturesTable read_captures_table(const Options& options) {
   if (!options.captures.empty()) return read_captures(options.captures);
   const bool folder = std::filesystem::is_directory(options.images.images);
-  CapturesTable captures = folder ? captures_table(options.images.images) : CapturesTable{};
+  CapturesTable captures =
+      folder ? read_captures_of_folder(options.images.images) : CapturesTable{};
   if (captures.empty() &&
       (options.one_lamp || options.inclination_sigma_deg || options.height_sd_m ||
-       options.yaw_rate_sd_deg_per_s || options.frames_together > 1)) {
+       options.yaw_rate_sd_deg_per_s || options.window_size > 1)) {
     throw std::invalid_argument(
         "--one-lamp, --inclination-sigma-deg, --height-sd-m, --yaw-rate-sd-deg-per-s and --frames "
         "need captures.csv: give --captures");
   }
-  const auto some = [&](const auto& has) {
+  const auto any_capture = [&](const auto& has) {
     return std::any_of(captures.begin(), captures.end(),
                        [&](const auto& capture) { return has(capture.second); });
   };
-  if (options.frames_together > 1) {
+  if (options.window_size > 1) {
     if (!options.motion.max_speed_m_per_s &&
-        !some([](const Capture& one) { return one.velocity_m_per_s.has_value(); })) {
+        !any_capture([](const Capture& capture) { return capture.velocity_m_per_s.has_value(); })) {
       throw std::invalid_argument(
           "--frames needs --max-speed-m-per-s, or velocities in captures.csv");
     }
-    if (!some([](const Capture& one) { return one.time_s.has_value(); })) {
+    if (!any_capture([](const Capture& capture) { return capture.time_s.has_value(); })) {
       throw std::invalid_argument("--frames needs time_s in captures.csv");
     }
   }
-  if (options.yaw_sd_deg && !some([](const Capture& one) { return one.yaw_rad.has_value(); })) {
+  if (options.yaw_sd_deg &&
+      !any_capture([](const Capture& capture) { return capture.yaw_rad.has_value(); })) {
     throw std::invalid_argument("--yaw-sd-deg needs yaw_rad in captures.csv");
   }
-  if (options.height_sd_m && !some([](const Capture& one) { return one.z_m.has_value(); })) {
+  if (options.height_sd_m &&
+      !any_capture([](const Capture& capture) { return capture.z_m.has_value(); })) {
     throw std::invalid_argument("--height-sd-m needs z_m in captures.csv");
   }
   return captures;
@@ -101,15 +104,15 @@ LocateInput make_input(const Options& options, const CapturesTable& captures) {
   input.yaw_sd_rad = rad_from_deg(options.yaw_sd_deg.value_or(0));
   input.motion = options.motion.motion();
   input.yaw_rate_sd_rad_per_s = rad_from_deg(options.yaw_rate_sd_deg_per_s.value_or(0));
-  input.lean_sd_rad = rad_from_deg(options.lean_sd_deg.value_or(0));
+  input.roll_pitch_sd_rad = rad_from_deg(options.lean_sd_deg.value_or(0));
   input.height_sd_m = options.height_sd_m;
-  input.frames_together = options.frames_together;
+  input.window_size = options.window_size;
   return input;
 }
 
 LocateResult locate_in_images(const Options& options, LocateInput input) {
   check_image_outputs(options.images);
-  const LampImages images = lamp_images(options.images, input.lamps, input.calibration);
+  const LampImages images = make_lamp_images(options.images, input.lamps, input.calibration);
   LocatedImages found;
   {
     Progress progress("images");
@@ -122,10 +125,10 @@ LocateResult locate_in_images(const Options& options, LocateInput input) {
 }
 
 void run(Options options) {
-  std::vector<std::string> inputs = inputs_of(options.images);
+  std::vector<std::string> inputs = list_inputs(options.images);
   inputs.push_back(options.captures);
   check_output(options.images.output, inputs);
-  const CapturesTable captures = captures_of(options);
+  const CapturesTable captures = read_captures_table(options);
   options.images.captures = captures;
   if (const auto& mount = options.camera_on_robot) {
     options.images.yaw_in_robot_rad = rad_from_deg((*mount)[3]);
@@ -135,14 +138,14 @@ void run(Options options) {
   if (std::filesystem::is_directory(options.images.images)) {
     found = locate_in_images(options, std::move(input));
   } else {
-    input.frames = read_detections_of(options.images);
+    input.frames = read_detection_captures(options.images);
     found = locate_frames(input);
   }
-  tell(found);
-  if (found.rows.empty()) require(found);
+  print_remarks(found);
+  if (found.rows.empty()) throw_if_failed(found);
   write_fixes(options.images.output, found.rows);
   print_fixes(found.summary);
-  require(found);
+  throw_if_failed(found);
 }
 
 /// Adds the options of motion, roll and pitch, mount, and of the values in captures.csv.
@@ -183,7 +186,7 @@ void add_sensor_options(CLI::App& app, Options& options) {
          "--one-lamp")
       ->check(finite_positive());
   app.add_option(
-         "--frames", options.frames_together,
+         "--frames", options.window_size,
          "Captures to fix together, with one velocity, where captures.csv has time_s within "
          "0.2 s (default: 1)")
       ->check(CLI::Range(1, 2));

@@ -17,21 +17,21 @@ namespace {
 struct Options {
   CaptureOptions images;
   std::string plot;
-  LevelOptions level;
+  TiltOptions level;
   std::string method = "axis";
 };
 
 void run(const CLI::App& app, const Options& options) {
   if (options.method == "lamps") {
     if (!options.plot.empty()) throw std::invalid_argument("--plot is of a turn on the spot");
-    return rotate_by_lamps(app, options.images, options.level);
+    return run_rotation_by_lamps(app, options.images, options.level);
   }
   for (const char* of_lamps : {"--refine-map", "--captures", "--max-speed-m-per-s",
                                "--max-yaw-rate-deg-per-s", "--yaw-rate-sd-deg-per-s"}) {
     if (app.count(of_lamps) == 0) continue;
     throw std::invalid_argument(std::string(of_lamps) + " needs --method lamps");
   }
-  rotate_on_spot(app, options.images, options.method, options.plot);
+  run_rotation_in_place(app, options.images, options.method, options.plot);
 }
 
 }  // namespace

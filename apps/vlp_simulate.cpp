@@ -25,7 +25,7 @@ struct Options {
   std::string scene, output;
   std::vector<std::string> folders;
   std::optional<int> seed, archive;
-  int threads = all_cores();
+  int threads = count_cores();
 };
 
 void run(const Options& options) {
@@ -39,7 +39,7 @@ void run(const Options& options) {
   cv::setNumThreads(1);  // captures are rendered in parallel
   const std::string what = options.archive ? "sessions" : "captures";
   const SimulationOptions how{options.folders, options.threads,
-                              origin_of(options.scene, seed, "vlp-simulate", VLP_VERSION)};
+                              make_provenance(options.scene, seed, "vlp-simulate", VLP_VERSION)};
   SimulationSummary summary;
   {
     Progress progress(what);

@@ -68,15 +68,15 @@ void add_hook(CLI::App& app, StationRunOptions& options) {
 
 /// Refuses a password: all users of the machine see command lines.
 std::string find_password(const std::string& where) {
-  return states_password(where) ? "a password on the command line is shown to all users of the "
-                                  "machine: give it in the "
-                                  "variable PGPASSWORD, or in the file that PGPASSFILE names"
-                                : "";
+  return contains_password(where) ? "a password on the command line is shown to all users of the "
+                                    "machine: give it in the "
+                                    "variable PGPASSWORD, or in the file that PGPASSFILE names"
+                                  : "";
 }
 
 /// Adds a command with the options for the location of records.
-CLI::App* add_where(CLI::App& app, const char* name, const char* what,
-                    StationRecordsOptions& options) {
+CLI::App* add_records_location(CLI::App& app, const char* name, const char* what,
+                               StationRecordsOptions& options) {
   CLI::App* command = app.add_subcommand(name, what);
   command->add_option("--station", options.station, "The station, station.yaml");
   command
@@ -87,9 +87,9 @@ CLI::App* add_where(CLI::App& app, const char* name, const char* what,
 }
 
 /// Adds a command with the options common to all commands on records.
-CLI::App* add_records(CLI::App& app, const char* name, const char* what,
-                      StationRecordsOptions& options) {
-  CLI::App* command = add_where(app, name, what, options);
+CLI::App* add_records_command(CLI::App& app, const char* name, const char* what,
+                              StationRecordsOptions& options) {
+  CLI::App* command = add_records_location(app, name, what, options);
   command->add_option("--camera-id", options.filter.camera, "Only of this camera");
   command->add_option(
       "--of-station", options.filter.station,
@@ -114,16 +114,17 @@ CLI::App* add_records(CLI::App& app, const char* name, const char* what,
 
 /// Adds the commands that print or write the record of a run.
 void add_commands_of_a_run(CLI::App& app, StationRecordsOptions& options) {
-  add_records(app, "list", "A line for each run", options);
-  auto* show = add_records(app, "show", "All of one run, the last unless it is named", options);
+  add_records_command(app, "list", "A line for each run", options);
+  auto* show =
+      add_records_command(app, "show", "All of one run, the last unless it is named", options);
   show->add_option("run", options.run, "Name of the run");
-  auto* restore =
-      add_records(app, "restore",
-                  "Write the calibration and the report of a run again, from its record", options);
+  auto* restore = add_records_command(
+      app, "restore", "Write the calibration and the report of a run again, from its record",
+      options);
   restore->add_option("run", options.run, "Name of the run")->required();
   restore->add_option("-o,--output", options.output,
                       "The folder of results (default: the station's); in it CAMERA/RUN/");
-  auto* certified = add_records(
+  auto* certified = add_records_command(
       app, "certificate",
       "Write the certificate of a run, certificate.html: values with expanded uncertainty, "
       "conformity, traceability",
@@ -139,15 +140,15 @@ void add_upkeep(CLI::App& app, StationRecordsOptions& options) {
       "clean", "What of the runs is kept no longer ('keep' in station.yaml); records stay");
   clean->add_option("--station", options.station, "The station, station.yaml")->required();
   clean->add_flag("--delete", options.remove, "Delete it (default: only tell)");
-  CLI::App* verify_records = add_where(
+  CLI::App* verify_records = add_records_location(
       app, "verify-records",
       "Whether the records are as they were kept: what was changed, removed or added by hand, by "
       "name; exit code 1 when there is any",
       options);
-  verify_records->add_option("--noted", options.noted,
+  verify_records->add_option("--noted", options.expected_digest,
                              "The last digest that an earlier verify-records told: the trail has "
                              "to have it still");
-  CLI::App* voided = add_where(
+  CLI::App* voided = add_records_location(
       app, "void",
       "A run counts no more: in no yield, trend or study; it stays in the records, with who voided "
       "it and why, its files are renamed, and it is done again",
@@ -159,7 +160,7 @@ void add_upkeep(CLI::App& app, StationRecordsOptions& options) {
 
 /// Adds the commands that move runs into and out of records.
 void add_transfer(CLI::App& app, StationRecordsOptions& options) {
-  auto* exported = add_records(app, "export", "Write runs as CSV or JSON", options);
+  auto* exported = add_records_command(app, "export", "Write runs as CSV or JSON", options);
   exported->add_option("-o,--output", options.output, "Where to: .csv or .json")->required();
   CLI::App* imported = app.add_subcommand(
       "import",
@@ -177,13 +178,13 @@ constexpr const char* kFigureHelp = "Which: rms_px, check_mean_mm, ...";
 
 /// Adds the statistics over runs: trend, capability, study.
 void add_statistics(CLI::App& app, StationRecordsOptions& options) {
-  auto* trend = add_records(
+  auto* trend = add_records_command(
       app, "trend",
       "A figure over the runs, with the limits of a control chart; exit code 1 for an alarm. Of "
       "units "
       "of the station that passed, unless --verdict, --kind or --of-station says otherwise",
       options);
-  trend->add_option("figure", options.figure, kFigureHelp)->required();
+  trend->add_option("figure", options.metric, kFigureHelp)->required();
   trend->add_option("-o,--output", options.output, "Draw it, .png or .svg");
   trend
       ->add_option(
@@ -191,19 +192,20 @@ void add_statistics(CLI::App& app, StationRecordsOptions& options) {
           "What is an alarm: western-electric (four rules), nelson (eight), one of them as "
           "nelson-3, ewma (default: western-electric)")
       ->option_text("RULE ...");
-  auto* capable = add_records(app, "capability",
-                              "How figures scatter compared with their gates: Cpk, Ppk, with "
-                              "95 % intervals. Of units of the "
-                              "station that were judged",
-                              options);
-  capable->add_option("figure", options.figure, "Only this: rms_px, check_mean_mm, ...");
-  auto* study = add_records(app, "study",
-                            "What measuring adds to a figure: repeatability and "
-                            "reproducibility (%GRR, ndc) of units that "
-                            "were run as often on each station; with --reference bias and "
-                            "linearity",
-                            options);
-  study->add_option("figure", options.figure, kFigureHelp)->required();
+  auto* capable =
+      add_records_command(app, "capability",
+                          "How figures scatter compared with their gates: Cpk, Ppk, with "
+                          "95 % intervals. Of units of the "
+                          "station that were judged",
+                          options);
+  capable->add_option("figure", options.metric, "Only this: rms_px, check_mean_mm, ...");
+  auto* study = add_records_command(app, "study",
+                                    "What measuring adds to a figure: repeatability and "
+                                    "reproducibility (%GRR, ndc) of units that "
+                                    "were run as often on each station; with --reference bias and "
+                                    "linearity",
+                                    options);
+  study->add_option("figure", options.metric, kFigureHelp)->required();
   study->add_option("--units", options.units, "Its cameras (default: those with two runs or more)")
       ->option_text("ID ...");
   study
@@ -228,18 +230,18 @@ void run_command(const CLI::App& app, const StationRunOptions& run,
   }
   if (app.got_subcommand("verify")) run_verify(run);
   if (app.got_subcommand("hook")) run_hooks(run);
-  if (app.got_subcommand("list")) list_runs(records);
-  if (app.got_subcommand("show")) show_run(records);
+  if (app.got_subcommand("list")) print_runs(records);
+  if (app.got_subcommand("show")) print_run(records);
   if (app.got_subcommand("restore")) restore_run(records);
   if (app.got_subcommand("certificate")) write_certificate(records);
-  if (app.got_subcommand("clean")) clean_up(records);
+  if (app.got_subcommand("clean")) clean_expired_folders(records);
   if (app.got_subcommand("void")) void_run(records);
   if (app.got_subcommand("verify-records")) verify_records(records);
   if (app.got_subcommand("import")) import_archive(records);
   if (app.got_subcommand("export")) export_runs(records);
-  if (app.got_subcommand("trend")) show_trend(records);
-  if (app.got_subcommand("capability")) show_capability(records);
-  if (app.got_subcommand("study")) show_study(records);
+  if (app.got_subcommand("trend")) print_trend(records);
+  if (app.got_subcommand("capability")) print_capability(records);
+  if (app.got_subcommand("study")) print_study(records);
 }
 
 }  // namespace
@@ -274,7 +276,7 @@ int main(int argc, char** argv) {
   app.fallthrough();
   vlp::StationRunOptions run;
   vlp::StationRecordsOptions records;
-  run.threads = vlp::all_cores();
+  run.threads = vlp::count_cores();
   vlp::add_run(app, run);
   vlp::add_verify(app, run);
   vlp::add_hook(app, run);

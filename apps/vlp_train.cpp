@@ -29,7 +29,7 @@ struct Options {
   std::vector<std::string> folders;
   std::string lamps, calibration, labels, output;
   bool row_time = false;
-  FrontendOptions frontend = default_frontend();
+  FrontendOptions frontend = make_default_frontend();
 };
 
 /// Inputs read from the files of the options.
@@ -38,12 +38,12 @@ struct Inputs {
   std::optional<Calibration> calibration;
   /// Labels of each folder; empty without a table.
   std::vector<std::vector<Frame>> labels;
-  SeenLights seen;
+  DetectedLights seen;
 };
 
 /// Reads the labels in the folder of the images: the named table. If none is named and labels are
 /// needed, reads the first existing one of detections.csv and true_detections.csv.
-std::vector<Frame> labels_in(const fs::path& folder, const std::string& table, bool needed) {
+std::vector<Frame> read_labels(const fs::path& folder, const std::string& table, bool needed) {
   if (!table.empty()) return read_detections(folder / table);
   if (!needed) return {};
   for (const char* name : {"detections.csv", "true_detections.csv"}) {
@@ -61,27 +61,27 @@ Inputs read_inputs(const Options& options) {
   for (const std::string& folder : options.folders) {
     for (const fs::path& image : list_images(folder))
       check_output(options.output, {image.string()});
-    inputs.labels.push_back(labels_in(folder, options.labels, !options.row_time));
+    inputs.labels.push_back(read_labels(folder, options.labels, !options.row_time));
   }
   {
     Progress progress("images");
     inputs.seen =
-        see_lights({options.folders.begin(), options.folders.end()}, inputs.lamps,
-                   inputs.calibration, !options.row_time, options.frontend,
-                   [&](std::size_t done, std::size_t total) { progress.update(done, total); });
+        detect_lights({options.folders.begin(), options.folders.end()}, inputs.lamps,
+                      inputs.calibration, !options.row_time, options.frontend,
+                      [&](std::size_t done, std::size_t total) { progress.update(done, total); });
   }
   StepResult remarks;
   add_remarks(inputs.seen, remarks);
-  tell(remarks);
+  print_remarks(remarks);
   return inputs;
 }
 
 void train(const Options& options) {
   const Inputs inputs = read_inputs(options);
   const TrainStepResult result =
-      train_lamps(inputs.seen, inputs.labels, inputs.lamps, options.folders.front());
-  tell(result);
-  require(result);
+      train_lamp_classifier(inputs.seen, inputs.labels, inputs.lamps, options.folders.front());
+  print_remarks(result);
+  throw_if_failed(result);
   write_lamp_classifier(options.output, result.classifier);
   print_training(result);
 }
@@ -95,9 +95,9 @@ void train_row_time(const CLI::App& app, const Options& options) {
   files.push_back(options.lamps);
   const RowTimeStepResult result =
       find_row_time(inputs.seen, inputs.labels, inputs.lamps, options.lamps, inputs.calibration,
-                    history_entry(app, files));
-  tell(result);
-  require(result);
+                    make_program_history_entry(app, files));
+  print_remarks(result);
+  throw_if_failed(result);
   if (!options.output.empty()) write_calibration(options.output, result.calibration);
   print_row_time(result.found, inputs.seen.camera.readout);
 }

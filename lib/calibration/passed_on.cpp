@@ -6,24 +6,25 @@
 
 namespace vlp {
 
-std::optional<MatrixX> jacobian_of(const SolvedWith& solved, const Eigen::VectorXd& exact,
-                                   const MatrixX& covariance) {
+std::optional<MatrixX> estimate_jacobian(const PerturbedSolve& solve,
+                                         const Eigen::VectorXd& nominal,
+                                         const MatrixX& covariance) {
   const Eigen::LLT<Eigen::MatrixXd> factor(covariance);
   if (factor.info() != Eigen::Success) return {};
   const Eigen::MatrixXd lower = factor.matrixL();
-  Eigen::MatrixXd moved(lower.cols(), exact.size());
+  Eigen::MatrixXd changes(lower.cols(), nominal.size());
   for (Eigen::Index i = 0; i < lower.cols(); ++i) {
     double fraction = 1;
-    auto by_one = solved(lower.col(i));
-    if (!by_one) {
+    auto solution = solve(lower.col(i));
+    if (!solution) {
       fraction = 1.0 / 16;
-      by_one = solved(fraction * lower.col(i));
+      solution = solve(fraction * lower.col(i));
     }
-    if (!by_one) return {};
-    moved.row(i) = (*by_one - exact).transpose() / fraction;
+    if (!solution) return {};
+    changes.row(i) = (*solution - nominal).transpose() / fraction;
   }
   // J L = moved'.
-  const MatrixX jacobian = factor.matrixU().solve(moved).transpose();
+  const MatrixX jacobian = factor.matrixU().solve(changes).transpose();
   if (!jacobian.allFinite()) return {};
   return jacobian;
 }

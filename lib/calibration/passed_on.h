@@ -14,7 +14,7 @@ namespace vlp {
 
 /// Function that returns the solution if the assumed inputs have the errors `error`; std::nullopt
 /// if there is no solution.
-using SolvedWith = std::function<std::optional<Eigen::VectorXd>(const Eigen::VectorXd& error)>;
+using PerturbedSolve = std::function<std::optional<Eigen::VectorXd>(const Eigen::VectorXd& error)>;
 
 /// Estimates the derivative of a solution with respect to errors of its inputs, one column per
 /// error.
@@ -30,7 +30,7 @@ using SolvedWith = std::function<std::optional<Eigen::VectorXd>(const Eigen::Vec
 /// coefficients, change together. If a column has no solution, it is tried once more at 1/16 of its
 /// size, because a solve may select other data at a larger error. Noise of the solve is then
 /// amplified 16 times, which is still far below the result.
-std::optional<MatrixX> jacobian_of(const SolvedWith& solved, const Eigen::VectorXd& exact,
-                                   const MatrixX& covariance);
+std::optional<MatrixX> estimate_jacobian(const PerturbedSolve& solve,
+                                         const Eigen::VectorXd& nominal, const MatrixX& covariance);
 
 }  // namespace vlp

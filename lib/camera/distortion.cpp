@@ -14,7 +14,7 @@ struct Radial {
   double denominator;  // of L
 };
 
-Radial radial(const std::array<double, 12>& k, double r2) {
+Radial compute_radial(const std::array<double, 12>& k, double r2) {
   const double numerator = 1 + r2 * (k[0] + r2 * (k[1] + r2 * k[4]));
   const double denominator = 1 + r2 * (k[5] + r2 * (k[6] + r2 * k[7]));
   const double inverse = 1 / denominator;
@@ -30,7 +30,7 @@ Distortion::Value Distortion::operator()(const Eigen::Vector2d& z) const {
   const double x = z.x(), y = z.y();
   const double xx = x * x, yy = y * y, xy = x * y, r2 = xx + yy;
   const double p1 = k[2], p2 = k[3];
-  const Radial l = radial(k, r2);
+  const Radial l = compute_radial(k, r2);
   const double prism_x = 2 * (k[8] + 2 * k[9] * r2), prism_y = 2 * (k[10] + 2 * k[11] * r2);
   Value value;
   value.distorted = {x * l.factor + 2 * p1 * xy + p2 * (r2 + 2 * xx) + r2 * (k[8] + k[9] * r2),
@@ -45,17 +45,18 @@ Distortion::Value Distortion::operator()(const Eigen::Vector2d& z) const {
 
 Eigen::Matrix<double, 2, 12> Distortion::coefficient_jacobian(const Eigen::Vector2d& z) const {
   const double r2 = z.squaredNorm(), r4 = r2 * r2, r6 = r4 * r2, xy2 = 2 * z.x() * z.y();
-  const Radial l = radial(k, r2);
-  const double numerator_share = 1 / l.denominator, denominator_share = -l.factor / l.denominator;
+  const Radial l = compute_radial(k, r2);
+  const double d_factor_d_numerator = 1 / l.denominator,
+               d_factor_d_denominator = -l.factor / l.denominator;
   Eigen::Matrix<double, 2, 12> jacobian = Eigen::Matrix<double, 2, 12>::Zero();
-  jacobian.col(0) = z * (r2 * numerator_share);
-  jacobian.col(1) = z * (r4 * numerator_share);
+  jacobian.col(0) = z * (r2 * d_factor_d_numerator);
+  jacobian.col(1) = z * (r4 * d_factor_d_numerator);
   jacobian.col(2) << xy2, r2 + 2 * z.y() * z.y();
   jacobian.col(3) << r2 + 2 * z.x() * z.x(), xy2;
-  jacobian.col(4) = z * (r6 * numerator_share);
-  jacobian.col(5) = z * (r2 * denominator_share);
-  jacobian.col(6) = z * (r4 * denominator_share);
-  jacobian.col(7) = z * (r6 * denominator_share);
+  jacobian.col(4) = z * (r6 * d_factor_d_numerator);
+  jacobian.col(5) = z * (r2 * d_factor_d_denominator);
+  jacobian.col(6) = z * (r4 * d_factor_d_denominator);
+  jacobian.col(7) = z * (r6 * d_factor_d_denominator);
   jacobian.row(0).segment<2>(8) << r2, r4;
   jacobian.row(1).segment<2>(10) << r2, r4;
   return jacobian;
@@ -66,19 +67,19 @@ double Distortion::valid_radius() const {
   // u:
   //   L + 2 r2 L' + r u.w,
   // with w from the tangential and prism terms. It is smallest for u = -w / |w|.
-  const auto grows = [this](double r) {
-    const Radial l = radial(k, r * r);
+  const auto is_monotonic = [this](double r) {
+    const Radial l = compute_radial(k, r * r);
     const double w_x = 6 * k[3] + 2 * k[8] + 4 * r * r * k[9];
     const double w_y = 6 * k[2] + 2 * k[10] + 4 * r * r * k[11];
     return l.denominator > 0 && l.factor + 2 * r * r * l.slope > r * std::hypot(w_x, w_y);
   };
   constexpr double step = 0.01;
   for (int i = 1; i * step <= searched_radius; ++i) {
-    if (grows(i * step)) continue;
+    if (is_monotonic(i * step)) continue;
     double inside = (i - 1) * step, outside = i * step;
     while (outside - inside > 1e-12) {
       const double middle = (inside + outside) / 2;
-      (grows(middle) ? inside : outside) = middle;
+      (is_monotonic(middle) ? inside : outside) = middle;
     }
     return inside;
   }

@@ -25,13 +25,13 @@ double Fisheye::valid_angle_rad() const {
 }
 
 double Fisheye::angle_rad(double at_distance, double valid_rad, double start_rad) const {
-  constexpr double rounding = 1e-14;  // relative, for distances at the very end
-  if (!(at_distance <= distance(valid_rad) * (1 + rounding))) {
+  constexpr double numeric_tolerance = 1e-14;  // relative, for distances at the very end
+  if (!(at_distance <= distance(valid_rad) * (1 + numeric_tolerance))) {
     return std::numeric_limits<double>::quiet_NaN();
   }
   double low = 0, high = valid_rad, angle = start_rad;
-  constexpr int most_steps = 60;
-  for (int i = 0; i < most_steps; ++i) {
+  constexpr int max_iterations = 60;
+  for (int i = 0; i < max_iterations; ++i) {
     const double error = distance(angle) - at_distance;
     (error > 0 ? high : low) = angle;
     double next = angle - error / slope(angle);
@@ -54,20 +54,21 @@ FisheyeAngles::FisheyeAngles(const Fisheye& fisheye)
     const double to =
         i + 1 == kIntervals ? valid_rad_ : fisheye.angle_rad((i + 1) * interval, valid_rad_, start);
     // At a fold the slope of the angle is infinite.
-    const double way = to - from, steepest = 3 * way;
+    const double difference = to - from, steepest = 3 * difference;
     const double slope = fisheye.slope(to);
     const double to_slope = slope > 0 ? std::min(interval / slope, steepest) : steepest;
-    starts_[static_cast<std::size_t>(i)] = {from, from_slope, 3 * way - 2 * from_slope - to_slope,
-                                            from_slope + to_slope - 2 * way};
+    initial_angles_[static_cast<std::size_t>(i)] = {from, from_slope,
+                                                    3 * difference - 2 * from_slope - to_slope,
+                                                    from_slope + to_slope - 2 * difference};
     from = to, from_slope = to_slope;
   }
 }
 
-double FisheyeAngles::start_for(double distance) const {
+double FisheyeAngles::compute_initial_angle_rad(double distance) const {
   const double at = distance * intervals_per_distance_;
   const int interval = at < kIntervals ? static_cast<int>(at) : kIntervals - 1;
   const double x = at - interval;
-  const auto& [a, b, c, d] = starts_[static_cast<std::size_t>(interval)];
+  const auto& [a, b, c, d] = initial_angles_[static_cast<std::size_t>(interval)];
   // This order returns 0 for NaN.
   return std::min(valid_rad_, std::max(0.0, a + x * (b + x * (c + x * d))));
 }

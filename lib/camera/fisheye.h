@@ -49,11 +49,11 @@ class FisheyeAngles {
   double valid_rad() const { return valid_rad_; }
   /// Returns the angle of a distance as Fisheye::angle_rad() does.
   double operator()(double distance) const {
-    return fisheye_.angle_rad(distance, valid_rad_, start_for(distance));
+    return fisheye_.angle_rad(distance, valid_rad_, compute_initial_angle_rad(distance));
   }
 
  private:
-  double start_for(double distance) const;
+  double compute_initial_angle_rad(double distance) const;
 
   Fisheye fisheye_;
   double valid_rad_;
@@ -61,7 +61,7 @@ class FisheyeAngles {
   double intervals_per_distance_;
   /// Initial angle in each of kIntervals equal intervals of the distance: coefficients of a cubic
   /// polynomial of the position in the interval (0 to 1), the constant first.
-  std::array<std::array<double, 4>, kIntervals> starts_;
+  std::array<std::array<double, 4>, kIntervals> initial_angles_;
 };
 
 }  // namespace vlp

@@ -126,8 +126,8 @@ std::optional<Eigen::Vector2d> Opencv::undistort(const Eigen::Vector2d& distorte
 }
 
 /// Position of a point in the stereographic plane, and its derivative.
-struct StereographicPlace {
-  explicit StereographicPlace(const Eigen::Vector3d& x)
+struct StereographicPoint {
+  explicit StereographicPoint(const Eigen::Vector3d& x)
       : norm(x.norm()), depth(norm + x.z()), plane(x.head<2>() * (2 / depth)) {}
   Matrix23 jacobian(const Eigen::Vector3d& x) const {
     const Eigen::Vector3d d_depth = x / norm + Eigen::Vector3d::UnitZ();
@@ -141,12 +141,12 @@ struct StereographicPlace {
 class Stereographic : public LensFamily {
  public:
   std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& x) const override {
-    const StereographicPlace at(x);
+    const StereographicPoint at(x);
     if (!(at.depth > 0)) return std::nullopt;
     return at.plane;
   }
   Jacobians jacobians(const Eigen::Vector3d& x) const override {
-    return {StereographicPlace(x).jacobian(x), {}};
+    return {StereographicPoint(x).jacobian(x), {}};
   }
   std::optional<Ray> unproject(const Eigen::Vector2d& plane) const override {
     Ray ray;
@@ -163,27 +163,29 @@ class Splined : public LensFamily {
       : surface_(grid, control_points) {}
 
   std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& x) const override {
-    const StereographicPlace at(x);
+    const StereographicPoint at(x);
     if (!(at.depth > 0) || !surface_.covers(at.plane)) return std::nullopt;
     return surface_.distorted(at.plane);
   }
   Jacobians jacobians(const Eigen::Vector3d& x) const override {
-    const StereographicPlace at(x);
+    const StereographicPoint at(x);
     return {surface_(at.plane).d_distorted_d_u * at.jacobian(x), {}};
   }
-  std::vector<ByDistortion> by_distortions(const Eigen::Vector3d& x) const override {
-    const SplineSurface::Weights at = surface_.weights(StereographicPlace(x).plane);
+  std::vector<DistortionDerivative> compute_distortion_derivatives(
+      const Eigen::Vector3d& x) const override {
+    const SplineSurface::Weights at = surface_.weights(StereographicPoint(x).plane);
     const SplineGrid& grid = surface_.grid();
     const auto width = static_cast<std::size_t>(grid.order) + 1;
-    std::vector<ByDistortion> shares;
+    std::vector<DistortionDerivative> derivatives;
     for (std::size_t j = 0; j < width; ++j) {
       for (std::size_t i = 0; i < width; ++i) {
         const Eigen::Index point = (at.row + static_cast<Eigen::Index>(j)) * grid.nx + at.column +
                                    static_cast<Eigen::Index>(i);
-        for (const int axis : {0, 1}) shares.push_back({2 * point + axis, axis, at.x[i] * at.y[j]});
+        for (const int axis : {0, 1})
+          derivatives.push_back({2 * point + axis, axis, at.x[i] * at.y[j]});
       }
     }
-    return shares;
+    return derivatives;
   }
   std::optional<Ray> unproject(const Eigen::Vector2d& plane) const override {
     Eigen::Matrix2d d_plane_d_u;
@@ -205,12 +207,13 @@ class OpencvFisheye : public LensFamily {
   explicit OpencvFisheye(std::span<const double> k)
       : fisheye_{{k[0], k[1], k[2], k[3]}}, angles_(fisheye_) {}
   std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& x) const override {
-    const double beside = x.head<2>().norm();
-    const double angle_rad = std::atan2(beside, x.z());
-    if (!x.allFinite() || !(angle_rad <= angles_.valid_rad()) || !(beside > 0 || x.z() > 0)) {
+    const double axis_distance = x.head<2>().norm();
+    const double angle_rad = std::atan2(axis_distance, x.z());
+    if (!x.allFinite() || !(angle_rad <= angles_.valid_rad()) ||
+        !(axis_distance > 0 || x.z() > 0)) {
       return std::nullopt;
     }
-    return x.head<2>() * (fisheye_.distance(angle_rad) / std::max(beside, kOnAxis));
+    return x.head<2>() * (fisheye_.distance(angle_rad) / std::max(axis_distance, kOnAxis));
   }
   Jacobians jacobians(const Eigen::Vector3d& x) const override;
   std::optional<Ray> unproject(const Eigen::Vector2d& plane) const override;
@@ -225,22 +228,23 @@ class OpencvFisheye : public LensFamily {
 
 LensFamily::Jacobians OpencvFisheye::jacobians(const Eigen::Vector3d& x) const {
   const Eigen::Vector2d xy = x.head<2>();
-  const double beside = xy.norm(), squared_norm = x.squaredNorm();
-  const double angle_rad = std::atan2(beside, x.z());
+  const double axis_distance = xy.norm(), squared_norm = x.squaredNorm();
+  const double angle_rad = std::atan2(axis_distance, x.z());
   const double slope = fisheye_.slope(angle_rad);
-  const bool on_axis = beside <= kOnAxis;
-  const double scale = on_axis ? 1 / x.z() : fisheye_.distance(angle_rad) / beside;
-  const Eigen::Vector2d way = on_axis ? Eigen::Vector2d(0, 0) : Eigen::Vector2d(xy / beside);
+  const bool on_axis = axis_distance <= kOnAxis;
+  const double scale = on_axis ? 1 / x.z() : fisheye_.distance(angle_rad) / axis_distance;
+  const Eigen::Vector2d radial_direction =
+      on_axis ? Eigen::Vector2d(0, 0) : Eigen::Vector2d(xy / axis_distance);
   Jacobians result;
   result.d_plane_d_point.leftCols<2>() =
       scale * Eigen::Matrix2d::Identity() +
-      (slope * x.z() / squared_norm - scale) * way * way.transpose();
+      (slope * x.z() / squared_norm - scale) * radial_direction * radial_direction.transpose();
   result.d_plane_d_point.col(2) = xy * (-slope / squared_norm);
   result.d_plane_d_distortions.resize(2, std::ssize(fisheye_.k));
   double power = angle_rad;
   for (Eigen::Index i = 0; i < result.d_plane_d_distortions.cols(); ++i) {
     power *= angle_rad * angle_rad;
-    result.d_plane_d_distortions.col(i) = way * power;
+    result.d_plane_d_distortions.col(i) = radial_direction * power;
   }
   return result;
 }
@@ -262,7 +266,8 @@ std::optional<LensFamily::Ray> OpencvFisheye::unproject(const Eigen::Vector2d& p
   return ray;
 }
 
-std::shared_ptr<const LensFamily> family_of(LensModel model, std::span<const double> distortions) {
+std::shared_ptr<const LensFamily> make_lens_family(LensModel model,
+                                                   std::span<const double> distortions) {
   if (is_splined(model)) return std::make_shared<Splined>(grid_of(model), distortions);
   switch (model) {
     case LensModel::pinhole:
@@ -281,7 +286,7 @@ std::shared_ptr<const LensFamily> family_of(LensModel model, std::span<const dou
 Lens::Lens(LensModel model, std::span<const double> parameters) : model_(model) {
   const auto finite = [](double value) { return std::isfinite(value); };
   if (parameters.size() != parameter_count(model)) {
-    throw std::invalid_argument(std::string(name_of(model)) + " takes " +
+    throw std::invalid_argument(std::string(to_string(model)) + " takes " +
                                 std::to_string(parameter_count(model)) + " parameters, not " +
                                 std::to_string(parameters.size()));
   }
@@ -293,7 +298,7 @@ Lens::Lens(LensModel model, std::span<const double> parameters) : model_(model) 
   }
   focal_px_ = {parameters[0], parameters[1]};
   center_px_ = {parameters[2], parameters[3]};
-  family_ = family_of(model, parameters.subspan(4));
+  family_ = make_lens_family(model, parameters.subspan(4));
 }
 
 std::optional<Eigen::Vector2d> Lens::project(const Eigen::Vector3d& x_in_camera) const {
@@ -309,25 +314,26 @@ std::optional<Lens::Projection> Lens::project_with_jacobians(
   const auto pixel = project(x_in_camera);
   if (!pixel) return std::nullopt;
   constexpr Eigen::Index core = 4;
-  const LensFamily::Jacobians by_family = family_->jacobians(x_in_camera);
-  const Eigen::Index distortions = by_family.d_plane_d_distortions.cols();
-  Projection result{*pixel, focal_px_.asDiagonal() * by_family.d_plane_d_point, {}};
+  const LensFamily::Jacobians family_jacobians = family_->jacobians(x_in_camera);
+  const Eigen::Index distortions = family_jacobians.d_plane_d_distortions.cols();
+  Projection result{*pixel, focal_px_.asDiagonal() * family_jacobians.d_plane_d_point, {}};
   result.d_pixel_d_parameters.resize(2, core + distortions);
   result.d_pixel_d_parameters.leftCols<2>() =
       (*pixel - center_px_).cwiseQuotient(focal_px_).asDiagonal();
   result.d_pixel_d_parameters.middleCols<2>(2).setIdentity();
   result.d_pixel_d_parameters.rightCols(distortions) =
-      focal_px_.asDiagonal() * by_family.d_plane_d_distortions;
+      focal_px_.asDiagonal() * family_jacobians.d_plane_d_distortions;
   return result;
 }
 
-std::optional<Lens::ByParameters> Lens::by_parameters(const Eigen::Vector3d& x_in_camera) const {
+std::optional<Lens::SparseJacobian> Lens::compute_parameter_jacobian(
+    const Eigen::Vector3d& x_in_camera) const {
   const auto projection = project_with_jacobians(x_in_camera);
   if (!projection) return std::nullopt;
   constexpr Eigen::Index core = 4;
   const auto& dense = projection->d_pixel_d_parameters;
-  const auto sparse = family_->by_distortions(x_in_camera);
-  ByParameters result{{}, Eigen::Matrix2Xd::Zero(2, dense.cols() + std::ssize(sparse))};
+  const auto sparse = family_->compute_distortion_derivatives(x_in_camera);
+  SparseJacobian result{{}, Eigen::Matrix2Xd::Zero(2, dense.cols() + std::ssize(sparse))};
   result.d_pixel.leftCols(dense.cols()) = dense;
   for (Eigen::Index i = 0; i < dense.cols(); ++i) result.parameters.push_back(i);
   for (const auto& [distortion, axis, d_plane] : sparse) {

@@ -53,7 +53,7 @@ class Lens {
   std::optional<Projection> project_with_jacobians(const Eigen::Vector3d& x_in_camera) const;
 
   /// Sparse Jacobian of a pixel with respect to the parameters of the lens.
-  struct ByParameters {
+  struct SparseJacobian {
     /// Indices of the parameters that the pixel depends on, in mrcal's order, ascending.
     std::vector<Eigen::Index> parameters;
     /// One column per entry of `parameters`.
@@ -61,7 +61,8 @@ class Lens {
   };
   /// Computes the Jacobian of a point's pixel with respect to all parameters, including the control
   /// points of splined lenses. Returns std::nullopt for points that project() rejects.
-  std::optional<ByParameters> by_parameters(const Eigen::Vector3d& x_in_camera) const;
+  std::optional<SparseJacobian> compute_parameter_jacobian(
+      const Eigen::Vector3d& x_in_camera) const;
 
   struct Ray {
     /// Direction, not of unit length: z = 1 for PINHOLE and OPENCVn; z <= 1 for other models, where

@@ -21,7 +21,8 @@ class LensFamily {
 
   struct Jacobians {
     Eigen::Matrix<double, 2, 3> d_plane_d_point;
-    /// One column per distortion. Empty for models with more than twelve, see by_distortions().
+    /// One column per distortion. Empty for models with more than twelve, see
+    /// compute_distortion_derivatives().
     Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::DontAlign, 2, 12> d_plane_d_distortions;
   };
   /// Computes the Jacobians of project(). Does not allocate.
@@ -30,7 +31,7 @@ class LensFamily {
 
   /// Derivative of one coordinate of the plane, x (axis 0) or y (axis 1), with respect to one
   /// distortion.
-  struct ByDistortion {
+  struct DistortionDerivative {
     Eigen::Index distortion;
     int axis;
     double d_plane;
@@ -38,7 +39,10 @@ class LensFamily {
   /// Computes the derivatives for models with more than twelve distortions: only those of
   /// distortions that the position depends on, in ascending order. Empty for other models.
   /// @pre project() returns a finite position.
-  virtual std::vector<ByDistortion> by_distortions(const Eigen::Vector3d&) const { return {}; }
+  virtual std::vector<DistortionDerivative> compute_distortion_derivatives(
+      const Eigen::Vector3d&) const {
+    return {};
+  }
 
   struct Ray {
     Eigen::Vector3d direction;

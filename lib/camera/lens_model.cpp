@@ -12,19 +12,19 @@ namespace vlp {
 namespace {
 
 /// Returns the name of a splined lens. Names are created at the first call and kept.
-std::string_view splined_name_of(LensModel model) {
+std::string_view make_splined_name(LensModel model) {
   static std::mutex mutex;
   static std::map<LensModel, std::string> names;
   const std::lock_guard alone(mutex);
   const auto [entry, added] = names.try_emplace(model);
-  if (added) entry->second = name_of(grid_of(model));
+  if (added) entry->second = to_string(grid_of(model));
   return entry->second;
 }
 
 }  // namespace
 
-std::string_view name_of(LensModel model) {
-  return is_splined(model) ? splined_name_of(model)
+std::string_view to_string(LensModel model) {
+  return is_splined(model) ? make_splined_name(model)
                            : lens_models()[static_cast<std::size_t>(model)].name;
 }
 
@@ -32,7 +32,7 @@ std::optional<LensModel> lens_model_from_name(std::string_view name) {
   for (const LensModelRow& row : lens_models()) {
     if (row.name == name) return row.model;
   }
-  if (const auto grid = spline_grid_from_name(name)) return splined_lens(*grid);
+  if (const auto grid = parse_spline_grid(name)) return lens_model_for(*grid);
   return std::nullopt;
 }
 

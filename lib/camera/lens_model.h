@@ -28,12 +28,12 @@ namespace vlp {
 ///   splined         the control points row by row, x before y
 ///
 /// A new model needs an enumerator here, a row in lens_table.cpp, its equation in a header and a
-/// class in family_of() of lens.cpp.
+/// class in make_lens_family() of lens.cpp.
 enum class LensModel { pinhole, stereographic, opencv4, opencv5, opencv8, opencv12, fisheye };
 
 /// Returns mrcal's name, for example "LENSMODEL_OPENCV8", or "OPENCV_FISHEYE". The view stays valid
 /// until the program ends.
-std::string_view name_of(LensModel model);
+std::string_view to_string(LensModel model);
 
 /// Returns the model with a name; std::nullopt for other names. A splined lens must be within the
 /// bounds of SplineGrid, and its name written as mrcal writes it.

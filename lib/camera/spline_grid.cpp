@@ -14,27 +14,29 @@ constexpr std::array<std::string_view, 4> kWords{
 
 }  // namespace
 
-std::optional<SplineGrid> spline_grid_from_name(std::string_view name) {
+std::optional<SplineGrid> parse_spline_grid(std::string_view name) {
   SplineGrid grid{};
   const std::array numbers{&grid.order, &grid.nx, &grid.ny, &grid.fov_x_deg};
-  std::string_view rest = name;
+  std::string_view remaining = name;
   for (std::size_t i = 0; i < kWords.size(); ++i) {
-    if (!rest.starts_with(kWords[i])) return {};
-    rest.remove_prefix(kWords[i].size());
-    const auto [end, error] = std::from_chars(rest.data(), rest.data() + rest.size(), *numbers[i]);
+    if (!remaining.starts_with(kWords[i])) return {};
+    remaining.remove_prefix(kWords[i].size());
+    const auto [end, error] =
+        std::from_chars(remaining.data(), remaining.data() + remaining.size(), *numbers[i]);
     if (error != std::errc()) return {};
-    rest.remove_prefix(static_cast<std::size_t>(end - rest.data()));
+    remaining.remove_prefix(static_cast<std::size_t>(end - remaining.data()));
   }
-  const auto fits = [&](int knots) {
-    return knots > grid.order && knots <= SplineGrid::kMostKnots;
+  const auto is_valid_count = [&](int knots) {
+    return knots > grid.order && knots <= SplineGrid::kMaxKnots;
   };
-  const bool known = (grid.order == 2 || grid.order == 3) && fits(grid.nx) && fits(grid.ny) &&
-                     grid.fov_x_deg >= 1 && grid.fov_x_deg <= SplineGrid::kMostFov_deg;
+  const bool is_valid = (grid.order == 2 || grid.order == 3) && is_valid_count(grid.nx) &&
+                        is_valid_count(grid.ny) && grid.fov_x_deg >= 1 &&
+                        grid.fov_x_deg <= SplineGrid::kMaxFov_deg;
   // A model has exactly one name: no leading zeros.
-  return known && name_of(grid) == name ? std::optional(grid) : std::nullopt;
+  return is_valid && to_string(grid) == name ? std::optional(grid) : std::nullopt;
 }
 
-std::string name_of(const SplineGrid& grid) {
+std::string to_string(const SplineGrid& grid) {
   std::string name;
   const std::array numbers{grid.order, grid.nx, grid.ny, grid.fov_x_deg};
   for (std::size_t i = 0; i < kWords.size(); ++i) {

@@ -16,12 +16,12 @@ namespace vlp {
 struct SplineGrid {
   /// Degree of the polynomials, 2 or 3.
   int order;
-  /// Number of control points along x and y, more than `order` and at most kMostKnots.
+  /// Number of control points along x and y, more than `order` and at most kMaxKnots.
   int nx, ny;
-  /// Field of view from the left to the right end of the grid, 1 to kMostFov_deg.
+  /// Field of view from the left to the right end of the grid, 1 to kMaxFov_deg.
   int fov_x_deg;
 
-  static constexpr int kMostKnots = 255, kMostFov_deg = 359;
+  static constexpr int kMaxKnots = 255, kMaxFov_deg = 359;
 
   std::size_t control_points() const {
     return static_cast<std::size_t>(nx) * static_cast<std::size_t>(ny);
@@ -32,7 +32,7 @@ struct SplineGrid {
 /// Returns the LensModel of the splined lens with this grid. Its value holds the four numbers of
 /// the grid in separate bits, above the enumerators of LensModel.
 /// @pre The numbers are within the bounds of SplineGrid.
-constexpr LensModel splined_lens(const SplineGrid& grid) {
+constexpr LensModel lens_model_for(const SplineGrid& grid) {
   return static_cast<LensModel>(1 << 30 | (grid.order - 2) << 29 | grid.fov_x_deg << 20 |
                                 grid.nx << 10 | grid.ny);
 }
@@ -48,8 +48,8 @@ constexpr SplineGrid grid_of(LensModel model) {
 
 /// Parses the grid in mrcal's name of a splined lens. Returns std::nullopt if mrcal would write the
 /// name differently, or if a number is out of the bounds of SplineGrid.
-std::optional<SplineGrid> spline_grid_from_name(std::string_view name);
+std::optional<SplineGrid> parse_spline_grid(std::string_view name);
 /// Returns mrcal's name of the splined lens with this grid.
-std::string name_of(const SplineGrid& grid);
+std::string to_string(const SplineGrid& grid);
 
 }  // namespace vlp

@@ -43,8 +43,8 @@ struct Piece {
 template <int Order>
 Piece piece_at(double at, int control_points) {
   constexpr double middle = Order == 2 ? 0.5 : 0;
-  const int own = std::clamp(static_cast<int>(at + middle), 1, control_points - Order);
-  return {own - 1, at - own};
+  const int interval = std::clamp(static_cast<int>(at + middle), 1, control_points - Order);
+  return {interval - 1, at - interval};
 }
 
 }  // namespace
@@ -59,7 +59,7 @@ SplineSurface::SplineSurface(const SplineGrid& grid, std::span<const double> con
   } else {
     fill_pieces<3>(control_points);
   }
-  fill_starts();
+  fill_initial_points();
 }
 
 template <int Order>
@@ -116,7 +116,7 @@ SplineSurface::Value SplineSurface::operator()(const Eigen::Vector2d& u) const {
 }
 
 template <int Order>
-SplineSurface::Weights SplineSurface::weights_of(const Eigen::Vector2d& u) const {
+SplineSurface::Weights SplineSurface::compute_weights(const Eigen::Vector2d& u) const {
   const Piece x = piece_at<Order>(u.x() * pieces_per_u_ + (grid_.nx - 1) / 2.0, grid_.nx),
               y = piece_at<Order>(u.y() * pieces_per_u_ + (grid_.ny - 1) / 2.0, grid_.ny);
   Weights weights{x.index, y.index, {}, {}};
@@ -132,25 +132,25 @@ SplineSurface::Weights SplineSurface::weights_of(const Eigen::Vector2d& u) const
 }
 
 SplineSurface::Weights SplineSurface::weights(const Eigen::Vector2d& u) const {
-  return grid_.order == 2 ? weights_of<2>(u) : weights_of<3>(u);
+  return grid_.order == 2 ? compute_weights<2>(u) : compute_weights<3>(u);
 }
 
 template <int Order>
 std::optional<Eigen::Vector2d> SplineSurface::search(Eigen::Vector2d u,
                                                      const Eigen::Vector2d& distorted,
                                                      Eigen::Matrix2d& d_distorted_d_u) const {
-  constexpr int most_steps = 50, most_halvings = 12;
-  constexpr double rounding = 1e-12;  // relative to the reach, for pixels at its very end
+  constexpr int max_iterations = 50, max_halvings = 12;
+  constexpr double numeric_tolerance = 1e-12;  // relative to the reach, for pixels at its very end
   Eigen::Vector2d from = u, step(0, 0);
-  double least = std::numeric_limits<double>::infinity();
-  for (int steps = 0, halvings = 0; steps < most_steps;) {
+  double smallest = std::numeric_limits<double>::infinity();
+  for (int iterations = 0, halvings = 0; iterations < max_iterations;) {
     // The only call, so that the compiler inlines it into the loop.
     const Value at = value<Order>(u);
     const Eigen::Vector2d error = at.distorted - distorted;
-    if (!(error.squaredNorm() < least)) {  // halve the step until the error decreases
-      if (++halvings == most_halvings) return std::nullopt;
+    if (!(error.squaredNorm() < smallest)) {  // halve the step until the error decreases
+      if (++halvings == max_halvings) return std::nullopt;
       step /= 2;
-      u = within_reach(from + step);
+      u = clamp_to_reach(from + step);
       continue;
     }
     const Eigen::Matrix2d& j = at.d_distorted_d_u;
@@ -162,83 +162,84 @@ std::optional<Eigen::Vector2d> SplineSurface::search(Eigen::Vector2d u,
     // Newton's method converges quadratically: after a step of 1e-6 the error is 1e-12.
     if (step.squaredNorm() <= 1e-12) {
       u += step;
-      if (!((u.cwiseAbs() - reach_).maxCoeff() <= rounding * reach_.maxCoeff())) {
+      if (!((u.cwiseAbs() - reach_).maxCoeff() <= numeric_tolerance * reach_.maxCoeff())) {
         return std::nullopt;
       }
       d_distorted_d_u = j;
-      return within_reach(u);
+      return clamp_to_reach(u);
     }
-    from = u, least = error.squaredNorm(), halvings = 0, ++steps;
-    u = within_reach(from + step);
+    from = u, smallest = error.squaredNorm(), halvings = 0, ++iterations;
+    u = clamp_to_reach(from + step);
   }
   return std::nullopt;
 }
 
 std::optional<Eigen::Vector2d> SplineSurface::undistorted(const Eigen::Vector2d& distorted,
                                                           Eigen::Matrix2d& d_distorted_d_u) const {
-  const Eigen::Vector2d start = start_for(distorted);
+  const Eigen::Vector2d start = compute_initial_point(distorted);
   return grid_.order == 2 ? search<2>(start, distorted, d_distorted_d_u)
                           : search<3>(start, distorted, d_distorted_d_u);
 }
 
-Eigen::Vector2d SplineSurface::start_for(const Eigen::Vector2d& distorted) const {
-  const Eigen::Vector2d at = (distorted - first_start_).cwiseProduct(starts_per_unit_);
-  const auto within = [](double node) { return node > 0 ? std::min(node, kStarts - 1.0) : 0; };
-  const double column = within(at.x()), row = within(at.y());
-  const int i = std::min(static_cast<int>(column), kStarts - 2);
-  const int j = std::min(static_cast<int>(row), kStarts - 2);
+Eigen::Vector2d SplineSurface::compute_initial_point(const Eigen::Vector2d& distorted) const {
+  const Eigen::Vector2d at = (distorted - first_node_).cwiseProduct(nodes_per_unit_);
+  const auto clamp_node = [](double node) { return node > 0 ? std::min(node, kNodes - 1.0) : 0; };
+  const double column = clamp_node(at.x()), row = clamp_node(at.y());
+  const int i = std::min(static_cast<int>(column), kNodes - 2);
+  const int j = std::min(static_cast<int>(row), kNodes - 2);
   const double x = column - i, y = row - j;
-  const Eigen::Vector2d* node = starts_.data() + static_cast<std::ptrdiff_t>(j) * kStarts + i;
-  return within_reach((1 - y) * ((1 - x) * node[0] + x * node[1]) +
-                      y * ((1 - x) * node[kStarts] + x * node[kStarts + 1]));
+  const Eigen::Vector2d* node =
+      initial_points_.data() + static_cast<std::ptrdiff_t>(j) * kNodes + i;
+  return clamp_to_reach((1 - y) * ((1 - x) * node[0] + x * node[1]) +
+                        y * ((1 - x) * node[kNodes] + x * node[kNodes + 1]));
 }
 
-void SplineSurface::fill_starts() {
-  constexpr int tried = 2 * kStarts - 1;
+void SplineSurface::fill_initial_points() {
+  constexpr int num_samples = 2 * kNodes - 1;
   constexpr double inf = std::numeric_limits<double>::infinity();
   std::vector<std::pair<Eigen::Vector2d, Value>> places;
-  places.reserve(static_cast<std::size_t>(tried) * tried);
-  Eigen::Vector2d least(inf, inf), most(-inf, -inf);
-  for (int row = 0; row < tried; ++row) {
-    for (int column = 0; column < tried; ++column) {
-      const Eigen::Vector2d share = Eigen::Vector2d(column, row) / (kStarts - 1);
-      const Eigen::Vector2d u = reach_.cwiseProduct(share - Eigen::Vector2d(1, 1));
+  places.reserve(static_cast<std::size_t>(num_samples) * num_samples);
+  Eigen::Vector2d smallest(inf, inf), largest(-inf, -inf);
+  for (int row = 0; row < num_samples; ++row) {
+    for (int column = 0; column < num_samples; ++column) {
+      const Eigen::Vector2d fraction = Eigen::Vector2d(column, row) / (kNodes - 1);
+      const Eigen::Vector2d u = reach_.cwiseProduct(fraction - Eigen::Vector2d(1, 1));
       places.emplace_back(u, (*this)(u));
-      least = least.cwiseMin(places.back().second.distorted);
-      most = most.cwiseMax(places.back().second.distorted);
+      smallest = smallest.cwiseMin(places.back().second.distorted);
+      largest = largest.cwiseMax(places.back().second.distorted);
     }
   }
-  first_start_ = least;
+  first_node_ = smallest;
   constexpr double tiny = 1e-300;  // if all distorted positions coincide
-  starts_per_unit_ = (kStarts - 1) * (most - least).cwiseMax(tiny).cwiseInverse();
-  starts_.assign(static_cast<std::size_t>(kStarts) * kStarts, Eigen::Vector2d::Zero());
+  nodes_per_unit_ = (kNodes - 1) * (largest - smallest).cwiseMax(tiny).cwiseInverse();
+  initial_points_.assign(static_cast<std::size_t>(kNodes) * kNodes, Eigen::Vector2d::Zero());
   // The initial point of a node is extrapolated from the sample nearest to the node.
-  std::vector<double> distances(starts_.size(), inf);
+  std::vector<double> distances(initial_points_.size(), inf);
   for (const auto& [u, at] : places) {
-    const Eigen::Vector2d node = (at.distorted - least).cwiseProduct(starts_per_unit_);
+    const Eigen::Vector2d node = (at.distorted - smallest).cwiseProduct(nodes_per_unit_);
     const Eigen::Vector2d whole = node.array().round();
     const Eigen::Vector2d start =
-        u + at.d_distorted_d_u.inverse() * (whole - node).cwiseQuotient(starts_per_unit_);
+        u + at.d_distorted_d_u.inverse() * (whole - node).cwiseQuotient(nodes_per_unit_);
     if (!(at.d_distorted_d_u.determinant() > 0) || !start.allFinite()) continue;
-    const auto index = static_cast<std::size_t>(whole.y() * kStarts + whole.x());
+    const auto index = static_cast<std::size_t>(whole.y() * kNodes + whole.x());
     const double distance = (node - whole).squaredNorm();
     if (!(distance < distances[index])) continue;
     distances[index] = distance;
-    starts_[index] = within_reach(start);
+    initial_points_[index] = clamp_to_reach(start);
   }
   // Nodes without a sample take the initial point of a neighbor: right and down, then left and up.
-  const auto take = [&](std::size_t to, std::size_t from) {
+  const auto copy_from = [&](std::size_t to, std::size_t from) {
     if (distances[to] < inf || distances[from] == inf) return;
     distances[to] = distances[from];
-    starts_[to] = starts_[from];
+    initial_points_[to] = initial_points_[from];
   };
-  for (std::size_t i = 1; i < starts_.size(); ++i) {
-    if (i % kStarts > 0) take(i, i - 1);
-    if (i >= kStarts) take(i, i - kStarts);
+  for (std::size_t i = 1; i < initial_points_.size(); ++i) {
+    if (i % kNodes > 0) copy_from(i, i - 1);
+    if (i >= kNodes) copy_from(i, i - kNodes);
   }
-  for (std::size_t i = starts_.size() - 1; i-- > 0;) {
-    if ((i + 1) % kStarts > 0) take(i, i + 1);
-    if (i + kStarts < starts_.size()) take(i, i + kStarts);
+  for (std::size_t i = initial_points_.size() - 1; i-- > 0;) {
+    if ((i + 1) % kNodes > 0) copy_from(i, i + 1);
+    if (i + kNodes < initial_points_.size()) copy_from(i, i + kNodes);
   }
 }
 

@@ -64,17 +64,17 @@ class SplineSurface {
   template <int Order>
   void fill_pieces(std::span<const double> control_points);
   template <int Order>
-  Weights weights_of(const Eigen::Vector2d& u) const;
+  Weights compute_weights(const Eigen::Vector2d& u) const;
   template <int Order>
   inline Value value(const Eigen::Vector2d& u) const;
   template <int Order>
   std::optional<Eigen::Vector2d> search(Eigen::Vector2d u, const Eigen::Vector2d& distorted,
                                         Eigen::Matrix2d& d_distorted_d_u) const;
-  Eigen::Vector2d within_reach(const Eigen::Vector2d& u) const {
+  Eigen::Vector2d clamp_to_reach(const Eigen::Vector2d& u) const {
     return u.cwiseMax(-reach_).cwiseMin(reach_);
   }
-  void fill_starts();
-  Eigen::Vector2d start_for(const Eigen::Vector2d& distorted) const;
+  void fill_initial_points();
+  Eigen::Vector2d compute_initial_point(const Eigen::Vector2d& distorted) const;
 
   SplineGrid grid_;
   double pieces_per_u_;
@@ -82,10 +82,10 @@ class SplineSurface {
   /// Coefficients of x^i y^j of each piece, pieces row by row; for each j all i.
   std::vector<Eigen::Vector2d> pieces_;
   /// Initial points of undistorted(): points whose distorted positions are close to the nodes of a
-  /// kStarts x kStarts lattice over the range of the distorted positions.
-  static constexpr int kStarts = 33;
-  Eigen::Vector2d first_start_, starts_per_unit_;
-  std::vector<Eigen::Vector2d> starts_;
+  /// kNodes x kNodes lattice over the range of the distorted positions.
+  static constexpr int kNodes = 33;
+  Eigen::Vector2d first_node_, nodes_per_unit_;
+  std::vector<Eigen::Vector2d> initial_points_;
 };
 
 }  // namespace vlp

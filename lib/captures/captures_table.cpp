@@ -90,7 +90,7 @@ CapturesTable read_captures(const std::filesystem::path& file) {
   return table;
 }
 
-CapturesTable captures_table(const std::filesystem::path& folder) {
+CapturesTable read_captures_of_folder(const std::filesystem::path& folder) {
   const auto file = folder / "captures.csv";
   return std::filesystem::exists(file) ? read_captures(file) : CapturesTable{};
 }

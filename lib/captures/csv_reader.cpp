@@ -105,11 +105,12 @@ CsvTable::CsvTable(const std::filesystem::path& file) : file_(file) {
 
 CsvTable::Column CsvTable::required(std::string_view name) const {
   if (const auto column = optional(name)) return *column;
-  constexpr std::size_t enough = 500;  // all columns of the program's tables
+  constexpr std::size_t max_names_bytes = 500;  // all columns of the program's tables
   std::string names;
   for (const std::string& have : header_) names += (names.empty() ? "" : ", ") + have;
-  throw InputError(file_, 1, std::string(name),
-                   "this column is missing; the columns are: " + shortened(names, enough));
+  throw InputError(
+      file_, 1, std::string(name),
+      "this column is missing; the columns are: " + truncate_text(names, max_names_bytes));
 }
 
 std::optional<CsvTable::Column> CsvTable::optional(std::string_view name) const {
@@ -135,7 +136,7 @@ double CsvTable::number(std::size_t row, Column column) const {
 
 double CsvTable::coordinate_m(std::size_t row, Column column) const {
   const double value_m = number(row, column);
-  if (std::abs(value_m) > kFarthest_m) {
+  if (std::abs(value_m) > kMaxCoordinate_m) {
     throw error(
         row, column,
         "should be within 1,000 km, in metres, not '" + std::string(text(row, column)) + "'");

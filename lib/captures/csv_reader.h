@@ -14,7 +14,7 @@
 namespace vlp {
 
 /// Maximum coordinate. Larger values are mistakes, and their squares may overflow.
-inline constexpr double kFarthest_m = 1e6;
+inline constexpr double kMaxCoordinate_m = 1e6;
 
 /// A CSV file with a header line, read into memory. RFC 4180 quoting, LF or CRLF, optional UTF-8
 /// byte order mark. Columns are found by name in any order; other columns are ignored. Removes the
@@ -37,7 +37,7 @@ class CsvTable {
   /// Returns a finite number, or an integer. Throws InputError for other fields.
   double number(std::size_t row, Column column) const;
   int integer(std::size_t row, Column column) const;
-  /// Returns a coordinate in meters. Throws InputError also if it exceeds kFarthest_m.
+  /// Returns a coordinate in meters. Throws InputError also if it exceeds kMaxCoordinate_m.
   double coordinate_m(std::size_t row, Column column) const;
   /// Returns a number; std::nullopt if the field is empty.
   std::optional<double> optional_number(std::size_t row, Column column) const;

@@ -38,34 +38,34 @@ void CsvWriter::row(const std::vector<std::string>& fields) {
 void CsvWriter::write_row(std::span<const std::string_view> fields) {
   const char* separator = "";
   for (const std::string_view field : fields) {
-    waiting_ += separator;
+    buffer_ += separator;
     separator = ",";
     if (begins_like_formula(field) && !is_number(field)) {
       const std::string text = "'" + std::string(field);
-      waiting_ += quoted(std::string_view(text));
+      buffer_ += quoted(std::string_view(text));
       continue;
     }
     const bool plain = field.find_first_of(",\"\r\n") == std::string_view::npos &&
                        !field.starts_with(' ') && !field.ends_with(' ');
-    waiting_ += plain ? std::string(field) : quoted(field);
+    buffer_ += plain ? std::string(field) : quoted(field);
   }
-  waiting_ += '\n';
-  constexpr std::size_t enough = 1 << 16;
-  if (waiting_.size() >= enough) write_waiting();
+  buffer_ += '\n';
+  constexpr std::size_t flush_bytes = 1 << 16;
+  if (buffer_.size() >= flush_bytes) flush_buffer();
 }
 
-void CsvWriter::write_waiting() {
-  file_.write(waiting_);
-  waiting_.clear();
+void CsvWriter::flush_buffer() {
+  file_.write(buffer_);
+  buffer_.clear();
 }
 
 void CsvWriter::save() {
-  write_waiting();
+  flush_buffer();
   file_.save();
 }
 
 void CsvWriter::save_unsynced() {
-  write_waiting();
+  flush_buffer();
   file_.save_unsynced();
 }
 

@@ -32,15 +32,15 @@ class CsvWriter {
   void row(std::initializer_list<std::string_view> fields);
   void row(const std::vector<std::string>& fields);
   void save();
-  /// See WholeFile::save_unsynced().
+  /// See AtomicFileWriter::save_unsynced().
   void save_unsynced();
 
  private:
-  void write_waiting();
+  void flush_buffer();
   void write_row(std::span<const std::string_view> fields);
 
-  WholeFile file_;
-  std::string waiting_;
+  AtomicFileWriter file_;
+  std::string buffer_;
 };
 
 }  // namespace vlp

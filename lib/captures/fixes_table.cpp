@@ -39,7 +39,7 @@ struct FixColumns {
   std::optional<CsvTable::Column> rejected, outside_region;
 };
 
-std::optional<Eigen::Vector2d> pair_in(
+std::optional<Eigen::Vector2d> read_pair(
     const CsvTable& csv, std::size_t row,
     const std::array<std::optional<CsvTable::Column>, 2>& columns) {
   const auto& [first, second] = columns;
@@ -49,7 +49,7 @@ std::optional<Eigen::Vector2d> pair_in(
   return Eigen::Vector2d(*a, *b);
 }
 
-std::optional<Eigen::Vector4d> sd_in(
+std::optional<Eigen::Vector4d> read_sds(
     const CsvTable& csv, std::size_t row,
     const std::array<std::optional<CsvTable::Column>, 4>& columns) {
   Eigen::Vector4d sd;
@@ -63,35 +63,35 @@ std::optional<Eigen::Vector4d> sd_in(
   return sd;
 }
 
-FixRow::Fix fix_in(const CsvTable& csv, std::size_t row, const FixColumns& columns) {
+FixRow::Fix read_fix(const CsvTable& csv, std::size_t row, const FixColumns& columns) {
   const auto [x_m, y_m, z_m, yaw_rad] = columns.pose;
   FixRow::Fix fix{
       {{csv.coordinate_m(row, x_m), csv.coordinate_m(row, y_m), csv.coordinate_m(row, z_m)},
        csv.number(row, yaw_rad)},
-      sd_in(csv, row, columns.sd),
+      read_sds(csv, row, columns.sd),
       0,
-      sd_in(csv, row, columns.noise_sd)};
+      read_sds(csv, row, columns.noise_sd)};
   if (columns.residual_px) {
     fix.residual_px = csv.optional_number(row, *columns.residual_px).value_or(0);
   }
-  fix.velocity_m_per_s = pair_in(csv, row, columns.velocity);
-  if (const auto lean = pair_in(csv, row, columns.lean)) fix.inclination = {lean->x(), lean->y()};
+  fix.velocity_m_per_s = read_pair(csv, row, columns.velocity);
+  if (const auto lean = read_pair(csv, row, columns.lean)) fix.inclination = {lean->x(), lean->y()};
   return fix;
 }
 
 /// Reads ids separated by blanks.
-std::vector<int> ids_in(const CsvTable& csv, std::size_t row, CsvTable::Column column) {
+std::vector<int> read_ids(const CsvTable& csv, std::size_t row, CsvTable::Column column) {
   std::vector<int> ids;
-  std::string_view rest = csv.text(row, column);
-  while (!rest.empty()) {
-    const std::string_view word = rest.substr(0, rest.find(' '));
+  std::string_view remaining = csv.text(row, column);
+  while (!remaining.empty()) {
+    const std::string_view word = remaining.substr(0, remaining.find(' '));
     int id = 0;
     const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), id);
     if (error != std::errc() || end != word.data() + word.size()) {
       throw csv.error(row, column, "should be ids of lamps, separated by blanks");
     }
     ids.push_back(id);
-    rest.remove_prefix(std::min(rest.size(), word.size() + 1));
+    remaining.remove_prefix(std::min(remaining.size(), word.size() + 1));
   }
   return ids;
 }
@@ -105,28 +105,28 @@ struct AddedColumn {
   std::string (*text)(const FixRow&);
 };
 
-std::string time_of(const FixRow& row) { return row.time_s ? fixed(*row.time_s, kDigits) : ""; }
+std::string format_time(const FixRow& row) { return row.time_s ? fixed(*row.time_s, kDigits) : ""; }
 
 template <int axis>
-std::string noise_sd_of(const FixRow& row) {
+std::string format_noise_sd(const FixRow& row) {
   if (!row.fix || !row.fix->noise_sd) return "";
   return significant((*row.fix->noise_sd)[axis], kSdDigits);
 }
 
 template <int axis>
-std::string velocity_of(const FixRow& row) {
+std::string format_velocity(const FixRow& row) {
   if (!row.fix || !row.fix->velocity_m_per_s) return "";
   return fixed((*row.fix->velocity_m_per_s)[axis], kDigits);
 }
 
 template <double Inclination::*angle>
-std::string lean_of(const FixRow& row) {
+std::string format_lean(const FixRow& row) {
   if (!row.fix || !row.fix->inclination) return "";
   return fixed((*row.fix->inclination).*angle, kDigits);
 }
 
 template <std::vector<int> FixRow::*lamps>
-std::string ids_of(const FixRow& row) {
+std::string format_ids(const FixRow& row) {
   std::string ids;
   for (const int id : row.*lamps) {
     if (!ids.empty()) ids += ' ';
@@ -136,24 +136,24 @@ std::string ids_of(const FixRow& row) {
 }
 
 constexpr std::array<AddedColumn, 11> kAddedColumns{
-    {{"time_s", time_of},
-     {"noise_sd_x_m", noise_sd_of<0>},
-     {"noise_sd_y_m", noise_sd_of<1>},
-     {"noise_sd_z_m", noise_sd_of<2>},
-     {"noise_sd_yaw_rad", noise_sd_of<3>},
-     {"vx_m_per_s", velocity_of<0>},
-     {"vy_m_per_s", velocity_of<1>},
-     {"roll_rad", lean_of<&Inclination::roll_rad>},
-     {"pitch_rad", lean_of<&Inclination::pitch_rad>},
-     {"rejected", ids_of<&FixRow::rejected>},
-     {"outside_region", ids_of<&FixRow::outside_region>}}};
+    {{"time_s", format_time},
+     {"noise_sd_x_m", format_noise_sd<0>},
+     {"noise_sd_y_m", format_noise_sd<1>},
+     {"noise_sd_z_m", format_noise_sd<2>},
+     {"noise_sd_yaw_rad", format_noise_sd<3>},
+     {"vx_m_per_s", format_velocity<0>},
+     {"vy_m_per_s", format_velocity<1>},
+     {"roll_rad", format_lean<&Inclination::roll_rad>},
+     {"pitch_rad", format_lean<&Inclination::pitch_rad>},
+     {"rejected", format_ids<&FixRow::rejected>},
+     {"outside_region", format_ids<&FixRow::outside_region>}}};
 
-std::vector<AddedColumn> columns_that_some_have(const std::vector<FixRow>& rows) {
+std::vector<AddedColumn> find_used_columns(const std::vector<FixRow>& rows) {
   std::vector<AddedColumn> columns;
   for (const AddedColumn& column : kAddedColumns) {
-    const bool some = std::any_of(rows.begin(), rows.end(),
-                                  [&](const FixRow& row) { return !column.text(row).empty(); });
-    if (some) columns.push_back(column);
+    const bool is_used = std::any_of(rows.begin(), rows.end(),
+                                     [&](const FixRow& row) { return !column.text(row).empty(); });
+    if (is_used) columns.push_back(column);
   }
   return columns;
 }
@@ -164,7 +164,7 @@ void write_fixes(const std::filesystem::path& file, const std::vector<FixRow>& r
   std::vector<std::string> header{"image",  "status",     "x_m",    "y_m",
                                   "z_m",    "yaw_rad",    "sd_x_m", "sd_y_m",
                                   "sd_z_m", "sd_yaw_rad", "lamps",  "residual_px"};
-  const auto added = columns_that_some_have(rows);
+  const auto added = find_used_columns(rows);
   for (const AddedColumn& column : added) header.emplace_back(column.name);
   CsvWriter csv(file, header);
   for (const FixRow& row : rows) {
@@ -196,7 +196,7 @@ std::vector<FixRow> read_fixes(const std::filesystem::path& file) {
   std::vector<FixRow> rows;
   rows.reserve(csv.rows());
   for (std::size_t row = 0; row < csv.rows(); ++row) {
-    const auto name = unique_name(csv, row, image, images);
+    const auto name = read_unique_name(csv, row, image, images);
     FixRow& read = rows.emplace_back(FixRow{std::string(name),
                                             std::string(csv.text(row, status)),
                                             {},
@@ -206,9 +206,9 @@ std::vector<FixRow> read_fixes(const std::filesystem::path& file) {
     if (utf8_length(read.status) != read.status.size()) {
       throw csv.error(row, status, "should be UTF-8");
     }
-    if (read.status == "ok") read.fix = fix_in(csv, row, columns);
-    if (columns.rejected) read.rejected = ids_in(csv, row, *columns.rejected);
-    if (columns.outside_region) read.outside_region = ids_in(csv, row, *columns.outside_region);
+    if (read.status == "ok") read.fix = read_fix(csv, row, columns);
+    if (columns.rejected) read.rejected = read_ids(csv, row, *columns.rejected);
+    if (columns.outside_region) read.outside_region = read_ids(csv, row, *columns.outside_region);
     if (columns.time_s) read.time_s = csv.optional_number(row, *columns.time_s);
   }
   if (rows.empty()) throw InputError(file, "holds no fix");

@@ -57,8 +57,8 @@ void write_fixes(const std::filesystem::path& file, const std::vector<FixRow>& r
 /// Standard deviations are ignored unless all four are given. Values of a fix are ignored unless
 /// the status is "ok".
 /// @throws InputError as CsvTable; if an image or a status is empty, or a status is not UTF-8; if
-/// an image occurs twice; if a value of a fix is not finite or exceeds kFarthest_m; if a standard
-/// deviation is negative; if lamps are not ids; if there are no rows
+/// an image occurs twice; if a value of a fix is not finite or exceeds kMaxCoordinate_m; if a
+/// standard deviation is negative; if lamps are not ids; if there are no rows
 std::vector<FixRow> read_fixes(const std::filesystem::path& file);
 
 }  // namespace vlp

@@ -24,7 +24,7 @@ Id::Id(std::string text, const std::filesystem::path& source, std::string_view k
     : text_(std::move(text)) {
   if (accepts(text_)) return;
   constexpr std::size_t max_shown = 100;
-  std::string problem = first_characters(printable_line(text_), max_shown);
+  std::string problem = truncate_utf8(printable_line(text_), max_shown);
   throw InputError(source, problem.insert(0, "'").append("' is no id of a ").append(kind) +
                                ": 1 to 200 bytes of UTF-8 are one, without '/', without "
                                "control characters, and without a '.' at the beginning");

@@ -11,7 +11,7 @@
 
 namespace vlp {
 
-void in_parallel(std::size_t count, int threads, const std::function<void(std::size_t)>& task) {
+void parallel_for(std::size_t count, int threads, const std::function<void(std::size_t)>& task) {
   std::atomic<std::size_t> next = 0;
   std::mutex failing;
   std::exception_ptr failure;

@@ -17,7 +17,7 @@ namespace vlp {
 class NameIndex {
  public:
   /// Reserves memory for `most` names, fewer than 2^32.
-  explicit NameIndex(std::size_t most);
+  explicit NameIndex(std::size_t max_names);
 
   /// Adds a name with the next index, from 0. Returns false, without a change, if the name exists.
   bool insert(std::string_view name);
@@ -27,10 +27,10 @@ class NameIndex {
  private:
   struct Slot {
     std::uint32_t hash = 0;
-    std::uint32_t next_place = 0;  // 0: free
+    std::uint32_t next_index = 0;  // 0: free
   };
   /// Returns the slot of the name, or the free slot for it.
-  std::size_t slot_of(std::string_view name, std::uint64_t hash) const;
+  std::size_t find_slot(std::string_view name, std::uint64_t hash) const;
 
   std::vector<Slot> slots_;
   std::vector<std::string_view> names_;
@@ -38,7 +38,7 @@ class NameIndex {
 
 /// Returns the name in a cell and adds it to `names`. Throws InputError if it is empty or occurs in
 /// an earlier row.
-std::string_view unique_name(const CsvTable& csv, std::size_t row, CsvTable::Column column,
-                             NameIndex& names);
+std::string_view read_unique_name(const CsvTable& csv, std::size_t row, CsvTable::Column column,
+                                  NameIndex& names);
 
 }  // namespace vlp

@@ -5,13 +5,13 @@
 namespace vlp {
 
 std::size_t count_far_outside(std::span<const Frame> frames, const std::array<int, 2>& imager_px) {
-  constexpr double share = 0.1;
+  constexpr double fraction = 0.1;
   const Eigen::Array2d size(imager_px[0], imager_px[1]);
   std::size_t outside = 0;
   for (const Frame& frame : frames) {
     for (const Detection& detection : frame.detections) {
       const Eigen::Array2d pixel = detection.pixel.array();
-      const bool near = (pixel >= -share * size).all() && (pixel <= (1 + share) * size).all();
+      const bool near = (pixel >= -fraction * size).all() && (pixel <= (1 + fraction) * size).all();
       outside += near ? 0 : 1;
     }
   }

@@ -9,26 +9,26 @@
 
 namespace vlp {
 
-NearestOnPath nearest_on(const Path& path, const Eigen::Vector2d& place_m) {
+NearestOnPath find_nearest_on_path(const Path& path, const Eigen::Vector2d& position_m) {
   NearestOnPath nearest{path.waypoints_m.front(), {}};
-  double least = std::numeric_limits<double>::infinity();
+  double min_squared_distance = std::numeric_limits<double>::infinity();
   std::size_t leg = 0;
-  double share_of_leg = 0;
+  double leg_fraction = 0;
   for (std::size_t i = 0; i + 1 < path.waypoints_m.size(); ++i) {
     const Eigen::Vector2d& begin = path.waypoints_m[i];
-    const Eigen::Vector2d along = path.waypoints_m[i + 1] - begin, to_place = place_m - begin;
+    const Eigen::Vector2d along = path.waypoints_m[i + 1] - begin, to_place = position_m - begin;
     const double squared_length = along.squaredNorm();
-    const double share =
+    const double fraction =
         squared_length > 0 ? std::clamp(to_place.dot(along) / squared_length, 0.0, 1.0) : 0;
-    const double squared_distance = (share * along - to_place).squaredNorm();
-    if (squared_distance >= least) continue;
-    least = squared_distance;
+    const double squared_distance = (fraction * along - to_place).squaredNorm();
+    if (squared_distance >= min_squared_distance) continue;
+    min_squared_distance = squared_distance;
     leg = i;
-    share_of_leg = share;
-    nearest.xy_m = begin + share * along;
+    leg_fraction = fraction;
+    nearest.xy_m = begin + fraction * along;
   }
   if (!path.z_m.empty()) {
-    nearest.z_m = path.z_m[leg] + share_of_leg * (path.z_m[leg + 1] - path.z_m[leg]);
+    nearest.z_m = path.z_m[leg] + leg_fraction * (path.z_m[leg + 1] - path.z_m[leg]);
   }
   return nearest;
 }

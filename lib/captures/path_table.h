@@ -24,11 +24,11 @@ struct NearestOnPath {
 };
 
 /// Returns the point of a path closest to a position.
-NearestOnPath nearest_on(const Path& path, const Eigen::Vector2d& place_m);
+NearestOnPath find_nearest_on_path(const Path& path, const Eigen::Vector2d& position_m);
 
 /// Reads a path. Columns: x_m, y_m and, optionally, z_m.
-/// @throws InputError as CsvTable; if a coordinate exceeds kFarthest_m; if there are fewer than two
-/// waypoints, or all coincide
+/// @throws InputError as CsvTable; if a coordinate exceeds kMaxCoordinate_m; if there are fewer
+/// than two waypoints, or all coincide
 Path read_path(const std::filesystem::path& file);
 
 }  // namespace vlp

@@ -97,11 +97,11 @@ std::string printable(std::string_view text) { return escape(text, "\n\t"); }
 
 std::string printable_line(std::string_view text) { return escape(text, ""); }
 
-std::string first_characters(std::string text, std::size_t most_bytes) {
+std::string truncate_utf8(std::string text, std::size_t max_bytes) {
   const auto goes_on = [](char byte) { return (static_cast<unsigned char>(byte) & 0xC0) == 0x80; };
-  if (text.size() <= most_bytes) return text;
-  while (most_bytes > 0 && goes_on(text[most_bytes])) --most_bytes;
-  text.resize(most_bytes);
+  if (text.size() <= max_bytes) return text;
+  while (max_bytes > 0 && goes_on(text[max_bytes])) --max_bytes;
+  text.resize(max_bytes);
   return text;
 }
 

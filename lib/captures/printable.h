@@ -16,8 +16,8 @@ std::string printable(std::string_view text);
 /// cannot add a line to a list.
 std::string printable_line(std::string_view text);
 
-/// Returns the longest prefix of a UTF-8 text with at most `most_bytes` bytes and no truncated
+/// Returns the longest prefix of a UTF-8 text with at most `max_bytes` bytes and no truncated
 /// character.
-std::string first_characters(std::string text, std::size_t most_bytes);
+std::string truncate_utf8(std::string text, std::size_t max_bytes);
 
 }  // namespace vlp

@@ -48,7 +48,7 @@ class OpenFile {
 };
 
 /// Returns the status of a file, or of a link itself; std::nullopt if it does not exist.
-std::optional<struct stat> status_of(int folder, const std::string& name) {
+std::optional<struct stat> read_status(int folder, const std::string& name) {
   struct stat status {};
   if (::fstatat(folder, name.c_str(), &status, AT_SYMLINK_NOFOLLOW) != 0) return std::nullopt;
   return status;
@@ -115,7 +115,7 @@ SharedFolder::~SharedFolder() {
 }
 
 void SharedFolder::check_place() const {
-  const auto present = status_of(AT_FDCWD, path_.string());
+  const auto present = read_status(AT_FDCWD, path_.string());
   struct stat opened {};
   if (present && ::fstat(descriptor_, &opened) == 0 && present->st_dev == opened.st_dev &&
       present->st_ino == opened.st_ino) {
@@ -137,7 +137,7 @@ std::optional<SharedFolder> SharedFolder::find_folder(const Id& name) const {
   const int found = ::openat(descriptor_, name.text().c_str(), kFolderFlags | O_NOFOLLOW);
   if (found >= 0) return SharedFolder(std::move(path), found);
   const int reason = errno;
-  const auto status = status_of(descriptor_, name.text());
+  const auto status = read_status(descriptor_, name.text());
   if (!status) return std::nullopt;
   if (S_ISLNK(status->st_mode)) throw InputError(path, kLink);
   errno = reason;
@@ -156,7 +156,7 @@ SharedFolder SharedFolder::make_folder(const Id& name) const {
 
 bool SharedFolder::has(const std::string& name) const {
   checked(name);
-  return status_of(descriptor_, name).has_value();
+  return read_status(descriptor_, name).has_value();
 }
 
 int SharedFolder::open(const std::string& name, int flags) const {
@@ -167,7 +167,7 @@ int SharedFolder::open(const std::string& name, int flags) const {
       ::openat(descriptor_, name.c_str(), flags | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC, mode);
   if (descriptor < 0) {
     const int reason = errno;
-    const auto there = status_of(descriptor_, name);
+    const auto there = read_status(descriptor_, name);
     if (there && S_ISLNK(there->st_mode)) throw InputError(path, kLink);
     if (there && S_ISFIFO(there->st_mode)) throw InputError(path, "is no regular file");
     errno = reason;
@@ -211,7 +211,7 @@ std::optional<std::string> SharedFolder::read(const std::string& name,
 
 void SharedFolder::replace(const std::string& name, std::string_view content) const {
   const fs::path path = checked(name);
-  const auto former = status_of(descriptor_, name);
+  const auto former = read_status(descriptor_, name);
   TemporaryFile file(descriptor_, name);
   if (file.descriptor() < 0) fail(path, "cannot be written");
   if (former && S_ISREG(former->st_mode) && !keep_mode_and_owner(file.descriptor(), *former)) {

@@ -16,7 +16,7 @@ std::vector<TruthRow> read_truth(const std::filesystem::path& file) {
   std::vector<TruthRow> rows;
   rows.reserve(csv.rows());
   for (std::size_t row = 0; row < csv.rows(); ++row) {
-    const auto name = unique_name(csv, row, image, images);
+    const auto name = read_unique_name(csv, row, image, images);
     TruthRow& read = rows.emplace_back();
     read.image = name;
     read.xy_m = {csv.coordinate_m(row, x_m), csv.coordinate_m(row, y_m)};

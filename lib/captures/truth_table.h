@@ -22,8 +22,8 @@ struct TruthRow {
 
 /// Reads `truth.csv`. Columns: image, x_m, y_m and, optionally, z_m and yaw_rad, whose fields may
 /// be empty.
-/// @throws InputError as CsvTable; if a coordinate exceeds kFarthest_m; if an image name is empty
-/// or occurs twice; if there are no rows
+/// @throws InputError as CsvTable; if a coordinate exceeds kMaxCoordinate_m; if an image name is
+/// empty or occurs twice; if there are no rows
 std::vector<TruthRow> read_truth(const std::filesystem::path& file);
 
 }  // namespace vlp

@@ -7,72 +7,72 @@
 namespace vlp {
 namespace {
 
-Path path_of(const EvaluationInput& input) {
+Path make_reference_path(const EvaluationInput& input) {
   if (input.path) return *input.path;
   return {{(*input.line_m)[0], (*input.line_m)[1]}, {}};
 }
 
 void add_horizontal(Evaluation& evaluation, const std::vector<FixError>& errors, int threads) {
   std::vector<double> sizes_m;
-  std::vector<std::size_t> units;
+  std::vector<std::size_t> clusters;
   sizes_m.reserve(errors.size());
-  units.reserve(errors.size());
+  clusters.reserve(errors.size());
   for (const FixError& error : errors) {
     sizes_m.push_back(error.horizontal_m.norm());
-    units.push_back(error.unit);
+    clusters.push_back(error.cluster);
   }
-  evaluation.intervals_m = error_intervals(sizes_m, units, threads);
-  evaluation.horizontal_m = figures_of(sizes_m);
-  evaluation.distribution_m = distribution_of(std::move(sizes_m));
+  evaluation.intervals_m = compute_error_intervals(sizes_m, clusters, threads);
+  evaluation.horizontal_m = compute_error_statistics(sizes_m);
+  evaluation.distribution_m = compute_distribution(std::move(sizes_m));
 }
 
-std::optional<SignedFigures> signed_figures(const std::vector<FixError>& errors,
-                                            std::optional<double> FixError::*part) {
+std::optional<SignedErrorStatistics> compute_signed_statistics(
+    const std::vector<FixError>& errors, std::optional<double> FixError::*part) {
   std::vector<double> values;
   values.reserve(errors.size());
   for (const FixError& error : errors) {
     if (error.*part) values.push_back(*(error.*part));
   }
   if (values.empty()) return std::nullopt;
-  return signed_figures_of(std::move(values));
+  return compute_signed_error_statistics(std::move(values));
 }
 
 void add_comparison(Evaluation& evaluation, const EvaluationInput& input,
                     const std::vector<FixError>& errors) {
   if (!input.truth) check_same_images(input.fixes, *input.others);
-  const FixErrors others = errors_of(input, *input.others);
+  const FixErrors others = compute_errors(input, *input.others);
   evaluation.comparison =
       compare(input.fixes.rows, errors, input.others->rows, others.errors, input.threads);
 }
 
 }  // namespace
 
-FixErrors errors_of(const EvaluationInput& input, const FromFile<FixRow>& fixes) {
+FixErrors compute_errors(const EvaluationInput& input, const FromFile<FixRow>& fixes) {
   if (input.truth) return errors_against_truth(fixes, *input.truth, input.station_m);
-  return errors_against_path(fixes.rows, path_of(input));
+  return errors_against_path(fixes.rows, make_reference_path(input));
 }
 
 Evaluation evaluate(const EvaluationInput& input) {
-  const auto [captures, missing, errors] = errors_of(input, input.fixes);
+  const auto [captures, missing, errors] = compute_errors(input, input.fixes);
   Evaluation evaluation;
-  evaluation.against = input.truth ? "truth" : input.path ? "path" : "line";
+  evaluation.reference = input.truth ? "truth" : input.path ? "path" : "line";
   evaluation.captures = captures;
   evaluation.fixes = errors.size();
   evaluation.missing = missing;
   if (errors.empty()) return evaluation;
   add_horizontal(evaluation, errors, input.threads);
-  evaluation.height_m = signed_figures(errors, &FixError::height_m);
-  evaluation.yaw_rad = signed_figures(errors, &FixError::yaw_rad);
-  evaluation.drawn = "runs of fixes";
+  evaluation.height_m = compute_signed_statistics(errors, &FixError::height_m);
+  evaluation.yaw_rad = compute_signed_statistics(errors, &FixError::yaw_rad);
+  evaluation.resampling_unit = "runs of fixes";
   if (input.truth) {
-    evaluation.stations = bias_and_scatter(errors, input.truth->rows);
-    evaluation.drawn = evaluation.stations ? "stations" : "captures";
-    evaluation.stated = stated_ratio(input.fixes.rows, errors);
+    evaluation.stations = compute_bias_and_scatter(errors, input.truth->rows);
+    evaluation.resampling_unit = evaluation.stations ? "stations" : "captures";
+    evaluation.normalized_errors = compute_normalized_errors(input.fixes.rows, errors);
   }
   if (input.truth && input.limit) {
     const auto& [lamps, camera, noise_px] = *input.limit;
     evaluation.limit =
-        limit_ratio(errors, input.truth->rows, lamps, camera, noise_px, input.threads);
+        compute_crlb_ratio(errors, input.truth->rows, lamps, camera, noise_px, input.threads);
   }
   if (input.line_m) evaluation.fit = fit_line(input.fixes.rows, *input.line_m);
   if (input.others) add_comparison(evaluation, input, errors);

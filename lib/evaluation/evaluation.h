@@ -43,33 +43,33 @@ struct EvaluationInput {
 /// Accuracy of fixes. Without any fix, only the members up to `missing` are valid.
 struct Evaluation {
   /// Reference: "truth", "path" or "line".
-  std::string against;
+  std::string reference;
   std::size_t captures = 0, fixes = 0;
   /// Number of captures without a fix, by status.
   std::map<std::string, std::size_t> missing;
-  double missing_share() const {
+  double missing_fraction() const {
     return static_cast<double>(captures - fixes) / static_cast<double>(captures);
   }
 
-  ErrorFigures horizontal_m{};
+  ErrorStatistics horizontal_m{};
   std::vector<std::pair<double, double>> distribution_m;
   std::optional<ErrorIntervals> intervals_m;
   /// Resampling unit of the intervals: "stations", "captures" or "runs of fixes".
-  std::string drawn;
-  std::optional<SignedFigures> height_m, yaw_rad;
+  std::string resampling_unit;
+  std::optional<SignedErrorStatistics> height_m, yaw_rad;
   /// Only with a ground truth, if reference points have two fixes or more.
   std::optional<BiasAndScatter> stations;
   /// Only with a commanded line, if the fixes determine a direction.
   std::optional<LineFit> fit;
   /// Only with a ground truth.
-  std::optional<StatedRatio> stated;
-  std::optional<LimitRatio> limit;
+  std::optional<NormalizedErrors> normalized_errors;
+  std::optional<CrlbRatio> limit;
   std::optional<Comparison> comparison;
 };
 
 /// Computes the errors of single fixes against the reference of `input`.
 /// @throws InputError if image names do not match
-FixErrors errors_of(const EvaluationInput& input, const FromFile<FixRow>& fixes);
+FixErrors compute_errors(const EvaluationInput& input, const FromFile<FixRow>& fixes);
 
 /// Evaluates the fixes of `input`.
 /// @throws InputError if image names do not match

@@ -16,143 +16,141 @@ using Json = nlohmann::ordered_json;
 
 /// Unit of keys and the factor that converts SI values to it.
 struct KeyUnit {
-  const char* ending;
-  double of_one;
+  const char* suffix;
+  double factor;
 };
 const KeyUnit kMmKeys{"_mm", 1e3};
 const KeyUnit kDegKeys{"_deg", deg_from_rad(1)};
 
-Json json_of(const ErrorFigures& figures, const KeyUnit& unit) {
-  const auto key = [&](const char* name) { return name + std::string(unit.ending); };
-  return {{key("mean"), unit.of_one * figures.mean},
-          {key("median"), unit.of_one * figures.median},
-          {key("p90"), unit.of_one * figures.p90},
-          {key("max"), unit.of_one * figures.max},
-          {key("rms"), unit.of_one * figures.rms}};
+Json to_json(const ErrorStatistics& statistics, const KeyUnit& unit) {
+  const auto key = [&](const char* name) { return name + std::string(unit.suffix); };
+  return {{key("mean"), unit.factor * statistics.mean},
+          {key("median"), unit.factor * statistics.median},
+          {key("p90"), unit.factor * statistics.p90},
+          {key("max"), unit.factor * statistics.max},
+          {key("rms"), unit.factor * statistics.rms}};
 }
 
-Json json_of(const SignedFigures& figures, const KeyUnit& unit) {
-  Json json = json_of(figures.sizes, unit);
-  json["bias" + std::string(unit.ending)] = unit.of_one * figures.bias;
-  json["fixes"] = figures.sizes.count;
+Json to_json(const SignedErrorStatistics& statistics, const KeyUnit& unit) {
+  Json json = to_json(statistics.sizes, unit);
+  json["bias" + std::string(unit.suffix)] = unit.factor * statistics.bias;
+  json["fixes"] = statistics.sizes.count;
   return json;
 }
 
-Json json_of(const Interval& interval_m) {
-  return {kMmKeys.of_one * interval_m.low, kMmKeys.of_one * interval_m.high};
+Json to_json(const Interval& interval_m) {
+  return {kMmKeys.factor * interval_m.low, kMmKeys.factor * interval_m.high};
 }
 
-Json json_of(const std::vector<std::pair<double, double>>& distribution_m) {
+Json to_json(const std::vector<std::pair<double, double>>& distribution_m) {
   Json points = Json::array();
-  for (const auto& [share, error_m] : distribution_m) {
-    points.push_back({{"share", share}, {"error_mm", kMmKeys.of_one * error_m}});
+  for (const auto& [fraction, error_m] : distribution_m) {
+    points.push_back({{"share", fraction}, {"error_mm", kMmKeys.factor * error_m}});
   }
   return points;
 }
 
-Json json_of(const BiasAndScatter& figures) {
+Json to_json(const BiasAndScatter& statistics) {
   Json list = Json::array();
-  for (const auto& station : figures.stations) {
+  for (const auto& station : statistics.stations) {
     list.push_back({{"x_m", station.xy_m.x()},
                     {"y_m", station.xy_m.y()},
                     {"fixes", station.fixes},
-                    {"bias_x_mm", kMmKeys.of_one * station.bias_m.x()},
-                    {"bias_y_mm", kMmKeys.of_one * station.bias_m.y()},
-                    {"sd_mm", kMmKeys.of_one * station.sd_m}});
+                    {"bias_x_mm", kMmKeys.factor * station.bias_m.x()},
+                    {"bias_y_mm", kMmKeys.factor * station.bias_m.y()},
+                    {"sd_mm", kMmKeys.factor * station.sd_m}});
   }
-  return {{"stations", figures.stations.size()},
-          {"fixes", figures.fixes},
-          {"bias_mm", kMmKeys.of_one * figures.bias_m},
-          {"scatter_mm", kMmKeys.of_one * figures.scatter_m},
+  return {{"stations", statistics.stations.size()},
+          {"fixes", statistics.fixes},
+          {"bias_mm", kMmKeys.factor * statistics.bias_m},
+          {"scatter_mm", kMmKeys.factor * statistics.scatter_m},
           {"list", list}};
 }
 
-Json json_of(const LineFit& fit) {
-  Json json = json_of(fit.distances_m, kMmKeys);
-  json["jitter_mm"] = kMmKeys.of_one * fit.jitter_m;
+Json to_json(const LineFit& fit) {
+  Json json = to_json(fit.distances_m, kMmKeys);
+  json["jitter_mm"] = kMmKeys.factor * fit.jitter_m;
   json["angle_deg"] = deg_from_rad(fit.angle_rad);
   for (const auto& [key, end] : {std::pair("begin", fit.line_m[0]), {"end", fit.line_m[1]}}) {
     json[key] = {{"x_m", end.x()}, {"y_m", end.y()}};
   }
-  json["cdf"] = json_of(fit.distribution_m);
+  json["cdf"] = to_json(fit.distribution_m);
   return json;
 }
 
-Json json_of(const StatedRatio& stated) {
-  Json json{{"horizontal", stated.horizontal}, {"fixes", stated.fixes}};
-  if (stated.height) json["height"] = *stated.height;
-  if (stated.yaw) json["yaw"] = *stated.yaw;
-  json["within_95"] = stated.within_95;
-  if (stated.height_within_95) json["height_within_95"] = *stated.height_within_95;
-  if (stated.yaw_within_95) json["yaw_within_95"] = *stated.yaw_within_95;
+Json to_json(const NormalizedErrors& normalized_errors) {
+  Json json{{"horizontal", normalized_errors.horizontal}, {"fixes", normalized_errors.fixes}};
+  if (normalized_errors.height) json["height"] = *normalized_errors.height;
+  if (normalized_errors.yaw) json["yaw"] = *normalized_errors.yaw;
+  json["within_95"] = normalized_errors.within_95;
+  if (normalized_errors.height_within_95)
+    json["height_within_95"] = *normalized_errors.height_within_95;
+  if (normalized_errors.yaw_within_95) json["yaw_within_95"] = *normalized_errors.yaw_within_95;
   return json;
 }
 
-Json json_of(const Comparison& comparison) {
-  Json json{{"verdict", comparison.verdict()},
-            {"pairs", comparison.pairs},
-            {"units", comparison.units},
-            {"only_these", comparison.only_these},
-            {"only_others", comparison.only_others},
-            {"smaller_errors", comparison.smaller},
+Json to_json(const Comparison& comparison) {
+  Json json{{"verdict", comparison.verdict()},       {"pairs", comparison.pairs},
+            {"units", comparison.clusters},          {"only_these", comparison.only_these},
+            {"only_others", comparison.only_others}, {"smaller_errors", comparison.smaller},
             {"larger_errors", comparison.larger}};
   if (comparison.pairs > 0) {
-    json["mean_difference_mm"] = kMmKeys.of_one * comparison.mean_difference_m;
+    json["mean_difference_mm"] = kMmKeys.factor * comparison.mean_difference_m;
   }
-  json["least_mm"] = kMmKeys.of_one * comparison.least_m;
+  json["least_mm"] = kMmKeys.factor * comparison.min_relevant_m;
   if (comparison.too_few()) json["why"] = "too few";
-  if (comparison.interval_m) json["interval_95_mm"] = json_of(*comparison.interval_m);
+  if (comparison.interval_m) json["interval_95_mm"] = to_json(*comparison.interval_m);
   return json;
 }
 
-Json json_of(const std::vector<CheckedMetric>& gates) {
+Json to_json(const std::vector<CheckedMetric>& gates) {
   Json list = Json::array();
   for (const CheckedMetric& gate : gates) {
     list.push_back({{"name", gate.name},
                     {"unit", gate.unit},
                     {"value", gate.value ? Json(*gate.value) : Json(nullptr)},
                     {"limit", gate.limit.value()},
-                    {"asked", words_of(gate.asked)},
-                    {"passed", gate.met()}});
+                    {"asked", describe(gate.direction)},
+                    {"passed", gate.passed()}});
   }
   return list;
 }
 
-bool failed(const CheckedMetric& gate) { return !gate.met(); }
+bool failed(const CheckedMetric& gate) { return !gate.passed(); }
 
 }  // namespace
 
-std::string json_of(const Evaluation& evaluation, const std::vector<CheckedMetric>& gates) {
+std::string to_json(const Evaluation& evaluation, const std::vector<CheckedMetric>& gates) {
   Json json{{"format", "vlp-evaluation/1"},
-            {"against", evaluation.against},
+            {"against", evaluation.reference},
             {"captures", evaluation.captures},
             {"fixes", evaluation.fixes},
-            {"missing_share", evaluation.missing_share()},
+            {"missing_share", evaluation.missing_fraction()},
             {"missing", evaluation.missing},
-            {"horizontal", json_of(evaluation.horizontal_m, kMmKeys)}};
+            {"horizontal", to_json(evaluation.horizontal_m, kMmKeys)}};
   if (const auto& intervals = evaluation.intervals_m) {
-    json["horizontal"]["intervals_95"] = {{"drawn", evaluation.drawn},
-                                          {"units", intervals->units},
-                                          {"mean_mm", json_of(intervals->mean)},
-                                          {"median_mm", json_of(intervals->median)}};
-    Json& json_of_intervals = json["horizontal"]["intervals_95"];
-    if (intervals->p90) json_of_intervals["p90_mm"] = json_of(*intervals->p90);
-    json_of_intervals["rms_mm"] = json_of(intervals->rms);
+    json["horizontal"]["intervals_95"] = {{"drawn", evaluation.resampling_unit},
+                                          {"units", intervals->clusters},
+                                          {"mean_mm", to_json(intervals->mean)},
+                                          {"median_mm", to_json(intervals->median)}};
+    Json& intervals_json = json["horizontal"]["intervals_95"];
+    if (intervals->p90) intervals_json["p90_mm"] = to_json(*intervals->p90);
+    intervals_json["rms_mm"] = to_json(intervals->rms);
   }
-  json["horizontal"]["cdf"] = json_of(evaluation.distribution_m);
-  if (evaluation.height_m) json["height"] = json_of(*evaluation.height_m, kMmKeys);
-  if (evaluation.yaw_rad) json["yaw"] = json_of(*evaluation.yaw_rad, kDegKeys);
-  if (evaluation.stations) json["repeated"] = json_of(*evaluation.stations);
-  if (evaluation.fit) json["fitted_line"] = json_of(*evaluation.fit);
-  if (evaluation.stated) json["stated_ratio"] = json_of(*evaluation.stated);
+  json["horizontal"]["cdf"] = to_json(evaluation.distribution_m);
+  if (evaluation.height_m) json["height"] = to_json(*evaluation.height_m, kMmKeys);
+  if (evaluation.yaw_rad) json["yaw"] = to_json(*evaluation.yaw_rad, kDegKeys);
+  if (evaluation.stations) json["repeated"] = to_json(*evaluation.stations);
+  if (evaluation.fit) json["fitted_line"] = to_json(*evaluation.fit);
+  if (evaluation.normalized_errors) json["stated_ratio"] = to_json(*evaluation.normalized_errors);
   if (evaluation.limit) {
     json["limit"] = {{"ratio", evaluation.limit->horizontal},
-                     {"limit_rms_mm", kMmKeys.of_one * evaluation.limit->limit_m},
-                     {"beaten", evaluation.limit->beaten()},
+                     {"limit_rms_mm", kMmKeys.factor * evaluation.limit->limit_m},
+                     {"beaten", evaluation.limit->is_below_limit()},
                      {"fixes", evaluation.limit->fixes}};
   }
-  if (evaluation.comparison) json["comparison"] = json_of(*evaluation.comparison);
-  json["gates"] = json_of(gates);
+  if (evaluation.comparison) json["comparison"] = to_json(*evaluation.comparison);
+  json["gates"] = to_json(gates);
   json["passed"] = std::none_of(gates.begin(), gates.end(), failed);
   return json.dump(2) + "\n";
 }

@@ -25,6 +25,6 @@ namespace vlp {
 ///   comparison    verdict, pairs, difference, and the smallest difference that matters
 ///   gates         name, unit, value, limit, asked ("at most" or "at least"), passed
 ///   passed        true if all gates are passed
-std::string json_of(const Evaluation& evaluation, const std::vector<CheckedMetric>& gates);
+std::string to_json(const Evaluation& evaluation, const std::vector<CheckedMetric>& gates);
 
 }  // namespace vlp

@@ -9,19 +9,19 @@ namespace {
 
 /// Returns the lower end of the difference's interval, negative if the fixes may be better. Returns
 /// 0 for too few clusters, and for a positive difference too small to matter.
-double worse_m(const Comparison& comparison) {
+double compute_worsening_m(const Comparison& comparison) {
   if (comparison.too_few()) return 0;
   const double low_m = comparison.interval_m->low;
-  return low_m > 0 && low_m <= comparison.least_m ? 0 : low_m;
+  return low_m > 0 && low_m <= comparison.min_relevant_m ? 0 : low_m;
 }
 
 }  // namespace
 
-std::vector<Metric> metrics_of(const Evaluation& evaluation) {
+std::vector<Metric> collect_metrics(const Evaluation& evaluation) {
   std::vector<Metric> metrics;
   const auto add = [&](const char* name, double value) { metrics.push_back({name, value}); };
   const auto add_mm = [&](const char* name, double value_m) { add(name, 1e3 * value_m); };
-  const ErrorFigures& errors_m = evaluation.horizontal_m;
+  const ErrorStatistics& errors_m = evaluation.horizontal_m;
   add_mm("mean_mm", errors_m.mean);
   add_mm("median_mm", errors_m.median);
   add_mm("p90_mm", errors_m.p90);
@@ -33,8 +33,8 @@ std::vector<Metric> metrics_of(const Evaluation& evaluation) {
   }
   if (evaluation.height_m) add_mm("height_rms_mm", evaluation.height_m->sizes.rms);
   if (evaluation.yaw_rad) add("yaw_rms_deg", deg_from_rad(evaluation.yaw_rad->sizes.rms));
-  add("missing", evaluation.missing_share());
-  if (evaluation.stated) add("stated_ratio", evaluation.stated->horizontal);
+  add("missing", evaluation.missing_fraction());
+  if (evaluation.normalized_errors) add("stated_ratio", evaluation.normalized_errors->horizontal);
   if (evaluation.limit) add("limit_ratio", evaluation.limit->horizontal);
   if (const auto& fit = evaluation.fit) {
     add_mm("fitted_mean_mm", fit->distances_m.mean);
@@ -42,7 +42,7 @@ std::vector<Metric> metrics_of(const Evaluation& evaluation) {
     add_mm("fitted_max_mm", fit->distances_m.max);
   }
   if (const auto& comparison = evaluation.comparison; comparison && comparison->pairs > 0) {
-    add_mm("worse_mm", worse_m(*comparison));
+    add_mm("worse_mm", compute_worsening_m(*comparison));
   }
   return metrics;
 }

@@ -11,6 +11,6 @@ namespace vlp {
 
 /// Returns the metrics of MetricSource::evaluation and ::reference that were measured, in their
 /// order.
-std::vector<Metric> metrics_of(const Evaluation& evaluation);
+std::vector<Metric> collect_metrics(const Evaluation& evaluation);
 
 }  // namespace vlp

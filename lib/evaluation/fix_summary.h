@@ -19,7 +19,7 @@ struct FixSummary {
   std::map<std::string, std::size_t> refused;
   /// Statistics over the frames with a fix; std::nullopt if there are none.
   struct Typical {
-    int fewest_lamps, most_lamps;
+    int min_lamps, max_lamps;
     double mean_lamps;
     /// Median over the fixes from three lamps or more; fewer lamps yield no residual.
     std::optional<double> median_residual_px;

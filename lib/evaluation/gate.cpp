@@ -17,7 +17,7 @@ namespace {
 
 constexpr int kDigits = 4;
 
-std::string names_of(const std::vector<MetricKind>& known) {
+std::string join_names(const std::vector<MetricKind>& known) {
   std::string all;
   for (const MetricKind& kind : known) all.append(all.empty() ? "" : ", ").append(kind.name);
   return all;
@@ -28,7 +28,7 @@ std::string with_unit(double value, const std::string& unit) {
 }
 
 /// Returns an error message on an invalid limit; empty if it is valid.
-std::string problem_of(const MetricKind& kind, double limit) {
+std::string describe_invalid_limit(const MetricKind& kind, double limit) {
   constexpr int digits = 6;
   const std::string text = significant(limit, digits);
   if (limit < 0) return "should not be negative, as no figure is to be below zero: " + text;
@@ -40,26 +40,27 @@ std::string problem_of(const MetricKind& kind, double limit) {
          (limit > 100 ? "" : ": for " + text + " % say " + significant(limit / 100, digits));
 }
 
-CheckedMetric checked(const MetricKind& kind, const std::vector<Metric>& metrics) {
-  return {kind.name, kind.unit, value_of(metrics, kind.name), {}, kind.asked};
+CheckedMetric make_checked_metric(const MetricKind& kind, const std::vector<Metric>& metrics) {
+  return {kind.name, kind.unit, find_metric_value(metrics, kind.name), {}, kind.direction};
 }
 
 }  // namespace
 
 double CheckedMetric::acceptance_limit() const {
   const double width = guard ? guard->width() : 0;
-  return asked == Direction::at_least ? limit.value() + width : limit.value() - width;
+  return direction == Direction::at_least ? limit.value() + width : limit.value() - width;
 }
 
-bool CheckedMetric::met() const {
+bool CheckedMetric::passed() const {
   if (!limit) return true;
   if (!value) return false;
-  return asked == Direction::at_least ? *value >= acceptance_limit() : *value <= acceptance_limit();
+  return direction == Direction::at_least ? *value >= acceptance_limit()
+                                          : *value <= acceptance_limit();
 }
 
 std::optional<double> CheckedMetric::conformance_probability() const {
   if (!limit || !value || !guard) return std::nullopt;
-  const double room = asked == Direction::at_least ? *value - *limit : *limit - *value;
+  const double room = direction == Direction::at_least ? *value - *limit : *limit - *value;
   return std::erfc(-room / guard->standard_uncertainty / std::numbers::sqrt2) / 2;
 }
 
@@ -71,19 +72,19 @@ std::string gate_descriptions(const std::vector<MetricKind>& known) {
     std::string name = kind.name;
     name.resize(width + 2, ' ');
     text.append("  ").append(name).append(kind.meaning);
-    text.append(kind.asked == Direction::at_least ? ", at least\n" : "\n");
+    text.append(kind.direction == Direction::at_least ? ", at least\n" : "\n");
   }
   return text;
 }
 
-Gate gate_of(const std::string& text, const std::vector<MetricKind>& known) {
+Gate parse_gate(const std::string& text, const std::vector<MetricKind>& known) {
   const std::size_t sign = text.find('=');
   const std::string name = text.substr(0, sign);
   const auto kind = std::find_if(known.begin(), known.end(),
                                  [&](const MetricKind& each) { return each.name == name; });
   if (kind == known.end()) {
     throw std::invalid_argument("gate '" + name +
-                                "' is not known; the gates are: " + names_of(known));
+                                "' is not known; the gates are: " + join_names(known));
   }
   double limit = 0;
   const char* const end = text.data() + text.size();
@@ -92,17 +93,17 @@ Gate gate_of(const std::string& text, const std::vector<MetricKind>& known) {
   if (failure != std::errc() || stop != end || !std::isfinite(limit)) {
     throw std::invalid_argument("gate '" + text + "' should be NAME=VALUE with a finite number");
   }
-  if (const std::string problem = problem_of(*kind, limit); !problem.empty()) {
+  if (const std::string problem = describe_invalid_limit(*kind, limit); !problem.empty()) {
     throw std::invalid_argument("gate '" + name + "' " + problem);
   }
   return {name, limit};
 }
 
-std::vector<Gate> gates_of(const std::vector<std::string>& texts,
-                           const std::vector<MetricKind>& known) {
+std::vector<Gate> parse_gates(const std::vector<std::string>& texts,
+                              const std::vector<MetricKind>& known) {
   std::vector<Gate> gates;
   for (const std::string& text : texts) {
-    Gate gate = gate_of(text, known);
+    Gate gate = parse_gate(text, known);
     for (const Gate& other : gates) {
       if (other.metric != gate.metric) continue;
       throw std::invalid_argument("gate '" + gate.metric + "' stands twice");
@@ -119,11 +120,11 @@ std::vector<Gate> read_gates(const YamlValue& value, const std::vector<MetricKin
     const auto limit = map.optional(kind.name);
     if (!limit) continue;
     gates.push_back({kind.name, limit->number()});
-    const std::string problem = problem_of(kind, gates.back().limit);
+    const std::string problem = describe_invalid_limit(kind, gates.back().limit);
     if (!problem.empty()) throw limit->error(problem);
   }
   map.finish();
-  if (gates.empty()) throw value.error("holds no gate; the gates are: " + names_of(known));
+  if (gates.empty()) throw value.error("holds no gate; the gates are: " + join_names(known));
   return gates;
 }
 
@@ -153,7 +154,7 @@ std::vector<CheckedMetric> check_gates(const std::vector<Gate>& gates,
   std::vector<CheckedMetric> results;
   results.reserve(gates.size());
   for (const Gate& gate : gates) {
-    results.push_back(checked(metric_kind(gate.metric).value(), metrics));
+    results.push_back(make_checked_metric(metric_kind(gate.metric).value(), metrics));
     results.back().limit = gate.limit;
     results.back().guard = gate.guard;
   }
@@ -165,7 +166,7 @@ std::vector<CheckedMetric> check_all(const std::vector<Gate>& gates,
                                      const std::vector<MetricKind>& known) {
   std::vector<CheckedMetric> results;
   for (const MetricKind& kind : known) {
-    CheckedMetric result = checked(kind, metrics);
+    CheckedMetric result = make_checked_metric(kind, metrics);
     for (const Gate& gate : gates) {
       if (gate.metric != kind.name) continue;
       result.limit = gate.limit;
@@ -176,30 +177,30 @@ std::vector<CheckedMetric> check_all(const std::vector<Gate>& gates,
   return results;
 }
 
-std::string words_of(const CheckedMetric& gate) {
+std::string describe(const CheckedMetric& gate) {
   return gate.name + " is " + (gate.value ? with_unit(*gate.value, gate.unit) : "not known") +
-         ", " + words_of(gate.asked) + " " + with_unit(gate.limit.value(), gate.unit) +
-         words_of_guard(gate) + " is asked for";
+         ", " + describe(gate.direction) + " " + with_unit(gate.limit.value(), gate.unit) +
+         describe_guard_band(gate) + " is asked for";
 }
 
-std::string words_of_guard(const CheckedMetric& gate) {
+std::string describe_guard_band(const CheckedMetric& gate) {
   if (!gate.guard) return "";
-  return std::string(gate.asked == Direction::at_least ? " and" : " less") + " a guard band of " +
-         with_unit(gate.guard->width(), gate.unit);
+  return std::string(gate.direction == Direction::at_least ? " and" : " less") +
+         " a guard band of " + with_unit(gate.guard->width(), gate.unit);
 }
 
-std::string words_of_missed(const std::vector<CheckedMetric>& gates) {
+std::string describe_failed_gates(const std::vector<CheckedMetric>& gates) {
   std::string words;
   for (const CheckedMetric& gate : gates) {
-    if (!gate.met()) words.append(words.empty() ? "" : "; ").append(words_of(gate));
+    if (!gate.passed()) words.append(words.empty() ? "" : "; ").append(describe(gate));
   }
   return words;
 }
 
-std::string cause_of(const CheckedMetric& gate) {
-  if (!gate.value) return words_of(gate);
+std::string describe_failure(const CheckedMetric& gate) {
+  if (!gate.value) return describe(gate);
   const auto kind = metric_kind(gate.name);
-  return std::string(kind ? kind->cause : "a gate is not met") + " (" + words_of(gate) + ")";
+  return std::string(kind ? kind->cause : "a gate is not met") + " (" + describe(gate) + ")";
 }
 
 }  // namespace vlp

@@ -42,14 +42,14 @@ struct CheckedMetric {
   std::optional<double> value;
   /// Limit of the gate; std::nullopt if the metric has no gate.
   std::optional<double> limit;
-  Direction asked;
+  Direction direction;
   std::optional<GuardBand> guard = {};
 
   /// Returns the limit tightened by its guard band.
   /// @pre there is a gate
   double acceptance_limit() const;
   /// Returns true if the gate is passed, or if there is none. A gate without a value is not passed.
-  bool met() const;
+  bool passed() const;
   /// Returns the probability that the true value is within the limit, given only the measured
   /// value: Phi((limit - value) / u), or Phi((value - limit) / u) (JCGM 106:2012, section 7).
   /// Returns std::nullopt without a value, a limit or a guard band.
@@ -62,15 +62,15 @@ std::string gate_descriptions(const std::vector<MetricKind>& known);
 /// Parses "NAME=VALUE".
 /// @throws std::invalid_argument with the valid names, if no kind has the name
 /// @throws std::invalid_argument if the value is not a number from 0 to the kind's largest
-Gate gate_of(const std::string& text, const std::vector<MetricKind>& known);
+Gate parse_gate(const std::string& text, const std::vector<MetricKind>& known);
 
 /// Parses several "NAME=VALUE".
-/// @throws std::invalid_argument as gate_of(), and if a name is repeated
-std::vector<Gate> gates_of(const std::vector<std::string>& texts,
-                           const std::vector<MetricKind>& known);
+/// @throws std::invalid_argument as parse_gate(), and if a name is repeated
+std::vector<Gate> parse_gates(const std::vector<std::string>& texts,
+                              const std::vector<MetricKind>& known);
 
 /// Reads {NAME: LIMIT}, in the order of the kinds.
-/// @throws InputError if a name or limit is invalid as in gate_of(), or if there is no gate
+/// @throws InputError if a name or limit is invalid as in parse_gate(), or if there is no gate
 std::vector<Gate> read_gates(const YamlValue& value, const std::vector<MetricKind>& known);
 
 /// Reads `vlp-gates/1`:
@@ -97,17 +97,17 @@ std::vector<CheckedMetric> check_all(const std::vector<Gate>& gates,
 /// Describes a gate, for example "mean_mm is 1.25 mm, at most 1 mm is asked for", or "at most 1 mm
 /// less a guard band of 0.04 mm".
 /// @pre there is a gate
-std::string words_of(const CheckedMetric& gate);
+std::string describe(const CheckedMetric& gate);
 
 /// Returns " less a guard band of 0.04 mm", or " and ..." for lower limits; empty without a guard
 /// band.
-std::string words_of_guard(const CheckedMetric& gate);
+std::string describe_guard_band(const CheckedMetric& gate);
 
-/// Returns words_of() for all gates that are not passed, separated by "; ".
-std::string words_of_missed(const std::vector<CheckedMetric>& gates);
+/// Returns describe() for all gates that are not passed, separated by "; ".
+std::string describe_failed_gates(const std::vector<CheckedMetric>& gates);
 
-/// Returns the probable cause of a failed gate, followed by words_of(); words_of() alone if the
+/// Returns the probable cause of a failed gate, followed by describe(); describe() alone if the
 /// metric was not measured.
-std::string cause_of(const CheckedMetric& gate);
+std::string describe_failure(const CheckedMetric& gate);
 
 }  // namespace vlp

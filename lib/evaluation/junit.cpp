@@ -36,9 +36,9 @@ std::vector<JUnitTest> make_junit_tests(std::span<const CheckedMetric> gates) {
   tests.reserve(gates.size());
   for (const CheckedMetric& gate : gates) {
     JUnitTest test{gate.name};
-    if (!gate.met()) {
+    if (!gate.passed()) {
       test.result = JUnitTest::Result::failed;
-      test.message = cause_of(gate);
+      test.message = describe_failure(gate);
     }
     tests.push_back(std::move(test));
   }

@@ -18,16 +18,18 @@ void write_limits(const std::filesystem::path& file, const FloorLimits& limits) 
   for (const auto& [name, key] : limits.sources) header.push_back(std::string(key) + "_m");
   header.emplace_back("horizontal_m");
   CsvWriter csv(file, header);
-  const auto at = [](double value) { return significant(value, digits); };
+  const auto format = [](double value) { return significant(value, digits); };
   for (const FloorLimits::Place& place : limits.places) {
     const auto& [position_m, yaw_rad] = place.camera;
-    std::vector<std::string> row{at(position_m.x()), at(position_m.y()), at(position_m.z()),
-                                 at(yaw_rad), std::to_string(place.lamps)};
+    std::vector<std::string> row{format(position_m.x()), format(position_m.y()),
+                                 format(position_m.z()), format(yaw_rad),
+                                 std::to_string(place.lamps)};
     if (!place.parts.empty()) {
       const Eigen::Vector4d sd = place.total().diagonal().cwiseMax(0).cwiseSqrt();
-      for (const double one : sd) row.push_back(at(one));
-      for (const Matrix4& part : place.parts) row.push_back(at(spread_of(part).horizontal_m));
-      row.push_back(at(spread_of(place.total()).horizontal_m));
+      for (const double sd_component : sd) row.push_back(format(sd_component));
+      for (const Matrix4& part : place.parts)
+        row.push_back(format(compute_fix_sds(part).horizontal_m));
+      row.push_back(format(compute_fix_sds(place.total()).horizontal_m));
     }
     row.resize(header.size());
     csv.row(row);

@@ -9,8 +9,8 @@
 namespace vlp {
 namespace {
 
-constexpr double kLargest = 1e6;
-constexpr const char* kOfFixes = "the fixes are worse than was asked for";
+constexpr double kMaxLimit = 1e6;
+constexpr const char* kFixesCause = "the fixes are worse than was asked for";
 
 constexpr std::array kMetricKinds{
     MetricKind{"blur_px", "px", MetricSource::station,
@@ -26,7 +26,7 @@ constexpr std::array kMetricKinds{
                "the lens is not of the type"},
     MetricKind{"board_bend_mm", "mm", MetricSource::station,
                "how far the middle of the board is from flat", "the board is bent",
-               Direction::at_most, kLargest, false},
+               Direction::at_most, kMaxLimit, false},
     MetricKind{"mtf50_asymmetry", "", MetricSource::lens,
                "difference of the MTF50 between directions from the image's middle, over the mean; "
                "needs AprilTags without corner squares",
@@ -65,7 +65,7 @@ constexpr std::array kMetricKinds{
         "expected largest error of a projection over the region where the lens is known, from "
         "the noise of the corners and from the board's print (board_print_px)",
         "the lens is not known well enough: other board views, or a more accurate board",
-        Direction::at_most, kLargest, false},
+        Direction::at_most, kMaxLimit, false},
     MetricKind{"halves_px", "px", MetricSource::lens,
                "difference of the lenses of every other view, rms per axis",
                "two halves of the board views give two lenses"},
@@ -81,9 +81,9 @@ constexpr std::array kMetricKinds{
     MetricKind{"rotation_spread_px", "px", MetricSource::rotation,
                "spread of the centres of the lamps' circles, of the level camera",
                "the circles of the turn have no common centre"},
-    MetricKind{"rotation_sd_px", "px", MetricSource::rotation,
-               "standard deviation of the rotation centre",
-               "the rotation centre is not known well enough", Direction::at_most, kLargest, false},
+    MetricKind{
+        "rotation_sd_px", "px", MetricSource::rotation, "standard deviation of the rotation centre",
+        "the rotation centre is not known well enough", Direction::at_most, kMaxLimit, false},
     MetricKind{"tilt_deg", "deg", MetricSource::rotation,
                "angle between the camera and the axis of rotation", "the camera leans on its mount",
                Direction::at_most, 90},
@@ -92,9 +92,9 @@ constexpr std::array kMetricKinds{
                "the camera sits beside its axis of rotation"},
     MetricKind{"row_time_us", "us", MetricSource::rotation,
                "row time, from the stripes of the lamps", "the row time is not that of the camera",
-               Direction::at_most, kLargest, false},
+               Direction::at_most, kMaxLimit, false},
     MetricKind{"row_time_sd_us", "us", MetricSource::rotation, "standard deviation of the row time",
-               "the row time is not known well enough", Direction::at_most, kLargest, false},
+               "the row time is not known well enough", Direction::at_most, kMaxLimit, false},
     MetricKind{"dispersion_mm", "mm", MetricSource::dispersion,
                "radius of the dispersion circle, before its offset is taken off",
                "the fixes at the station scatter too widely"},
@@ -103,7 +103,7 @@ constexpr std::array kMetricKinds{
                "the fixes at the station turn with the camera"},
     MetricKind{"world_mm", "mm", MetricSource::dispersion,
                "offset of the fixes that does not turn with the camera",
-               "the station or its lamp map is off", Direction::at_most, kLargest, false},
+               "the station or its lamp map is off", Direction::at_most, kMaxLimit, false},
     MetricKind{"check_fixes", "", MetricSource::station,
                "share of the check captures that have a fix", "captures of the check have no fix",
                Direction::at_least, 1},
@@ -120,27 +120,27 @@ constexpr std::array kMetricKinds{
                "largest horizontal error at the known points", "a fix at a known point is off"},
     MetricKind{"check_offset_mm", "mm", MetricSource::station,
                "length of the mean horizontal error", "the known points or the lamps have moved",
-               Direction::at_most, kLargest, false},
+               Direction::at_most, kMaxLimit, false},
     MetricKind{"check_height_mm", "mm", MetricSource::station,
                "rms error of the height at the known points",
                "the heights at the known points are off"},
     MetricKind{"check_residual_px", "px", MetricSource::station,
                "median residual of the fixes at the known points",
                "the lamps do not fit their map"},
-    MetricKind{"mean_mm", "mm", MetricSource::evaluation, "mean horizontal error", kOfFixes},
-    MetricKind{"median_mm", "mm", MetricSource::evaluation, "median horizontal error", kOfFixes},
+    MetricKind{"mean_mm", "mm", MetricSource::evaluation, "mean horizontal error", kFixesCause},
+    MetricKind{"median_mm", "mm", MetricSource::evaluation, "median horizontal error", kFixesCause},
     MetricKind{"p90_mm", "mm", MetricSource::evaluation,
-               "what 90 % of the horizontal errors do not exceed", kOfFixes},
-    MetricKind{"max_mm", "mm", MetricSource::evaluation, "largest horizontal error", kOfFixes},
+               "what 90 % of the horizontal errors do not exceed", kFixesCause},
+    MetricKind{"max_mm", "mm", MetricSource::evaluation, "largest horizontal error", kFixesCause},
     MetricKind{"rms_mm", "mm", MetricSource::evaluation,
-               "root mean square of the horizontal errors", kOfFixes},
+               "root mean square of the horizontal errors", kFixesCause},
     MetricKind{
         "bias_mm", "mm", MetricSource::evaluation,
         "what the fixes of a station share; needs a truth and stations with two fixes or more",
-        kOfFixes},
+        kFixesCause},
     MetricKind{"scatter_mm", "mm", MetricSource::evaluation,
                "of fixes within stations; needs a truth and stations with two fixes or more",
-               kOfFixes},
+               kFixesCause},
     MetricKind{
         "height_rms_mm", "mm", MetricSource::evaluation,
         "root mean square of the height errors; needs z_m in the truth or the path",
@@ -156,13 +156,13 @@ constexpr std::array kMetricKinds{
                "the fixes claim to be better than they are"},
     MetricKind{"limit_ratio", "", MetricSource::reference,
                "horizontal errors / theoretical limit; needs --lamps, --calibration, --noise-px",
-               kOfFixes},
+               kFixesCause},
     MetricKind{"fitted_mean_mm", "mm", MetricSource::reference,
-               "mean distance of the fitted line; needs --line", kOfFixes},
+               "mean distance of the fitted line; needs --line", kFixesCause},
     MetricKind{"fitted_p90_mm", "mm", MetricSource::reference,
-               "what 90 % of those distances do not exceed; needs --line", kOfFixes},
+               "what 90 % of those distances do not exceed; needs --line", kFixesCause},
     MetricKind{"fitted_max_mm", "mm", MetricSource::reference,
-               "the largest of those distances; needs --line", kOfFixes},
+               "the largest of those distances; needs --line", kFixesCause},
     MetricKind{
         "worse_mm", "mm", MetricSource::reference,
         "by how much the mean error is certainly larger than that of --compare (lower end of "
@@ -173,15 +173,15 @@ constexpr std::array kMetricKinds{
 
 }  // namespace
 
-std::string words_of(Direction asked) {
-  return asked == Direction::at_least ? "at least" : "at most";
+std::string describe(Direction required) {
+  return required == Direction::at_least ? "at least" : "at most";
 }
 
 std::vector<MetricKind> metric_kinds(std::initializer_list<MetricSource> sources) {
   std::vector<MetricKind> kinds;
   for (const MetricKind& kind : kMetricKinds) {
-    const bool asked = std::find(sources.begin(), sources.end(), kind.source) != sources.end();
-    if (asked) kinds.push_back(kind);
+    const bool required = std::find(sources.begin(), sources.end(), kind.source) != sources.end();
+    if (required) kinds.push_back(kind);
   }
   return kinds;
 }
@@ -192,7 +192,8 @@ std::optional<MetricKind> metric_kind(const std::string& name) {
   return kind == kMetricKinds.end() ? std::nullopt : std::optional(*kind);
 }
 
-std::optional<double> value_of(const std::vector<Metric>& metrics, const std::string& name) {
+std::optional<double> find_metric_value(const std::vector<Metric>& metrics,
+                                        const std::string& name) {
   for (const Metric& metric : metrics) {
     if (metric.name == name && std::isfinite(metric.value)) return metric.value;
   }

@@ -27,7 +27,7 @@ enum class MetricSource {
 enum class Direction { at_most, at_least };
 
 /// Returns "at most" or "at least".
-std::string words_of(Direction asked);
+std::string describe(Direction direction);
 
 /// Metric that can be measured and that a gate may limit.
 struct MetricKind {
@@ -39,7 +39,7 @@ struct MetricKind {
   const char* meaning;
   /// Probable cause of a failed gate, for humans: "the lens is decentred".
   const char* cause;
-  Direction asked = Direction::at_most;
+  Direction direction = Direction::at_most;
   /// Largest valid limit: 1 for a fraction.
   double largest = 1e6;
   /// True for a property of the camera; false for one of the equipment or the procedure.
@@ -59,6 +59,7 @@ struct Metric {
 };
 
 /// Returns the value of a metric; std::nullopt if it was not measured or is not finite.
-std::optional<double> value_of(const std::vector<Metric>& metrics, const std::string& name);
+std::optional<double> find_metric_value(const std::vector<Metric>& metrics,
+                                        const std::string& name);
 
 }  // namespace vlp

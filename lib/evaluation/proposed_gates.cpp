@@ -43,17 +43,17 @@ std::optional<ErrorIntervals> compute_intervals(
     const std::vector<FixError>& errors,
     const std::function<std::optional<double>(const FixError&)>& size_of, int threads) {
   std::vector<double> sizes;
-  std::vector<std::size_t> units;
+  std::vector<std::size_t> clusters;
   sizes.reserve(errors.size());
-  units.reserve(errors.size());
+  clusters.reserve(errors.size());
   for (const FixError& error : errors) {
     if (const auto size = size_of(error)) {
       sizes.push_back(std::abs(*size));
-      units.push_back(error.unit);
+      clusters.push_back(error.cluster);
     }
   }
   if (sizes.empty()) return std::nullopt;
-  return error_intervals(sizes, units, threads);
+  return compute_error_intervals(sizes, clusters, threads);
 }
 
 }  // namespace
@@ -71,7 +71,7 @@ std::vector<Gate> propose_gates(const EvaluationInput& input, const Evaluation& 
   if (const auto& p90_m = horizontal_m.p90) {
     add("p90_mm", evaluation.horizontal_m.p90, *p90_m, millimetres);
   }
-  const std::vector<FixError> errors = errors_of(input, input.fixes).errors;
+  const std::vector<FixError> errors = compute_errors(input, input.fixes).errors;
   const auto height_m = compute_intervals(
       errors, [](const FixError& error) { return error.height_m; }, input.threads);
   if (height_m) add("height_rms_mm", evaluation.height_m->sizes.rms, height_m->rms, millimetres);
@@ -79,7 +79,7 @@ std::vector<Gate> propose_gates(const EvaluationInput& input, const Evaluation& 
       errors, [](const FixError& error) { return error.yaw_rad; }, input.threads);
   if (yaw_rad) add("yaw_rms_deg", evaluation.yaw_rad->sizes.rms, yaw_rad->rms, degrees);
   constexpr double millionth = 1e-6;  // resolution of the written limit
-  gates.push_back({"missing", millionth * std::ceil(evaluation.missing_share() / millionth)});
+  gates.push_back({"missing", millionth * std::ceil(evaluation.missing_fraction() / millionth)});
   return gates;
 }
 
@@ -91,10 +91,10 @@ std::string format_gates(const std::vector<Gate>& gates, const Evaluation& evalu
       "the fraction of this run.\n"
       "format: vlp-gates/1\ngates:\n",
       evaluation.fixes, evaluation.captures);
-  const std::vector<Metric> metrics = metrics_of(evaluation);
+  const std::vector<Metric> metrics = collect_metrics(evaluation);
   for (const Gate& gate : gates) {
     text += fmt::format("  {}: {:.6g}  # {:.4g} measured\n", gate.metric, gate.limit,
-                        value_of(metrics, gate.metric).value_or(0));
+                        find_metric_value(metrics, gate.metric).value_or(0));
   }
   return text;
 }

@@ -10,28 +10,29 @@ namespace vlp {
 namespace {
 
 /// Number of clusters from which percentile intervals are nearly as wide as they should be, see
-/// error_intervals().
-constexpr std::size_t kEnoughUnits = 50;
+/// compute_error_intervals().
+constexpr std::size_t kSufficientClusters = 50;
 
-std::string so_few(std::size_t units, const std::string& drawn) {
-  return "of so few as " + std::to_string(units) + " " + drawn + " ";
+std::string describe_few(std::size_t clusters, const std::string& resampling_unit) {
+  return "of so few as " + std::to_string(clusters) + " " + resampling_unit + " ";
 }
 
 }  // namespace
 
-std::string unasked_missing(const Evaluation& evaluation, const std::vector<CheckedMetric>& gates) {
+std::string make_missing_fixes_warning(const Evaluation& evaluation,
+                                       const std::vector<CheckedMetric>& gates) {
   const std::size_t missing = evaluation.captures - evaluation.fixes;
-  const bool asked = std::any_of(gates.begin(), gates.end(),
-                                 [](const CheckedMetric& gate) { return gate.name == "missing"; });
-  if (gates.empty() || missing == 0 || asked) return "";
+  const bool has_gate = std::any_of(
+      gates.begin(), gates.end(), [](const CheckedMetric& gate) { return gate.name == "missing"; });
+  if (gates.empty() || missing == 0 || has_gate) return "";
   return std::to_string(missing) + " of " + std::to_string(evaluation.captures) +
          (missing == 1 ? " captures has" : " captures have") +
          " no fix, and no gate 'missing' asks";
 }
 
-std::string warning_of_limit(const Evaluation& evaluation) {
+std::string make_limit_warning(const Evaluation& evaluation) {
   const auto& limit = evaluation.limit;
-  if (!limit || !limit->beaten()) return "";
+  if (!limit || !limit->is_below_limit()) return "";
   constexpr int digits = 3;
   return "the errors are " + significant(limit->horizontal, digits) +
          " times the theoretical limit: either the noise of a lamp's pixel is stated too large, or "
@@ -39,25 +40,27 @@ std::string warning_of_limit(const Evaluation& evaluation) {
          "(other frames, a known height, lamps partly in view, a camera that leans)";
 }
 
-std::vector<std::string> sample_size_warnings(const Evaluation& evaluation) {
+std::vector<std::string> make_sample_size_warnings(const Evaluation& evaluation) {
   std::vector<std::string> warnings;
-  const std::string& drawn = evaluation.drawn;
+  const std::string& resampling_unit = evaluation.resampling_unit;
   if (const auto& intervals = evaluation.intervals_m; !intervals) {
-    warnings.push_back("there are too few " + drawn + " with a fix for intervals");
-  } else if (intervals->units < (evaluation.against == "truth" ? kEnoughUnits : kPathRuns)) {
+    warnings.push_back("there are too few " + resampling_unit + " with a fix for intervals");
+  } else if (intervals->clusters <
+             (evaluation.reference == "truth" ? kSufficientClusters : kPathRuns)) {
     const std::string p90 =
         intervals->p90 ? ", that of p90 most"
-                       : ", and p90 has none, which takes " + std::to_string(kFewestUnitsOfP90);
-    warnings.push_back(so_few(intervals->units, drawn) + "intervals are somewhat too narrow" + p90);
+                       : ", and p90 has none, which takes " + std::to_string(kMinClustersForP90);
+    warnings.push_back(describe_few(intervals->clusters, resampling_unit) +
+                       "intervals are somewhat too narrow" + p90);
   }
   if (const auto& comparison = evaluation.comparison; !comparison) {
     return warnings;
   } else if (comparison->too_few()) {
-    warnings.push_back(so_few(comparison->units, drawn) +
+    warnings.push_back(describe_few(comparison->clusters, resampling_unit) +
                        "with a fix in both files a comparison is no evidence, which takes " +
-                       std::to_string(kFewestUnitsCompared));
-  } else if (comparison->units < kEnoughUnits) {
-    warnings.push_back(so_few(comparison->units, drawn) +
+                       std::to_string(kMinClustersCompared));
+  } else if (comparison->clusters < kSufficientClusters) {
+    warnings.push_back(describe_few(comparison->clusters, resampling_unit) +
                        "with a fix in both files the difference's interval is somewhat too narrow");
   }
   return warnings;

@@ -13,16 +13,17 @@ namespace vlp {
 /// Returns, for example, "393 of 432 captures have no fix, and no gate 'missing' asks". Returns an
 /// empty text if every capture has a fix or if a gate limits `missing`. Empty without gates, too,
 /// as no run passes then.
-std::string unasked_missing(const Evaluation& evaluation, const std::vector<CheckedMetric>& gates);
+std::string make_missing_fixes_warning(const Evaluation& evaluation,
+                                       const std::vector<CheckedMetric>& gates);
 
 /// Returns a warning if the errors are below the theoretical limit, without a full stop; empty
 /// otherwise. Either the assumed pixel noise is too large, or the fixes use more information than
 /// one image of a level camera.
-std::string warning_of_limit(const Evaluation& evaluation);
+std::string make_limit_warning(const Evaluation& evaluation);
 
 /// Returns warnings about intervals and verdicts from few stations or captures, one line each
 /// without a full stop. For a comparison, clusters of the pairs count. Returns none for 50 clusters
 /// or more.
-std::vector<std::string> sample_size_warnings(const Evaluation& evaluation);
+std::vector<std::string> make_sample_size_warnings(const Evaluation& evaluation);
 
 }  // namespace vlp

@@ -19,7 +19,7 @@ namespace {
 /// Number of fractional bits of OpenCV's drawing coordinates.
 constexpr int kShift = 8;
 
-cv::Scalar color_of(LightKind kind) {
+cv::Scalar choose_color(LightKind kind) {
   switch (kind) {
     case LightKind::lamp:
       return {80, 255, 80};
@@ -35,7 +35,7 @@ cv::Scalar color_of(LightKind kind) {
   return {};
 }
 
-std::string label_of(const Light& light) {
+std::string make_label(const Light& light) {
   switch (light.kind) {
     case LightKind::lamp:
       return std::to_string(*light.lamp);
@@ -44,7 +44,7 @@ std::string label_of(const Light& light) {
     case LightKind::unknown:
     case LightKind::steady:
     case LightKind::formless:
-      return fmt::format("{}: {}", name_of(light.kind), name_of(light.reason));
+      return fmt::format("{}: {}", to_string(light.kind), to_string(light.reason));
   }
   return {};
 }
@@ -69,7 +69,7 @@ cv::Mat brightened(const cv::Mat& image) {
 
 /// Draws a text next to a light, on the side with enough space.
 void write_label(cv::Mat& picture, const Light& light, double size) {
-  const std::string label = label_of(light);
+  const std::string label = make_label(light);
   const int thickness = static_cast<int>(std::lround(size));
   const double scale = 0.5 * size;
   const cv::Size box = cv::getTextSize(label, cv::FONT_HERSHEY_SIMPLEX, scale, thickness, nullptr);
@@ -79,17 +79,17 @@ void write_label(cv::Mat& picture, const Light& light, double size) {
   const int bottom = std::clamp(static_cast<int>(light.pixel.y()) + box.height / 2, box.height,
                                 std::max(box.height, picture.rows - 1));
   cv::putText(picture, label, {std::max(0, left), bottom}, cv::FONT_HERSHEY_SIMPLEX, scale,
-              color_of(light.kind), thickness, cv::LINE_AA);
+              choose_color(light.kind), thickness, cv::LINE_AA);
 }
 
 }  // namespace
 
-cv::Mat annotated(const cv::Mat& image, const std::vector<Light>& lights, Readout readout) {
+cv::Mat render_annotated(const cv::Mat& image, const std::vector<Light>& lights, Readout readout) {
   cv::Mat picture = brightened(image);
   const double size = std::max(1.0, picture.cols / 1000.0);  // of letters and crosses
   const int thickness = static_cast<int>(std::lround(size));
   for (const Light& light : lights) {
-    const cv::Scalar color = color_of(light.kind);
+    const cv::Scalar color = choose_color(light.kind);
     for (const EdgePoint& edge : light.outline) {
       const Eigen::Vector2d at =
           readout == Readout::rows ? edge.pixel : Eigen::Vector2d(edge.pixel.reverse());

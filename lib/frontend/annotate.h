@@ -16,7 +16,7 @@ namespace vlp {
 /// yellow, unknown ones red, unmodulated ones blue, and lights without outline grey.
 ///
 /// @param image  one channel of 8 or 16 bits
-cv::Mat annotated(const cv::Mat& image, const std::vector<Light>& lights, Readout readout);
+cv::Mat render_annotated(const cv::Mat& image, const std::vector<Light>& lights, Readout readout);
 
 /// Writes an annotated image atomically as PNG into `folder`, named like the image with `.png`
 /// appended.

@@ -27,22 +27,24 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Returns the box around the corners of the board; the whole image if there are none.
-cv::Rect find_board_region(const SeenBoard& seen, const cv::Mat& image) {
+cv::Rect find_board_region(const BoardDetection& seen, const cv::Mat& image) {
   std::vector<cv::Point2f> corners;
   const auto add = [&](const Eigen::Vector2d& pixel) {
     corners.emplace_back(static_cast<float>(pixel.x()), static_cast<float>(pixel.y()));
   };
-  for (const SeenTag& tag : seen.tags) {
+  for (const TagDetection& tag : seen.tags) {
     for (const auto& corner : tag.corners_px) add(corner);
   }
-  for (const SeenPoint& point : seen.points) add(point.pixel);
+  for (const PointDetection& point : seen.points) add(point.pixel);
   return corners.empty() ? cv::Rect({}, image.size()) : cv::boundingRect(corners);
 }
 
 /// Returns true if most of the tags that cannot be used are overexposed.
-bool are_tags_overexposed(const SeenBoard& seen) { return 2 * seen.overexposed > seen.unusable; }
+bool are_tags_overexposed(const BoardDetection& seen) {
+  return 2 * seen.overexposed > seen.unusable;
+}
 
-std::string describe_too_few_corners(const Board& board, const SeenBoard& seen) {
+std::string describe_too_few_corners(const Board& board, const BoardDetection& seen) {
   if (board.kind == BoardKind::chessboard && seen.points.empty()) {
     return "the chessboard is not seen as a whole";
   }
@@ -82,7 +84,7 @@ void reject_other_sizes(std::vector<Observation>& images) {
 
 bool is_upside_down(const BoardView& view) {
   double down_px = 0;
-  for (const SeenTag& tag : view.seen.tags) {
+  for (const TagDetection& tag : view.seen.tags) {
     down_px +=
         (tag.corners_px[0] - tag.corners_px[3]).y() + (tag.corners_px[1] - tag.corners_px[2]).y();
   }
@@ -142,8 +144,8 @@ IntakeFailure explain_no_chessboard(const std::vector<fs::path>& images, const B
   std::array<int, 2> largest{0, 0};
   std::size_t inspected = 0;
   inspect_samples(images, options, [&](const SourceImage&, const cv::Mat& image) {
-    const auto shown = chessboard_shown(image);
-    if (shown[0] * shown[1] > largest[0] * largest[1]) largest = shown;
+    const auto description = count_chessboard_squares(image);
+    if (description[0] * description[1] > largest[0] * largest[1]) largest = description;
     return ++inspected < num_samples;
   });
   // The board may be rotated by 90 degrees.
@@ -178,15 +180,15 @@ IntakeFailure explain_no_board(const std::vector<fs::path>& images, const Board&
     overexposed += view.seen.overexposed;
   }
   double white = 0;
-  std::string shown;
-  fs::path shown_in;
+  std::string description;
+  fs::path described_file;
   int inspected = 0;
   inspect_samples(images, options, [&](const SourceImage& source, const cv::Mat& image) {
     constexpr int num_samples = 3;
     white = std::max(white, white_fraction(image, cv::Rect({}, image.size())));
-    shown = other_tags(board, image);
-    shown_in = source.file;
-    return shown.empty() && ++inspected < num_samples;
+    description = describe_other_tags(board, image);
+    described_file = source.file;
+    return description.empty() && ++inspected < num_samples;
   });
   constexpr double max_white = 0.1;
   if (white > max_white || (overexposed > 0 && 2 * overexposed > unusable)) {
@@ -194,10 +196,10 @@ IntakeFailure explain_no_board(const std::vector<fs::path>& images, const Board&
         "no tag of the board can be used in {} images, and {:.0f} % of the image is overexposed: "
         "white runs over the tags' corners; expose shorter",
         views.size(), 100 * white);
-    if (!shown.empty()) message += "; or is board.yaml wrong? " + shown;
+    if (!description.empty()) message += "; or is board.yaml wrong? " + description;
     return {false, std::move(message)};
   }
-  if (!shown.empty()) return {true, shown_in.string() + ": " + shown, board_file};
+  if (!description.empty()) return {true, described_file.string() + ": " + description, board_file};
   if (unusable > 0) {
     return {false, fmt::format(
                        "{} tags of the board are seen in {} images, but none with all four corners "
@@ -212,7 +214,7 @@ IntakeFailure explain_no_board(const std::vector<fs::path>& images, const Board&
             fmt::format("the images show tags of {}, but with other ids than the board has, "
                         "{} to {} ({} of them in {}){}",
                         board.family, board.first_id,
-                        board.first_id + static_cast<int>(board_layout(board).size()) - 1,
+                        board.first_id + static_cast<int>(compute_board_layout(board).size()) - 1,
                         foreign->seen.foreign.size(), foreign->image,
                         layout.empty() ? "" : "; " + layout),
             board_file};
@@ -226,9 +228,9 @@ IntakeFailure explain_no_board(const std::vector<fs::path>& images, const Board&
 /// Rejects corners that contradict their neighbors. A tag is rejected as a whole.
 void remove_blunders(const BoardLattice& lattice, BoardView& view,
                      std::vector<std::string>& warnings) {
-  const auto blunders = corner_blunders(lattice.corners(view.seen));
+  const auto blunders = find_corner_outliers(lattice.corners(view.seen));
   if (blunders.empty()) return;
-  const auto corners = corners_of(view.seen);
+  const auto corners = collect_corners(view.seen);
   const Eigen::Vector2d first = corners[blunders.front()].pixel;
   warnings.push_back(fmt::format(
       "{}: {} of its {} corners are not where their neighbours predict them, the first at "
@@ -250,8 +252,8 @@ bool is_mrcal_table(const fs::path& file) { return file.extension() == ".vnl"; }
 
 /// Rejects an image with too few corners to determine the pose of the board.
 void reject_few_corners(const Board& board, const BoardLattice& lattice, Observation& image) {
-  const SeenBoard& seen = image.board->seen;
-  if (lattice.enough(seen)) return;
+  const BoardDetection& seen = image.board->seen;
+  if (lattice.sufficient(seen)) return;
   if (!seen.any() && !seen.foreign.empty()) {
     return image.reject(RejectionReason::other_board, "shows tags that the board does not have");
   }
@@ -300,7 +302,7 @@ Observation BoardIntake::observe(const SourceImage& source) const {
 
 void BoardIntake::reject_poor(Observation& image, double bright_fraction,
                               double white_fraction) const {
-  const SeenBoard& seen = image.board->seen;
+  const BoardDetection& seen = image.board->seen;
   if (white_fraction > options_.max_white_fraction) {
     return image.reject(
         RejectionReason::overexposed,
@@ -308,7 +310,7 @@ void BoardIntake::reject_poor(Observation& image, double bright_fraction,
                     100 * white_fraction, seen.any() ? "board" : "image",
                     100 * options_.max_white_fraction));
   }
-  if (!lattice_.enough(seen) && bright_fraction < options_.min_bright_fraction) {
+  if (!lattice_.sufficient(seen) && bright_fraction < options_.min_bright_fraction) {
     return image.reject(RejectionReason::too_dark,
                         fmt::format("too dark: the brightest 1 % reach {:.0f} % of the full scale, "
                                     "{:.0f} % at least",
@@ -344,7 +346,7 @@ Observations observe_boards(const std::vector<fs::path>& images, const Board& bo
   return result;
 }
 
-bool holds_corners(const fs::path& file) {
+bool is_corner_file(const fs::path& file) {
   return is_mrcal_table(file) || file.extension() == ".csv";
 }
 

@@ -52,7 +52,7 @@ Observations observe_boards(const std::vector<std::filesystem::path>& images, co
                             const IntakeProgress& progress = {});
 
 /// Returns true if the extension is that of a file of corners: .vnl of mrcal, or .csv.
-bool holds_corners(const std::filesystem::path& file);
+bool is_corner_file(const std::filesystem::path& file);
 
 /// Reads the corners of a board from a file of mrcal (read_corners()) or from a table
 /// (read_corner_table()), instead of images of size `imager_px`. Selects views as observe_boards()

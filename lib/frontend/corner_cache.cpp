@@ -21,11 +21,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string settings_of(const Board& board) {
-  std::string settings =
-      fmt::format("11 {} {} {} {} {} {} {} {} {} {}", VLP_VERSION, board.family, board.cols,
-                  board.rows, shortest(board.tag_size_m), shortest(board.tag_spacing),
-                  board.border_bits, board.corner_squares, board.first_id, name_of(board.id_order));
+std::string describe_settings(const Board& board) {
+  std::string settings = fmt::format(
+      "11 {} {} {} {} {} {} {} {} {} {}", VLP_VERSION, board.family, board.cols, board.rows,
+      shortest(board.tag_size_m), shortest(board.tag_spacing), board.border_bits,
+      board.corner_squares, board.first_id, to_string(board.id_order));
   if (board.has_squares()) {
     settings += fmt::format(" {} {} {}", static_cast<int>(board.kind),
                             shortest(board.square_size_m), board.top_left_white);
@@ -41,21 +41,21 @@ constexpr std::array kColumns{
     "dark2", "bright2", "blur3",   "dark3",   "bright3"};
 
 /// Returns a row that is padded with zeros.
-std::vector<std::string> row_of(std::vector<std::string> begin) {
+std::vector<std::string> make_row(std::vector<std::string> begin) {
   begin.resize(kColumns.size(), "0");
   return begin;
 }
 
-std::vector<std::string> row_of(int id, const SeenTag::Outline& outline) {
+std::vector<std::string> make_row(int id, const TagDetection::Outline& outline) {
   std::vector<std::string> row{std::to_string(id)};
   for (const Eigen::Vector2d& pixel : outline.corners_px) {
     row.push_back(shortest(pixel.x()));
     row.push_back(shortest(pixel.y()));
   }
-  for (const auto& [square_px, cube_px, reach] : outline.bows) {
-    row.insert(row.end(), {shortest(square_px), shortest(cube_px), shortest(reach)});
+  for (const auto& [quadratic_px, cubic_px, reach] : outline.curvatures) {
+    row.insert(row.end(), {shortest(quadratic_px), shortest(cubic_px), shortest(reach)});
   }
-  for (const double sd_px : outline.sds_px) row.push_back(shortest(sd_px));
+  for (const double sd_px : outline.corner_sds_px) row.push_back(shortest(sd_px));
   for (const auto& [blur_px, dark, bright] : outline.steps) {
     row.insert(row.end(), {shortest(blur_px), shortest(dark), shortest(bright)});
   }
@@ -73,26 +73,27 @@ void write_view(const fs::path& file, const CachedView& cached) {
   const BoardView& view = cached.view;
   CsvWriter csv(file, {kColumns.begin(), kColumns.end()});
   csv.row(
-      row_of({"-1", std::to_string(view.imager_px[0]), std::to_string(view.imager_px[1]),
-              std::to_string(view.seen.foreign.size()), std::to_string(view.seen.unusable),
-              std::to_string(view.seen.overexposed), std::to_string(view.seen.points.size()),
-              std::to_string(view.seen.tags.size()), std::to_string(view.seen.curve_costs.size()),
-              shortest(cached.blur_px.value_or(-1)), shortest(cached.bright_fraction),
-              shortest(cached.white_fraction)}));
+      make_row({"-1", std::to_string(view.imager_px[0]), std::to_string(view.imager_px[1]),
+                std::to_string(view.seen.foreign.size()), std::to_string(view.seen.unusable),
+                std::to_string(view.seen.overexposed), std::to_string(view.seen.points.size()),
+                std::to_string(view.seen.tags.size()), std::to_string(view.seen.curve_costs.size()),
+                shortest(cached.blur_px.value_or(-1)), shortest(cached.bright_fraction),
+                shortest(cached.white_fraction)}));
   for (const auto* tags : {&view.seen.tags, &view.seen.foreign}) {
-    for (const SeenTag& tag : *tags) {
-      csv.row(row_of(tag.id, {tag.corners_px, tag.bows, tag.sds_px, tag.steps}));
+    for (const TagDetection& tag : *tags) {
+      csv.row(make_row(tag.id, {tag.corners_px, tag.curvatures, tag.corner_sds_px, tag.steps}));
     }
   }
-  for (const SeenPoint& point : view.seen.points) {
-    csv.row(row_of(
+  for (const PointDetection& point : view.seen.points) {
+    csv.row(make_row(
         {std::to_string(point.index), shortest(point.pixel.x()), shortest(point.pixel.y())}));
   }
   for (const double cost : view.seen.curve_costs) {
-    csv.row(row_of({"-1", shortest(cost)}));
+    csv.row(make_row({"-1", shortest(cost)}));
   }
-  for (const SeenTag& tag : view.seen.tags) {
-    for (const SeenTag::Outline& outline : tag.behind_curves) csv.row(row_of(tag.id, outline));
+  for (const TagDetection& tag : view.seen.tags) {
+    for (const TagDetection::Outline& outline : tag.tone_curve_fits)
+      csv.row(make_row(tag.id, outline));
   }
   csv.save_unsynced();
 }
@@ -116,14 +117,14 @@ CachedView read_view(const fs::path& file, const std::string& image) {
   if (1 + tags_seen + foreign + points + curves + behind * tags_seen != rows) {
     throw InputError(file, "is not of the cache");
   }
-  const auto outline_of = [&](std::size_t row) {
-    SeenTag::Outline outline;
+  const auto read_outline = [&](std::size_t row) {
+    TagDetection::Outline outline;
     for (std::size_t k = 0; k < 4; ++k) {
       outline.corners_px[k] = {at(row, kColumns[1 + 2 * k]), at(row, kColumns[2 + 2 * k])};
       const std::size_t bow = 9 + 3 * k;
-      outline.bows[k] = {at(row, kColumns[bow]), at(row, kColumns[bow + 1]),
-                         at(row, kColumns[bow + 2])};
-      outline.sds_px[k] = at(row, kColumns[21 + k]);
+      outline.curvatures[k] = {at(row, kColumns[bow]), at(row, kColumns[bow + 1]),
+                               at(row, kColumns[bow + 2])};
+      outline.corner_sds_px[k] = at(row, kColumns[21 + k]);
       const std::size_t step = 25 + 3 * k;
       outline.steps[k] = {at(row, kColumns[step]), at(row, kColumns[step + 1]),
                           at(row, kColumns[step + 2])};
@@ -133,22 +134,23 @@ CachedView read_view(const fs::path& file, const std::string& image) {
   std::size_t row = 1;
   for (const std::size_t end = row + tags_seen + foreign; row < end; ++row) {
     auto& tags = row <= tags_seen ? view.seen.tags : view.seen.foreign;
-    const auto [corners_px, bows, sds_px, steps] = outline_of(row);
-    tags.push_back({static_cast<int>(at(row, "id")), corners_px, bows, sds_px, {}, steps});
+    const auto [corners_px, curvatures, corner_sds_px, steps] = read_outline(row);
+    tags.push_back(
+        {static_cast<int>(at(row, "id")), corners_px, curvatures, corner_sds_px, {}, steps});
   }
   for (const std::size_t end = row + points; row < end; ++row) {
     view.seen.points.push_back(
         {static_cast<std::size_t>(at(row, "id")), {at(row, "u0"), at(row, "v0")}});
   }
   for (std::size_t i = 0; i < curves; ++i) view.seen.curve_costs.push_back(at(row++, "u0"));
-  for (SeenTag& tag : view.seen.tags) {
-    for (std::size_t i = 0; i < behind; ++i) tag.behind_curves.push_back(outline_of(row++));
+  for (TagDetection& tag : view.seen.tags) {
+    for (std::size_t i = 0; i < behind; ++i) tag.tone_curve_fits.push_back(read_outline(row++));
   }
   return {std::move(view), blur_px < 0 ? std::nullopt : std::optional(blur_px), at(0, "cube0"),
           at(0, "reach0")};
 }
 
-std::string digest_of(const SourceImage& image) {
+std::string compute_digest(const SourceImage& image) {
   if (image.frame.empty()) return sha256_of_file(image.file);
   const cv::Mat levels = image.frame.isContinuous() ? image.frame : image.frame.clone();
   const std::string bytes(levels.ptr<char>(), levels.total() * levels.elemSize());
@@ -162,21 +164,21 @@ BoardCache corner_cache(const fs::path& folder, const Board& board) {
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) throw InputError(folder, "cannot be made: " + error.message());
-  const auto place_of = [folder, settings = settings_of(board)](const SourceImage& image) {
-    return folder / (sha256_of_text(digest_of(image) + " " + settings) + ".csv");
+  const auto make_path = [folder, settings = describe_settings(board)](const SourceImage& image) {
+    return folder / (sha256_of_text(compute_digest(image) + " " + settings) + ".csv");
   };
-  const auto find = [place_of](const SourceImage& image) -> std::optional<CachedView> {
+  const auto find = [make_path](const SourceImage& image) -> std::optional<CachedView> {
     try {
-      const fs::path file = place_of(image);
+      const fs::path file = make_path(image);
       if (!fs::exists(file)) return {};
       return read_view(file, image.file.filename().string());
     } catch (const InputError&) {
       return {};
     }
   };
-  const auto keep = [place_of](const SourceImage& image, const CachedView& view) {
+  const auto keep = [make_path](const SourceImage& image, const CachedView& view) {
     try {
-      write_view(place_of(image), view);
+      write_view(make_path(image), view);
     } catch (const InputError&) {  // a full disk; the view itself is there
     }
   };

@@ -61,7 +61,7 @@ cv::Mat read_image(const fs::path& file, double max_mpx) {
   const char* const cut = "cannot be read as an image: it is cut short";
   if (is_cut_jpeg(bytes)) throw InputError(file, cut);
   // Other formats are rejected, because the memory that they need is unknown before decoding.
-  const auto size = size_in_header(bytes);
+  const auto size = read_header_size(bytes);
   if (!size) {
     throw InputError(file, has_image_signature(bytes)
                                ? "cannot be read as an image: it is cut short or damaged"

@@ -26,14 +26,16 @@ std::optional<std::int64_t> number_at(std::string_view bytes, std::size_t at, st
   return value;
 }
 
-Size pair_of(const std::optional<std::int64_t>& width, const std::optional<std::int64_t>& height) {
+Size make_size(const std::optional<std::int64_t>& width,
+               const std::optional<std::int64_t>& height) {
   if (!width || !height) return {};
   return std::array{*width, *height};
 }
 
 /// Reads the size from the first chunk, IHDR. Its length and type follow the signature of 8 bytes.
 Size png_size(std::string_view bytes) {
-  return pair_of(number_at(bytes, 16, 4, ByteOrder::big), number_at(bytes, 20, 4, ByteOrder::big));
+  return make_size(number_at(bytes, 16, 4, ByteOrder::big),
+                   number_at(bytes, 20, 4, ByteOrder::big));
 }
 
 /// Reads the size of a BMP. A negative height means that rows are stored from the top.
@@ -41,8 +43,8 @@ Size bmp_size(std::string_view bytes) {
   const auto header = number_at(bytes, 14, 4, ByteOrder::little);
   constexpr std::int64_t oldest = 12;  // of OS/2, with sizes of two bytes
   if (header == oldest) {
-    return pair_of(number_at(bytes, 18, 2, ByteOrder::little),
-                   number_at(bytes, 20, 2, ByteOrder::little));
+    return make_size(number_at(bytes, 18, 2, ByteOrder::little),
+                     number_at(bytes, 20, 2, ByteOrder::little));
   }
   const auto signed_at = [&](std::size_t at) -> std::optional<std::int64_t> {
     const auto value = number_at(bytes, at, 4, ByteOrder::little);
@@ -50,7 +52,7 @@ Size bmp_size(std::string_view bytes) {
     const auto with_sign = static_cast<std::int32_t>(*value);
     return with_sign < 0 ? -static_cast<std::int64_t>(with_sign) : with_sign;
   };
-  return pair_of(signed_at(18), signed_at(22));
+  return make_size(signed_at(18), signed_at(22));
 }
 
 /// Reads the frame header, SOF: FF C0 to FF CF but for C4, C8 and CC. The segments before it are
@@ -76,8 +78,8 @@ Size jpeg_size(std::string_view bytes) {
     const bool frame =
         marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc;
     if (frame) {
-      return pair_of(number_at(bytes, at + 7, 2, ByteOrder::big),
-                     number_at(bytes, at + 5, 2, ByteOrder::big));
+      return make_size(number_at(bytes, at + 7, 2, ByteOrder::big),
+                       number_at(bytes, at + 5, 2, ByteOrder::big));
     }
     if (!length || *length < 2) return {};
     at += 2 + static_cast<std::size_t>(*length);
@@ -118,7 +120,7 @@ Size tiff_size(std::string_view bytes, const TiffLayout& layout) {
     if (!size) size = number_at(bytes, entry + layout.value_at, value_bytes, order);
     if (!size) return {};
   }
-  return pair_of(width, height);
+  return make_size(width, height);
 }
 
 bool is_pnm(std::string_view bytes) {
@@ -135,15 +137,16 @@ Size pnm_size(std::string_view bytes) {
       at = bytes[at] == '#' ? std::min(bytes.find('\n', at), bytes.size()) : at + 1;
     }
     std::int64_t value = 0;
-    const std::string_view rest = bytes.substr(at);
-    const auto [stop, failure] = std::from_chars(rest.data(), rest.data() + rest.size(), value);
+    const std::string_view remaining = bytes.substr(at);
+    const auto [stop, failure] =
+        std::from_chars(remaining.data(), remaining.data() + remaining.size(), value);
     // A number at the very end may be cut short.
-    if (failure != std::errc() || stop == rest.data() + rest.size()) return {};
-    at += static_cast<std::size_t>(stop - rest.data());
+    if (failure != std::errc() || stop == remaining.data() + remaining.size()) return {};
+    at += static_cast<std::size_t>(stop - remaining.data());
     return value;
   };
   const auto width = next();
-  return pair_of(width, next());
+  return make_size(width, next());
 }
 
 }  // namespace
@@ -157,7 +160,7 @@ bool has_image_signature(std::string_view bytes) {
          });
 }
 
-Size size_in_header(std::string_view bytes) {
+Size read_header_size(std::string_view bytes) {
   using namespace std::string_view_literals;
   if (bytes.starts_with("\x89PNG\r\n\x1a\n"sv)) return png_size(bytes);
   if (bytes.starts_with("\xff\xd8"sv)) return jpeg_size(bytes);

@@ -28,7 +28,7 @@ ImageSource::ImageSource(std::vector<std::filesystem::path> files, const Fronten
     check_imager(file, {width, height}, imager_px);
     if (!video.next()) throw InputError(file, "holds no frame that can be decoded");
     const auto every = static_cast<std::size_t>(every_);
-    expected_ += (std::max<std::size_t>(video.frames_stated(), 1) + every - 1) / every;
+    expected_ += (std::max<std::size_t>(video.reported_frames(), 1) + every - 1) / every;
   }
 }
 
@@ -57,7 +57,7 @@ std::optional<SourceImage> ImageSource::next_frame() {
 }
 
 std::optional<SourceImage> ImageSource::next() {
-  const std::lock_guard lock(taking_);
+  const std::lock_guard lock(mutex_);
   for (; file_ < files_.size(); ++file_) {
     std::optional<SourceImage> image;
     if (is_video_name(files_[file_])) {
@@ -66,7 +66,7 @@ std::optional<SourceImage> ImageSource::next() {
     } else {
       image.emplace(files_[file_++]);
     }
-    image->index = given_++;
+    image->index = num_returned_++;
     return image;
   }
   return {};

@@ -65,10 +65,10 @@ class ImageSource {
 
   std::vector<std::filesystem::path> files_;
   int every_;
-  std::size_t expected_ = 0, given_ = 0, file_ = 0;
+  std::size_t expected_ = 0, num_returned_ = 0, file_ = 0;
   std::unique_ptr<Video> video_;
   std::vector<std::string> warnings_;
-  std::mutex taking_;
+  std::mutex mutex_;
 };
 
 /// Calls task(image) for each image of the source on several threads, as images_in_parallel().

@@ -10,13 +10,13 @@
 namespace vlp {
 
 void images_in_parallel(std::size_t count, int threads,
-                        const std::function<void(std::size_t)>& look_at,
+                        const std::function<void(std::size_t)>& process,
                         const std::function<void(std::size_t done)>& progress) {
   cv::setNumThreads(1);
   std::mutex counting;
   std::size_t done = 0;
-  in_parallel(count, threads, [&](std::size_t i) {
-    look_at(i);
+  parallel_for(count, threads, [&](std::size_t i) {
+    process(i);
     if (!progress) return;
     const std::lock_guard lock(counting);
     progress(++done);

@@ -17,25 +17,25 @@ std::unordered_map<std::string, const Frame*> frames_by_image(const std::vector<
 }
 
 bool may_be_lamp(const Light& light, const std::array<int, 2>& size_px) {
-  return flickers(light) && wholly_in_view(light, {size_px[0], size_px[1]});
+  return is_modulated(light) && is_fully_in_view(light, {size_px[0], size_px[1]});
 }
 
 }  // namespace
 
-const Light* light_at(const Observation& image, const Eigen::Vector2d& pixel) {
-  constexpr double nearest_share = 0.5;
+const Light* find_light(const Observation& image, const Eigen::Vector2d& pixel) {
+  constexpr double max_distance_fraction = 0.5;
   const Light* nearest = nullptr;
   for (const Light& light : image.lights) {
     if (!may_be_lamp(light, image.size_px)) continue;
     const double distance = (light.pixel - pixel).norm();
-    if (distance > nearest_share * light.radius_px) continue;
+    if (distance > max_distance_fraction * light.radius_px) continue;
     if (nearest == nullptr || distance < (nearest->pixel - pixel).norm()) nearest = &light;
   }
   return nearest;
 }
 
 void add_labelled(const std::vector<Observation>& images, const std::vector<Frame>& labels,
-                  Labelled& labelled) {
+                  LabelledLights& labelled) {
   const auto frames = frames_by_image(labels);
   std::size_t number = labelled.lights.empty() ? 0 : labelled.lights.back().image + 1;
   for (const Observation& image : images) {
@@ -43,7 +43,7 @@ void add_labelled(const std::vector<Observation>& images, const std::vector<Fram
     if (frame == frames.end() || !image.is_kept()) continue;
     for (const Detection& label : frame->second->detections) {
       ++labelled.labels;
-      if (const Light* light = light_at(image, label.pixel)) {
+      if (const Light* light = find_light(image, label.pixel)) {
         labelled.lights.push_back({label.lamp, light->stripes, number});
       } else {
         ++labelled.without_light;
@@ -53,13 +53,13 @@ void add_labelled(const std::vector<Observation>& images, const std::vector<Fram
   }
 }
 
-std::vector<LightPeriod> measured_periods(const std::vector<Observation>& images,
-                                          const std::vector<Frame>& labels) {
+std::vector<LightPeriod> collect_periods(const std::vector<Observation>& images,
+                                         const std::vector<Frame>& labels) {
   const auto frames = frames_by_image(labels);
   std::vector<LightPeriod> periods;
   const auto add = [&](std::size_t image, const Light& light, std::optional<int> lamp) {
     const Stripes& stripes = light.stripes;
-    if (!trustworthy(stripes)) return;
+    if (!is_reliable(stripes)) return;
     periods.push_back(
         {{stripes.period_lines, lamp, stripes.duty}, image, light.pixel, light.sigma_px});
   };
@@ -74,7 +74,7 @@ std::vector<LightPeriod> measured_periods(const std::vector<Observation>& images
     const auto frame = frames.find(image.name());
     if (frame == frames.end()) continue;
     for (const Detection& label : frame->second->detections) {
-      if (const Light* light = light_at(image, label.pixel)) add(i, *light, label.lamp);
+      if (const Light* light = find_light(image, label.pixel)) add(i, *light, label.lamp);
     }
   }
   return periods;

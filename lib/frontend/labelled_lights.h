@@ -15,10 +15,10 @@ namespace vlp {
 
 /// Finds the light of a label: the nearest modulated light that is completely in view and whose
 /// center is within half its radius of `pixel`. Returns nullptr if there is none.
-const Light* light_at(const Observation& image, const Eigen::Vector2d& pixel);
+const Light* find_light(const Observation& image, const Eigen::Vector2d& pixel);
 
 /// Lights whose lamps are given by a table.
-struct Labelled {
+struct LabelledLights {
   std::vector<LabelledLight> lights;
   /// Number of labels in images that are used, and number of these labels without a light.
   int labels = 0, without_light = 0;
@@ -26,7 +26,7 @@ struct Labelled {
 
 /// Adds the lights of one folder; `labels` refers to its images by name.
 void add_labelled(const std::vector<Observation>& images, const std::vector<Frame>& labels,
-                  Labelled& labelled);
+                  LabelledLights& labelled);
 
 /// Measured period of a light, with its position.
 struct LightPeriod : MeasuredPeriod {
@@ -38,7 +38,7 @@ struct LightPeriod : MeasuredPeriod {
 
 /// Returns the periods of the lights that are completely in view and whose stripes are
 /// trustworthy(). If `labels` is not empty, only of labelled lights.
-std::vector<LightPeriod> measured_periods(const std::vector<Observation>& images,
-                                          const std::vector<Frame>& labels);
+std::vector<LightPeriod> collect_periods(const std::vector<Observation>& images,
+                                         const std::vector<Frame>& labels);
 
 }  // namespace vlp

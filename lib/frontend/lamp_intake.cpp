@@ -137,7 +137,7 @@ void warn_of_map(const LampImages& images, const DetectorCamera& camera,
     focal_px = images.calibration->camera.intrinsics[camera.readout == Readout::rows ? 1 : 0];
   }
   const StripeConditions conditions{*camera.row_time_s, focal_px, 0, exposure_s};
-  const auto alike = lamps_alike(images.lamps, conditions);
+  const auto alike = find_ambiguous_lamps(images.lamps, conditions);
   for (std::size_t i = 0; i < std::min(alike.size(), kMaxLines); ++i) {
     const auto& [first, second, gap, needed] = alike[i];
     warnings.push_back(fmt::format(
@@ -146,10 +146,10 @@ void warn_of_map(const LampImages& images, const DetectorCamera& camera,
         first, second, 100 * gap, 100 * needed));
   }
   warn_of_rest(alike.size(), "pairs of lamps with frequencies that are too near", warnings);
-  const auto unreadable = lamps_unreadable(images.lamps, conditions);
+  const auto unreadable = find_unreadable_lamps(images.lamps, conditions);
   for (std::size_t i = 0; i < std::min(unreadable.size(), kMaxLines); ++i) {
     const auto& [lamp, period_lines, periods, contrast] = unreadable[i];
-    if (period_lines < kShortestPeriod_lines) {
+    if (period_lines < kMinPeriod_lines) {
       warnings.push_back(fmt::format(
           "lamp {} has stripes of {:.2g} lines, too fine to be seen: a lower frequency shows them",
           lamp, period_lines));
@@ -182,13 +182,13 @@ std::string list_shared_frequencies(const LampMap& map) {
   }
   const std::size_t more = pairs.size() > kMaxLines ? pairs.size() - kMaxLines : 0;
   pairs.resize(pairs.size() - more);
-  const std::string rest = more > 0 ? fmt::format(" and {} more pairs", more) : "";
-  return fmt::format("{}", fmt::join(pairs, ", ")) + rest;
+  const std::string remaining = more > 0 ? fmt::format(" and {} more pairs", more) : "";
+  return fmt::format("{}", fmt::join(pairs, ", ")) + remaining;
 }
 
 /// Explains that no lamp is identified, with the reason that most of the lights have.
 std::string explain_no_lamp(const std::vector<Observation>& images, const LampMap& map) {
-  const auto count = [&](LightKind kind) { return count_of(images, kind); };
+  const auto count = [&](LightKind kind) { return count_lights(images, kind); };
   const auto skipped = std::count_if(images.begin(), images.end(),
                                      [](const Observation& image) { return !image.is_kept(); });
   std::string message = fmt::format(
@@ -196,12 +196,12 @@ std::string explain_no_lamp(const std::vector<Observation>& images, const LampMa
       "image's edge, {} lights flicker unlike any lamp of the map, {} are steady, {} have no form)",
       images.size(), skipped, count(LightKind::cut), count(LightKind::unknown),
       count(LightKind::steady), count(LightKind::formless));
-  const auto reasons = reasons_of(images);
+  const auto reasons = count_reasons(images);
   if (reasons.empty()) {
     return message + ": are lamps lit and in view, and the exposure long enough?";
   }
   const auto& [kind, reason, lights] = reasons.front();
-  message += fmt::format("; most often, {} times: {}", lights, explanation_of(reason));
+  message += fmt::format("; most often, {} times: {}", lights, describe(reason));
   const std::string shared = list_shared_frequencies(map);
   if (reason == LightReason::unknown_period && !shared.empty()) {
     message += "; lamps of the map that share a frequency: " + shared +
@@ -224,7 +224,7 @@ void create_annotate_folder(const fs::path& folder, const fs::path& images) {
 LightDetector make_detector(const LampImages& images, const FrontendOptions& options,
                             Observations& result) {
   DetectorCamera camera = images.calibration
-                              ? detector_camera(*images.calibration)
+                              ? make_detector_camera(*images.calibration)
                               : DetectorCamera{Readout::rows, options.row_time_s, {}};
   std::optional<LampClassifier> classifier;
   if (options.classifier.empty()) {
@@ -260,26 +260,28 @@ LightDetector make_detector(const LampImages& images, const FrontendOptions& opt
 LevelRotations read_levels(const LampImages& images) {
   if (!images.calibration) return {};
   CapturesTable captures = images.captures.value_or(CapturesTable());
-  if (!images.captures && !is_video_name(images.images)) captures = captures_table(images.images);
-  return level_rotations(captures, *images.calibration, images.yaw_in_robot_rad);
+  if (!images.captures && !is_video_name(images.images))
+    captures = read_captures_of_folder(images.images);
+  return compute_level_rotations(captures, *images.calibration, images.yaw_in_robot_rad);
 }
 
 }  // namespace
 
-Eigen::Matrix3d level_rotation(const Inclination& inclination, double yaw_in_robot_rad,
-                               const Eigen::Matrix3d& base_from_camera) {
+Eigen::Matrix3d compute_level_rotation(const Inclination& inclination, double yaw_in_robot_rad,
+                                       const Eigen::Matrix3d& base_from_camera) {
   const Eigen::Matrix3d level_from_base =
-      inclination_rotation(inclination, yaw_in_robot_rad).level_from_base;
+      compute_inclination_rotation(inclination, yaw_in_robot_rad).level_from_base;
   return level_from_zenith((level_from_base * base_from_camera).inverse().col(2));
 }
 
-LevelRotations level_rotations(const CapturesTable& captures, const Calibration& calibration,
-                               double yaw_in_robot_rad) {
-  const Eigen::Matrix3d base_from_camera = detector_camera(calibration).level_from_camera;
+LevelRotations compute_level_rotations(const CapturesTable& captures,
+                                       const Calibration& calibration, double yaw_in_robot_rad) {
+  const Eigen::Matrix3d base_from_camera = make_detector_camera(calibration).level_from_camera;
   LevelRotations levels;
   for (const auto& [image, capture] : captures) {
     if (!capture.inclination) continue;
-    levels.emplace(image, level_rotation(*capture.inclination, yaw_in_robot_rad, base_from_camera));
+    levels.emplace(
+        image, compute_level_rotation(*capture.inclination, yaw_in_robot_rad, base_from_camera));
   }
   return levels;
 }
@@ -319,7 +321,7 @@ LampIntake LampIntake::with_annotate(const fs::path& folder) const {
 std::optional<LightDetector> LampIntake::detector_for(const std::string& image) const {
   const auto level = levels_.find(image);
   if (level == levels_.end()) return std::nullopt;
-  return detector_.leaning(level->second);
+  return detector_.with_tilt(level->second);
 }
 
 Observation LampIntake::observe(const SourceImage& source) const {
@@ -333,17 +335,18 @@ Observation LampIntake::observe(const SourceImage& source) const {
     const auto tilted = detector_for(result.name());
     const LightDetector& detector = tilted ? *tilted : detector_;
     if (can_turn_) {
-      auto [readout, lights] = detect_either_way(detector, image_view(image));
+      auto [readout, lights] = detect_with_either_readout(detector, image_view(image));
       result.readout = readout;
       result.lights = std::move(lights);
     } else {
       result.lights = detector.detect(image_view(image));
     }
-    if (std::cmp_less(lamps_in(result).size(), min_lamps(use_))) reject_few_lamps(image, result);
+    if (std::cmp_less(collect_lamps(result).size(), min_lamps(use_)))
+      reject_few_lamps(image, result);
   });
   if (!options_.annotate.empty() && !pixels.empty()) {
     write_annotated(options_.annotate, source.file,
-                    annotated(pixels, result.lights, result.readout));
+                    render_annotated(pixels, result.lights, result.readout));
   }
   for (Light& light : result.lights) std::vector<EdgePoint>().swap(light.outline);
   return result;
@@ -383,7 +386,7 @@ Observations observe_lamps(const LampImages& images, ImageUse use, const Fronten
 
 void check_lamps_seen(const LampImages& images, Observations& result) {
   check_any_readable(images.images, result.images);
-  if (count_of(result.images, LightKind::lamp) == 0) {
+  if (count_lights(result.images, LightKind::lamp) == 0) {
     result.failure = {false, explain_no_lamp(result.images, images.lamps)};
   } else if (std::none_of(result.images.begin(), result.images.end(),
                           [](const Observation& image) { return image.is_kept(); })) {

@@ -28,12 +28,12 @@ using LevelRotations = std::map<std::string, std::optional<Eigen::Matrix3d>>;
 
 /// Computes level_from_camera from the inclination of a robot. Its yaw is arbitrary; a detector
 /// uses only the direction of the zenith.
-Eigen::Matrix3d level_rotation(const Inclination& inclination, double yaw_in_robot_rad,
-                               const Eigen::Matrix3d& base_from_camera);
+Eigen::Matrix3d compute_level_rotation(const Inclination& inclination, double yaw_in_robot_rad,
+                                       const Eigen::Matrix3d& base_from_camera);
 
 /// Returns the level rotations of the images whose inclination is in the table.
-LevelRotations level_rotations(const CapturesTable& captures, const Calibration& calibration,
-                               double yaw_in_robot_rad);
+LevelRotations compute_level_rotations(const CapturesTable& captures,
+                                       const Calibration& calibration, double yaw_in_robot_rad);
 
 /// Images of lamps with the lamp map and the camera.
 struct LampImages {
@@ -96,7 +96,7 @@ class LampIntake {
   ImageUse use_;
   FrontendOptions options_;
   std::optional<std::array<int, 2>> imager_px_;
-  /// True if an image may be read out in the other direction (detect_either_way()).
+  /// True if an image may be read out in the other direction (detect_with_either_readout()).
   bool can_turn_ = false;
 };
 

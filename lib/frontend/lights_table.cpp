@@ -16,16 +16,16 @@ namespace {
 
 std::string_view outline_name(const Light& light) {
   if (light.kind == LightKind::formless) return "";
-  if (light.glows) return "glow";
+  if (light.is_glow) return "glow";
   if (!is_disc(light)) return traits_of(light.shape).name;
-  return light.uneven ? "rim" : "edge";
+  return light.is_uneven ? "rim" : "edge";
 }
 
 std::string lamp_name(const Light& light) { return light.lamp ? std::to_string(*light.lamp) : ""; }
 
 }  // namespace
 
-int count_of(std::span<const Observation> images, LightKind kind) {
+int count_lights(std::span<const Observation> images, LightKind kind) {
   std::ptrdiff_t count = 0;
   for (const Observation& image : images) {
     count += std::count_if(image.lights.begin(), image.lights.end(),
@@ -34,7 +34,7 @@ int count_of(std::span<const Observation> images, LightKind kind) {
   return static_cast<int>(count);
 }
 
-std::vector<CountedReason> reasons_of(std::span<const Observation> images) {
+std::vector<CountedReason> count_reasons(std::span<const Observation> images) {
   std::map<std::pair<LightKind, LightReason>, int> counts;
   for (const Observation& image : images) {
     for (const Light& light : image.lights) {
@@ -53,7 +53,7 @@ std::vector<CountedReason> reasons_of(std::span<const Observation> images) {
   return reasons;
 }
 
-std::string_view name_of(LightKind kind) {
+std::string_view to_string(LightKind kind) {
   switch (kind) {
     case LightKind::lamp:
       return "lamp";
@@ -69,7 +69,7 @@ std::string_view name_of(LightKind kind) {
   return {};
 }
 
-std::string_view name_of(LightReason reason) {
+std::string_view to_string(LightReason reason) {
   switch (reason) {
     case LightReason::identified:
       return "identified";
@@ -93,7 +93,7 @@ std::string_view name_of(LightReason reason) {
   return {};
 }
 
-std::string explanation_of(LightReason reason) {
+std::string describe(LightReason reason) {
   switch (reason) {
     case LightReason::identified:
       return "its stripes are that lamp's";
@@ -107,7 +107,7 @@ std::string explanation_of(LightReason reason) {
           "it shows less than {} periods, or less than {} and no lamp with more is in the image: "
           "if "
           "it is a lamp, go nearer, or modulate it faster",
-          kMinPeriods, kEnoughPeriods);
+          kMinPeriods, kMinReliablePeriods);
     case LightReason::no_clear_period:
       return "it shows no clear period: if it is a lamp, see that nothing hides a part, and that "
              "the read-out is right";
@@ -129,11 +129,11 @@ std::string explanation_of(LightReason reason) {
   return {};
 }
 
-std::string line_of(const Light& light) {
+std::string describe_light(const Light& light) {
   std::string line =
-      fmt::format("({:.1f}, {:.1f}) {}", light.pixel.x(), light.pixel.y(), name_of(light.kind));
+      fmt::format("({:.1f}, {:.1f}) {}", light.pixel.x(), light.pixel.y(), to_string(light.kind));
   if (light.lamp) line += fmt::format(" {}", *light.lamp);
-  line += fmt::format(": {}; radius {:.1f} px", explanation_of(light.reason), light.radius_px);
+  line += fmt::format(": {}; radius {:.1f} px", describe(light.reason), light.radius_px);
   if (light.kind == LightKind::formless) return line;
   const Stripes& stripes = light.stripes;
   line +=
@@ -155,7 +155,7 @@ void write_lights(const std::filesystem::path& file, std::span<const Observation
       const Stripes& stripes = light.stripes;
       const bool form = light.kind != LightKind::formless;
       const bool striped = form && stripes.period_lines > 0;
-      csv.row({image.name(), name_of(light.kind), name_of(light.reason), lamp_name(light),
+      csv.row({image.name(), to_string(light.kind), to_string(light.reason), lamp_name(light),
                fixed(light.pixel.x(), 4), fixed(light.pixel.y(), 4),
                number_if(form, light.sigma_px), fixed(light.radius_px, 4), outline_name(light),
                number_if(form, light.rise_px), number_if(form, light.roundness),

@@ -14,7 +14,7 @@
 namespace vlp {
 
 /// Returns the number of lights of a kind.
-int count_of(std::span<const Observation> images, LightKind kind);
+int count_lights(std::span<const Observation> images, LightKind kind);
 
 /// Number of lights with the same kind and reason.
 struct CountedReason {
@@ -25,19 +25,19 @@ struct CountedReason {
 
 /// Counts the lights that are no lamps, per kind and reason. The most frequent reason comes first.
 /// Lights without outline come last, because they are rarely lamps.
-std::vector<CountedReason> reasons_of(std::span<const Observation> images);
+std::vector<CountedReason> count_reasons(std::span<const Observation> images);
 
 /// Returns the enumerator as a word, for example "steady" and "too_few_periods".
-std::string_view name_of(LightKind kind);
-std::string_view name_of(LightReason reason);
+std::string_view to_string(LightKind kind);
+std::string_view to_string(LightReason reason);
 
 /// Describes a reason and its remedy in a clause, for example "it shows no clear period: ...".
-std::string explanation_of(LightReason reason);
+std::string describe(LightReason reason);
 
 /// Describes a light in one line: its position, its kind with the reason, and its measurements.
-std::string line_of(const Light& light);
+std::string describe_light(const Light& light);
 
-/// Writes `lights.csv` atomically, one row per light. Columns: image, kind, reason (name_of()
+/// Writes `lights.csv` atomically, one row per light. Columns: image, kind, reason (to_string()
 /// both), lamp, u_px, v_px, sigma_px, radius_px, outline (edge, rim, glow or shape), rise_px,
 /// roundness, contrast, period_lines, periods, clarity, coherence, duty; see Light and Stripes.
 /// Cells are empty for a light without lamp, stripes or outline.

@@ -38,7 +38,7 @@ std::string_view remedy_for(RejectionReason reason) {
 
 }  // namespace
 
-std::string_view name_of(RejectionReason reason) {
+std::string_view to_string(RejectionReason reason) {
   switch (reason) {
     case RejectionReason::unreadable:
       return "cannot be read";
@@ -77,7 +77,7 @@ bool is_redundant(RejectionReason reason) {
          reason == RejectionReason::not_needed;
 }
 
-std::vector<Detection> lamps_in(const Observation& image) {
+std::vector<Detection> collect_lamps(const Observation& image) {
   std::vector<Detection> lamps;
   for (const Light& light : image.lights) {
     if (light.kind == LightKind::lamp) lamps.push_back({*light.lamp, light.pixel, light.sigma_px});
@@ -85,7 +85,7 @@ std::vector<Detection> lamps_in(const Observation& image) {
   return lamps;
 }
 
-std::vector<BoardView> kept_views(std::span<const Observation> images) {
+std::vector<BoardView> collect_kept_views(std::span<const Observation> images) {
   std::vector<BoardView> views;
   for (const Observation& image : images) {
     if (image.is_kept() && image.board) views.push_back(*image.board);
@@ -93,10 +93,10 @@ std::vector<BoardView> kept_views(std::span<const Observation> images) {
   return views;
 }
 
-std::vector<Frame> kept_frames(std::span<const Observation> images) {
+std::vector<Frame> collect_kept_frames(std::span<const Observation> images) {
   std::vector<Frame> frames;
   for (const Observation& image : images) {
-    if (image.is_kept()) frames.push_back({image.name(), lamps_in(image)});
+    if (image.is_kept()) frames.push_back({image.name(), collect_lamps(image)});
   }
   return frames;
 }
@@ -111,7 +111,7 @@ std::string summarize_rejections(std::span<const Observation> images) {
     // The message names the run of the image; the text after the colon is the remedy.
     const bool has_owner = reason == RejectionReason::used_elsewhere;
     const auto colon = std::min(message.find(':'), message.size());
-    const std::pair key(reason, has_owner ? message.substr(0, colon) : name_of(reason).data());
+    const std::pair key(reason, has_owner ? message.substr(0, colon) : to_string(reason).data());
     remedies[key] = has_owner ? message.substr(colon) : remedy_for(reason);
     ++counts[key];
     ++rejected;

@@ -41,7 +41,7 @@ enum class RejectionReason {
 };
 
 /// Returns a phrase that follows a number of images, for example "blurred" or "cannot be read".
-std::string_view name_of(RejectionReason reason);
+std::string_view to_string(RejectionReason reason);
 
 /// Returns true if the image has no fault, but other images make it unnecessary.
 bool is_redundant(RejectionReason reason);
@@ -98,13 +98,13 @@ struct Observations {
 };
 
 /// Returns the lamps among the lights, with their centers.
-std::vector<Detection> lamps_in(const Observation& image);
+std::vector<Detection> collect_lamps(const Observation& image);
 
 /// Returns the views of the boards in the images that are used.
-std::vector<BoardView> kept_views(std::span<const Observation> images);
+std::vector<BoardView> collect_kept_views(std::span<const Observation> images);
 
 /// Returns the lamps in the images that are used, one frame per image.
-std::vector<Frame> kept_frames(std::span<const Observation> images);
+std::vector<Frame> collect_kept_frames(std::span<const Observation> images);
 
 /// Returns the number of rejected images per reason, for example "10 blurred, 2 too dark". Appends
 /// the remedy if one reason applies to more than half of them. Empty if no image is rejected.

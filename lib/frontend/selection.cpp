@@ -10,30 +10,30 @@ namespace vlp {
 namespace {
 
 /// Returns the corners of the board, or the lamps by their ids, sorted by index.
-std::vector<SeenPoint> points_in(const Observation& image) {
-  if (image.board) return corners_of(image.board->seen);
-  std::vector<SeenPoint> points;
-  for (const Detection& lamp : lamps_in(image)) {
+std::vector<PointDetection> points_in(const Observation& image) {
+  if (image.board) return collect_corners(image.board->seen);
+  std::vector<PointDetection> points;
+  for (const Detection& lamp : collect_lamps(image)) {
     points.push_back({static_cast<std::size_t>(lamp.lamp), lamp.pixel});
   }
   std::sort(points.begin(), points.end(),
-            [](const SeenPoint& a, const SeenPoint& b) { return a.index < b.index; });
+            [](const PointDetection& a, const PointDetection& b) { return a.index < b.index; });
   return points;
 }
 
-bool are_equal(const std::vector<SeenPoint>& a, const std::vector<SeenPoint>& b) {
+bool are_equal(const std::vector<PointDetection>& a, const std::vector<PointDetection>& b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(),
-                    [](const SeenPoint& one, const SeenPoint& two) {
+                    [](const PointDetection& one, const PointDetection& two) {
                       return one.index == two.index && one.pixel == two.pixel;
                     });
 }
 
-bool are_close(const std::vector<SeenPoint>& a, const std::vector<SeenPoint>& b,
+bool are_close(const std::vector<PointDetection>& a, const std::vector<PointDetection>& b,
                double max_distance_px) {
   constexpr double min_shared_fraction = 0.7;
   double sum_px2 = 0, shared = 0;
   auto other = b.begin();
-  for (const SeenPoint& point : a) {
+  for (const PointDetection& point : a) {
     while (other != b.end() && other->index < point.index) ++other;
     if (other == b.end()) break;
     if (other->index != point.index) continue;
@@ -50,7 +50,7 @@ int min_lamps(ImageUse use) { return use == ImageUse::turn || use == ImageUse::p
 
 void Selection::add(Observation& image) {
   if (!image.is_kept() || use_ == ImageUse::fixes) return;
-  std::vector<SeenPoint> points = points_in(image);
+  std::vector<PointDetection> points = points_in(image);
   if (points.empty()) return;
   for (const Kept& kept : kept_) {
     if (!are_equal(points, kept.points)) continue;

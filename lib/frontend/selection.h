@@ -35,7 +35,7 @@ class Selection {
  private:
   struct Kept {
     std::string name;
-    std::vector<SeenPoint> points;
+    std::vector<PointDetection> points;
   };
   ImageUse use_;
   double same_view_fraction_;

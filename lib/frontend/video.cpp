@@ -33,7 +33,7 @@ std::string frame_name(const std::string& video, std::size_t number) {
   return fmt::format("{}#{:06}", video, number);
 }
 
-std::optional<std::string> video_of_frame(const std::string& name) {
+std::optional<std::string> parse_video_name(const std::string& name) {
   const auto mark = name.rfind('#');
   if (mark == std::string::npos || mark + 1 == name.size() ||
       name.find_first_not_of("0123456789", mark + 1) != std::string::npos ||
@@ -84,19 +84,19 @@ std::array<int, 2> Video::size_px() const {
   return {of(cv::CAP_PROP_FRAME_WIDTH), of(cv::CAP_PROP_FRAME_HEIGHT)};
 }
 
-std::size_t Video::frames_stated() const {
-  constexpr double most = 1e9;
-  const double stated = capture_->reader->get(cv::CAP_PROP_FRAME_COUNT);
-  return stated > 0 && stated < most ? static_cast<std::size_t>(stated) : 0;
+std::size_t Video::reported_frames() const {
+  constexpr double max_frames = 1e9;
+  const double reported = capture_->reader->get(cv::CAP_PROP_FRAME_COUNT);
+  return reported > 0 && reported < max_frames ? static_cast<std::size_t>(reported) : 0;
 }
 
 /// Grabs the next frame. OpenCV fails several times after a frame that cannot be decoded and then
 /// continues.
 bool Video::grab() {
-  constexpr int most_tries = 100;
+  constexpr int max_tries = 100;
   if (ended_) return false;
-  const std::size_t stated = is_camera() ? 0 : frames_stated();
-  const int tries = grabbed_ < stated ? most_tries : 1;
+  const std::size_t reported = is_camera() ? 0 : reported_frames();
+  const int tries = grabbed_ < reported ? max_tries : 1;
   for (int i = 0; i < tries; ++i) {
     if (!capture_->reader->grab()) continue;
     gap_ = gap_ || i > 0;
@@ -131,14 +131,14 @@ std::optional<VideoFrame> Video::next() {
 void Video::skip() { grab(); }
 
 std::string Video::missing() const {
-  const std::size_t stated = frames_stated();
+  const std::size_t reported = reported_frames();
   // Other formats only estimate the number of frames from their duration.
   const std::string kind = std::filesystem::path(source_).extension().string();
   const bool exact = kind == ".avi" || kind == ".mp4" || kind == ".mov" || kind == ".m4v";
-  const std::size_t tolerated = exact || gap_ ? 0 : 1 + stated / 50;
-  if (grabbed_ + tolerated >= stated) return "";
+  const std::size_t tolerated = exact || gap_ ? 0 : 1 + reported / 50;
+  if (grabbed_ + tolerated >= reported) return "";
   return fmt::format("{} of its {} frames can be decoded; is it cut short, or damaged?", grabbed_,
-                     stated);
+                     reported);
 }
 
 }  // namespace vlp

@@ -19,7 +19,7 @@ bool is_video_name(const std::filesystem::path& file);
 std::string frame_name(const std::string& video, std::size_t number);
 
 /// Parses the name of a frame, VIDEO#000123, and returns VIDEO; std::nullopt for other names.
-std::optional<std::string> video_of_frame(const std::string& name);
+std::optional<std::string> parse_video_name(const std::string& name);
 
 /// Decoded frame of a video.
 struct VideoFrame {
@@ -50,7 +50,7 @@ class Video {
   bool is_camera() const;
   std::array<int, 2> size_px() const;
   /// Number of frames according to the header of the file; 0 if unknown.
-  std::size_t frames_stated() const;
+  std::size_t reported_frames() const;
   /// Describes missing frames in one line without the file name; empty if there are none.
   /// @pre The end of the video has been reached.
   std::string missing() const;

@@ -9,7 +9,7 @@
 namespace vlp {
 namespace {
 
-Eigen::Vector2d mean_of(std::span<const Eigen::Vector2d> points) {
+Eigen::Vector2d compute_mean(std::span<const Eigen::Vector2d> points) {
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
   for (const auto& point : points) mean += point / static_cast<double>(points.size());
   return mean;
@@ -29,8 +29,9 @@ std::optional<Circle> fit_taubin(std::span<const Eigen::Vector2d> points,
   }
   const double z = xx + yy, cov = xx * yy - xy * xy, var = zz - z * z;
   // The covariance of points on one line is singular, within the rounding of sums and coordinates.
-  constexpr double rounding = 8 * std::numeric_limits<double>::epsilon();
-  const double coordinate_variance = rounding * rounding * (mean.squaredNorm() + z);
+  constexpr double numeric_tolerance = 8 * std::numeric_limits<double>::epsilon();
+  const double coordinate_variance =
+      numeric_tolerance * numeric_tolerance * (mean.squaredNorm() + z);
   if (!(cov > z * (1e-14 * z + coordinate_variance))) return std::nullopt;
 
   const double a3 = 4 * z, a2 = -3 * z * z - zz;
@@ -56,7 +57,7 @@ std::optional<Circle> fit_taubin(std::span<const Eigen::Vector2d> points,
 
 std::optional<CircleFit> fit_circle(std::span<const Eigen::Vector2d> points) {
   if (points.size() < 3) return std::nullopt;
-  const Eigen::Vector2d mean = mean_of(points);
+  const Eigen::Vector2d mean = compute_mean(points);
   const auto start = fit_taubin(points, mean);
   if (!start) return std::nullopt;
 

@@ -10,9 +10,9 @@ namespace {
 
 using Points = std::span<const Eigen::Vector2d>;
 
-bool holds(const Circle& circle, const Eigen::Vector2d& point) {
-  constexpr double rounding = 1e-12;
-  return (point - circle.center).norm() <= circle.radius * (1 + rounding);
+bool contains(const Circle& circle, const Eigen::Vector2d& point) {
+  constexpr double numeric_tolerance = 1e-12;
+  return (point - circle.center).norm() <= circle.radius * (1 + numeric_tolerance);
 }
 
 Circle across(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
@@ -39,7 +39,7 @@ Circle through(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::
 Circle with_two_on_rim(Points points, const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   Circle circle = across(a, b);
   for (const auto& point : points) {
-    if (!holds(circle, point)) circle = through(a, b, point);
+    if (!contains(circle, point)) circle = through(a, b, point);
   }
   return circle;
 }
@@ -47,18 +47,18 @@ Circle with_two_on_rim(Points points, const Eigen::Vector2d& a, const Eigen::Vec
 Circle with_one_on_rim(Points points, const Eigen::Vector2d& a) {
   Circle circle{a, 0};
   for (std::size_t i = 0; i < points.size(); ++i) {
-    if (!holds(circle, points[i])) circle = with_two_on_rim(points.first(i), a, points[i]);
+    if (!contains(circle, points[i])) circle = with_two_on_rim(points.first(i), a, points[i]);
   }
   return circle;
 }
 
 }  // namespace
 
-Circle enclosing_circle(Points points) {
+Circle compute_enclosing_circle(Points points) {
   assert(!points.empty());
   Circle circle{points.front(), 0};
   for (std::size_t i = 1; i < points.size(); ++i) {
-    if (!holds(circle, points[i])) circle = with_one_on_rim(points.first(i), points[i]);
+    if (!contains(circle, points[i])) circle = with_one_on_rim(points.first(i), points[i]);
   }
   return circle;
 }

@@ -18,6 +18,6 @@ struct PlanePair {
 /// Minimizes the algebraic error, the sum of |(to, 1) x H (from, 1)|^2 over all H of unit norm. The
 /// coordinates are normalized to mean 0 and RMS radius 1 first.
 /// @pre There are at least four pairs, no three of four on a line; otherwise H is undetermined.
-Eigen::Matrix3d homography(std::span<const PlanePair> pairs);
+Eigen::Matrix3d estimate_homography(std::span<const PlanePair> pairs);
 
 }  // namespace vlp

@@ -56,10 +56,10 @@ struct Cholesky {
   /// squared diagonal element of L exceeds the largest one times the given ratio. The squared
   /// element of an unknown is its information, given all following unknowns and with the preceding
   /// ones free.
-  bool determines(double share) const {
-    const auto [least, most] =
+  bool has_full_rank(double min_ratio) const {
+    const auto [smallest, largest] =
         std::minmax_element(inverse_diagonal.begin(), inverse_diagonal.end());
-    return is_positive && *least * *least > share * *most * *most;
+    return is_positive && *smallest * *smallest > min_ratio * *largest * *largest;
   }
 
   /// Solves A y = x and returns y.

@@ -40,21 +40,22 @@ std::optional<Similarity> fit_similarity(std::size_t count, const From& from, co
   from_mean /= static_cast<double>(count);
   to_mean /= static_cast<double>(count);
   Eigen::Vector2d product = Eigen::Vector2d::Zero();
-  double spread = 0, from_magnitude = 0, to_magnitude = 0;
+  double sum_of_squares = 0, from_magnitude = 0, to_magnitude = 0;
   for (std::size_t i = 0; i < count; ++i) {
     const Eigen::Vector2d difference = from(i) - from_mean;
     product += conj_product(difference, to(i) - to_mean);
-    spread += difference.squaredNorm();
+    sum_of_squares += difference.squaredNorm();
     from_magnitude += from(i).squaredNorm();
     to_magnitude += to(i).squaredNorm();
   }
   // Smaller differences are rounding errors of the coordinates.
-  constexpr double rounding = 4 * std::numeric_limits<double>::epsilon();
-  if (!(spread > rounding * rounding * from_magnitude) ||
-      !(product.squaredNorm() > rounding * rounding * spread * to_magnitude)) {
+  constexpr double numeric_tolerance = 4 * std::numeric_limits<double>::epsilon();
+  if (!(sum_of_squares > numeric_tolerance * numeric_tolerance * from_magnitude) ||
+      !(product.squaredNorm() >
+        numeric_tolerance * numeric_tolerance * sum_of_squares * to_magnitude)) {
     return std::nullopt;
   }
-  const Eigen::Vector2d factor = product / spread;
+  const Eigen::Vector2d factor = product / sum_of_squares;
   return Similarity{to_mean - complex_product(factor, from_mean), factor};
 }
 

@@ -10,7 +10,7 @@ namespace vlp {
 namespace {
 
 template <int N>
-SymmetricEigen<N> decomposed(const Eigen::Matrix<double, N, N>& matrix) {
+SymmetricEigen<N> decompose(const Eigen::Matrix<double, N, N>& matrix) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, N, N>> solver(matrix);
   if (solver.info() == Eigen::Success) return {solver.eigenvalues(), solver.eigenvectors()};
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
@@ -20,13 +20,13 @@ SymmetricEigen<N> decomposed(const Eigen::Matrix<double, N, N>& matrix) {
 
 }  // namespace
 
-SymmetricEigen<2> symmetric_eigen(const Eigen::Matrix2d& matrix) { return decomposed(matrix); }
+SymmetricEigen<2> decompose_symmetric(const Eigen::Matrix2d& matrix) { return decompose(matrix); }
 
-SymmetricEigen<Eigen::Dynamic> symmetric_eigen(const Eigen::MatrixXd& matrix) {
-  return decomposed(matrix);
+SymmetricEigen<Eigen::Dynamic> decompose_symmetric(const Eigen::MatrixXd& matrix) {
+  return decompose(matrix);
 }
 
-std::optional<Eigen::Matrix4d> inverse_of_positive(const Eigen::Matrix4d& matrix) {
+std::optional<Eigen::Matrix4d> invert_positive_definite(const Eigen::Matrix4d& matrix) {
   const Eigen::LLT<Eigen::Matrix4d> factor(matrix);
   if (factor.info() != Eigen::Success) return std::nullopt;
   const Eigen::Matrix4d inverse = factor.solve(Eigen::Matrix4d::Identity());

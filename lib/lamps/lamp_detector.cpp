@@ -45,7 +45,7 @@ LampDetector::LampDetector(const LampMap& lamps, const Calibration& calibration)
   if (!calibration.camera.row_time_s) {
     throw std::invalid_argument("the calibration has no row_time_s, by which lamps are told apart");
   }
-  detector_ = std::make_shared<const LightDetector>(lamps, detector_camera(calibration));
+  detector_ = std::make_shared<const LightDetector>(lamps, make_detector_camera(calibration));
 }
 
 std::vector<Detection> LampDetector::detect(const ImageView& image) const {

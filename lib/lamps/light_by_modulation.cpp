@@ -22,14 +22,14 @@ constexpr double kMaxEccentricity = 0.1;
 Blob clip(std::span<const Blob> blobs, const PixelBox& box) {
   Blob result;
   for (const Blob& blob : blobs) {
-    for (Run run : blob.runs) {
+    for (PixelRun run : blob.runs) {
       if (run.row < box.y || run.row >= box.bottom()) continue;
       run.begin = std::max(run.begin, box.x);
       run.end = std::min(run.end, box.right());
       if (run.begin < run.end) result.runs.push_back(run);
     }
   }
-  std::sort(result.runs.begin(), result.runs.end(), [](const Run& a, const Run& b) {
+  std::sort(result.runs.begin(), result.runs.end(), [](const PixelRun& a, const PixelRun& b) {
     return a.row != b.row ? a.row < b.row : a.begin < b.begin;
   });
   return result;
@@ -37,7 +37,7 @@ Blob clip(std::span<const Blob> blobs, const PixelBox& box) {
 
 /// Returns the lit pixels of a light: the blob of which the light is the largest part, or the runs
 /// near its box.
-Blob lit_pixels(const PixelBox& box, std::span<const Blob> blobs, const ImageSize& size) {
+Blob find_lit_pixels(const PixelBox& box, std::span<const Blob> blobs, const ImageSize& size) {
   constexpr int max_area_ratio = 4;
   for (const Blob& blob : blobs) {
     const PixelBox whole = blob.box();
@@ -47,8 +47,8 @@ Blob lit_pixels(const PixelBox& box, std::span<const Blob> blobs, const ImageSiz
   return clip(blobs, grow(box, std::max(box.width, box.height) / 4, size));
 }
 
-Light without_outline(const ImageView& lines, const ModulatedLight& found,
-                      const LightShape& shape) {
+Light make_light_without_outline(const ImageView& lines, const ModulatedLight& found,
+                                 const LightShape& shape) {
   Light light{};
   light.pixel = shape.turned(found.center);
   light.sigma_px = std::clamp(found.center_sd_px, kMinSigma_px, kMaxSigma_px);
@@ -59,7 +59,7 @@ Light without_outline(const ImageView& lines, const ModulatedLight& found,
       {std::min(box.right(), lines.width) - 0.5, std::min(box.bottom(), lines.height) - 0.5});
   light.rise_px = found.radius_px / 2;
   light.roundness = 1;
-  light.glows = true;
+  light.is_glow = true;
   return light;
 }
 
@@ -71,19 +71,19 @@ PixelBox grow(const PixelBox& box, int margin_px, const ImageSize& size) {
       {0, 0, size.width, size.height});
 }
 
-Light light_by_modulation(const ImageView& lines, const ModulatedLight& found,
-                          std::span<const Blob> blobs, const Background& background,
-                          const LightShape& shape) {
-  const Blob blob = lit_pixels(found.box, blobs, lines.size());
+Light make_light_from_modulation(const ImageView& lines, const ModulatedLight& found,
+                                 std::span<const Blob> blobs, const Background& background,
+                                 const LightShape& shape) {
+  const Blob blob = find_lit_pixels(found.box, blobs, lines.size());
   std::optional<Rim> rim;
-  if (!blob.runs.empty()) rim = rim_of(lines, blob, background, shape);
-  Light light = without_outline(lines, found, shape);
+  if (!blob.runs.empty()) rim = fit_rim(lines, blob, background, shape);
+  Light light = make_light_without_outline(lines, found, shape);
   if (rim && rim->light.roundness >= kMinRoundness) {
     // Without a clear rim either center may be correct.
     const double apart_px =
-        rim->clear ? 0 : (rim->light.pixel - light.pixel).norm() / std::numbers::sqrt2;
+        rim->is_clear ? 0 : (rim->light.pixel - light.pixel).norm() / std::numbers::sqrt2;
     const bool is_round = found.asymmetry_px < kMaxEccentricity * found.radius_px;
-    if (rim->clear || !is_round) light = std::move(rim->light);
+    if (rim->is_clear || !is_round) light = std::move(rim->light);
     light.sigma_px = std::min(std::hypot(light.sigma_px, apart_px), kMaxSigma_px);
   }
   light.by_modulation = true;

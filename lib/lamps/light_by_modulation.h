@@ -17,13 +17,13 @@ namespace vlp {
 PixelBox grow(const PixelBox& box, int margin_px, const ImageSize& size);
 
 /// Converts a light that was found by its modulation to a Light. The outline is the rim, see
-/// rim_of(), if the rim is clear. Otherwise the light has no outline, and its center is the
+/// fit_rim(), if the rim is clear. Otherwise the light has no outline, and its center is the
 /// centroid of the lit area. Kind, reason and lamp are not set.
 ///
 /// @param lines  image whose rows are the scanlines
 /// @param blobs  lit pixels of the image, in which the rim is searched
-Light light_by_modulation(const ImageView& lines, const ModulatedLight& found,
-                          std::span<const Blob> blobs, const Background& background,
-                          const LightShape& shape);
+Light make_light_from_modulation(const ImageView& lines, const ModulatedLight& found,
+                                 std::span<const Blob> blobs, const Background& background,
+                                 const LightShape& shape);
 
 }  // namespace vlp

@@ -30,17 +30,17 @@ namespace vlp {
 
 namespace {
 
-/// Function that fits a light to a blob with the outline of outline_of(), for lamps of one shape
+/// Function that fits a light to a blob with the outline of find_outline(), for lamps of one shape
 /// with the sizes `sizes_m`. Returns std::nullopt if the blob has another shape. See
-/// rectangle_of().
-using ShapeDetector = decltype(&rectangle_of);
+/// fit_rectangle().
+using ShapeDetector = decltype(&fit_rectangle);
 
 /// Detectors of all shapes but discs, see LightShape, in the order in which they are tried.
 constexpr auto kShapeDetectors =
-    std::to_array<std::pair<ShapeKind, ShapeDetector>>({{ShapeKind::rectangle, &rectangle_of}});
+    std::to_array<std::pair<ShapeKind, ShapeDetector>>({{ShapeKind::rectangle, &fit_rectangle}});
 
 /// Returns the largest number of lines without light between two stripes of a lamp.
-int max_dark_rows_of(const LampMap& lamps, const std::optional<double>& row_time_s) {
+int compute_max_dark_rows(const LampMap& lamps, const std::optional<double>& row_time_s) {
   constexpr int unknown = 24, spare = 3;
   if (!row_time_s) return unknown;
   double max_rows = 0;
@@ -83,7 +83,7 @@ double clipped_fraction(const ImageView& lines, const Eigen::Vector2d& low,
 void add_unknown_lens(const ImageSize& size, std::vector<Light>& lights) {
   for (Light& light : lights) {
     if (light.kind == LightKind::formless) continue;
-    const double sigma_px = std::hypot(light.sigma_px, unknown_lens_sd_px(light, size));
+    const double sigma_px = std::hypot(light.sigma_px, compute_unknown_lens_sd_px(light, size));
     light.sigma_px = std::min(sigma_px, kMaxSigma_px);
   }
 }
@@ -94,7 +94,8 @@ constexpr double kMaxRise = 0.3;
 bool is_sharp(const Light& light) { return light.rise_px <= kMaxRise * light.radius_px; }
 
 bool has_clear_outline(const Light& light) {
-  return !light.glows && !light.is_doubtful && is_sharp(light) && light.roundness >= kMinRoundness;
+  return !light.is_glow && !light.is_doubtful && is_sharp(light) &&
+         light.roundness >= kMinRoundness;
 }
 
 /// Returns true if the center of one light is within the radius of the larger light.
@@ -103,7 +104,7 @@ bool are_at_one_place(const Light& a, const Light& b) {
 }
 
 /// Returns the reason why a light is steady; std::nullopt if it is modulated.
-std::optional<LightReason> why_steady(const Light& light) {
+std::optional<LightReason> find_steady_reason(const Light& light) {
   constexpr double min_clarity = 0.5, min_clipped = 0.5;
   const Stripes& stripes = light.stripes;
   if (!(stripes.contrast >= kMinContrast)) {
@@ -131,7 +132,7 @@ std::vector<PixelBox> merge_overlapping(std::vector<PixelBox> boxes) {
 
 }  // namespace
 
-DetectorCamera detector_camera(const Calibration& calibration) {
+DetectorCamera make_detector_camera(const Calibration& calibration) {
   const Camera& camera = calibration.camera;
   DetectorCamera result{camera.readout.value_or(Readout::rows), camera.row_time_s,
                         Lens(camera.lens_model, camera.intrinsics)};
@@ -147,7 +148,7 @@ LightDetector::LightDetector(const LampMap& lamps, const DetectorCamera& camera,
       camera_(camera),
       shape_(camera),
       classifier_(std::move(classifier)),
-      max_dark_rows_(max_dark_rows_of(lamps, camera.row_time_s)) {
+      max_dark_rows_(compute_max_dark_rows(lamps, camera.row_time_s)) {
   for (const Lamp& lamp : lamps_.lamps) {
     if (lamp.shape.size_m) sizes_m_[lamp.shape.kind].push_back(*lamp.shape.size_m);
   }
@@ -168,7 +169,7 @@ LightDetector::LightDetector(const LampMap& lamps, const DetectorCamera& camera,
   }
 }
 
-LightDetector LightDetector::leaning(
+LightDetector LightDetector::with_tilt(
     const std::optional<Eigen::Matrix3d>& level_from_camera) const {
   DetectorCamera camera = camera_;
   if (level_from_camera) {
@@ -186,30 +187,31 @@ LightDetector LightDetector::with_readout(Readout readout) const {
   return {lamps_, camera, classifier_};
 }
 
-std::vector<LightPart> LightDetector::parts_of(const ImageView& lines, const Blob& blob,
-                                               const Background& background) const {
+std::vector<LightPart> LightDetector::find_parts(const ImageView& lines, const Blob& blob,
+                                                 const Background& background) const {
   constexpr std::size_t max_lights = 4;
   const PixelBox box = blob.box();
   std::vector<LightPart> parts;
-  auto rest = outline_of(lines, blob, background);
+  auto remaining = find_outline(lines, blob, background);
   for (const auto& [kind, detect] : kShapeDetectors) {
     const auto sizes_m = sizes_m_.find(kind);
     if (sizes_m == sizes_m_.end()) continue;
-    if (auto light = detect(lines, blob, rest, background, shape_, sizes_m->second)) {
+    if (auto light = detect(lines, blob, remaining, background, shape_, sizes_m->second)) {
       light->shape = kind;
       return {{std::move(light), {}, box}};
     }
   }
   while (parts.size() < max_lights) {
-    auto light = shape_.light_of(rest, background);
+    auto light = shape_.fit_light(remaining, background);
     if (!light && !parts.empty()) break;
-    auto outline = std::move(rest);
-    rest = light ? shape_.outside(*light, outline) : std::vector<EdgePoint>();
+    auto outline = std::move(remaining);
+    remaining = light ? shape_.outside(*light, outline) : std::vector<EdgePoint>();
     parts.push_back({std::move(light), std::move(outline), box});
-    if (rest.empty()) break;
+    if (remaining.empty()) break;
   }
   for (LightPart& part : parts) {
-    if (part.light) part.light->outside = double(rest.size()) / double(part.light->outline.size());
+    if (part.light)
+      part.light->outside = double(remaining.size()) / double(part.light->outline.size());
   }
   constexpr double min_edge_roundness = 0.5;
   // Each of several touching lights has an edge; their brightness may differ.
@@ -217,9 +219,10 @@ std::vector<LightPart> LightDetector::parts_of(const ImageView& lines, const Blo
     return part.light && is_sharp(*part.light);
   });
   const std::optional<Light>& first = parts.front().light;
-  const bool has_edge = sharp_parts > 1 || (sharp_parts == 1 && first && is_sharp(*first) &&
-                                            first->roundness >= min_edge_roundness &&
-                                            !unevenly_lit(lines, blob, first->outline, background));
+  const bool has_edge =
+      sharp_parts > 1 ||
+      (sharp_parts == 1 && first && is_sharp(*first) && first->roundness >= min_edge_roundness &&
+       !is_unevenly_lit(lines, blob, first->outline, background));
   for (LightPart& part : parts) {
     if (part.light) part.light->is_doubtful = !has_edge;
   }
@@ -229,18 +232,18 @@ std::vector<LightPart> LightDetector::parts_of(const ImageView& lines, const Blo
 void LightDetector::add_by_modulation(const ImageView& lines, const std::vector<Blob>& blobs,
                                       const Background& background,
                                       std::vector<Light>& lights) const {
-  const auto is_settled = [&](const Light& light) {
+  const auto is_conclusive = [&](const Light& light) {
     if (!has_clear_outline(light)) return false;
-    const auto steady = why_steady(light);
+    const auto steady = find_steady_reason(light);
     if (steady) return *steady == LightReason::steady || *steady == LightReason::overexposed;
-    return lamp_of(light.stripes).has_value();
+    return identify_lamp(light.stripes).has_value();
   };
   std::vector<PixelBox> boxes;
   for (const Blob& blob : blobs) {
     const PixelBox box = blob.box();
     const Eigen::Vector2d middle(box.x + box.width / 2.0, box.y + box.height / 2.0);
     const bool is_known = std::any_of(lights.begin(), lights.end(), [&](const Light& light) {
-      return is_settled(light) &&
+      return is_conclusive(light) &&
              (shape_.turned(light.pixel) - middle).norm() < light.radius_px / 2 &&
              std::max(box.width, box.height) < 3 * light.radius_px;
     });
@@ -248,14 +251,14 @@ void LightDetector::add_by_modulation(const ImageView& lines, const std::vector<
   }
   for (const ModulatedLight& found : find_modulated_lights(
            lines, merge_overlapping(std::move(boxes)), background, lamp_periods_)) {
-    Light light = light_by_modulation(lines, found, blobs, background, shape_);
+    Light light = make_light_from_modulation(lines, found, blobs, background, shape_);
     if (found.lamp) light.lamp = lamps_by_period_[*found.lamp];
     // Lamps with the same period differ in duty; without known periods a classifier decides.
     const bool has_choice = found.lamp ? !light.lamp : lamp_periods_.empty();
-    if (has_choice) light.lamp = lamp_of(light.stripes);
+    if (has_choice) light.lamp = identify_lamp(light.stripes);
     const auto is_at_it = [&](const Light& other) { return are_at_one_place(other, light); };
     const auto is_better = [&](const Light& other) {
-      return is_at_it(other) && (!found.lamp || other.by_modulation || is_settled(other));
+      return is_at_it(other) && (!found.lamp || other.by_modulation || is_conclusive(other));
     };
     if (std::any_of(lights.begin(), lights.end(), is_better)) continue;
     std::erase_if(lights, is_at_it);
@@ -266,64 +269,67 @@ void LightDetector::add_by_modulation(const ImageView& lines, const std::vector<
 void LightDetector::measure(const ImageView& lines, const Background& background,
                             Light& light) const {
   const Eigen::Vector2d low = shape_.turned(light.low), high = shape_.turned(light.high);
-  const auto judge = [&](const std::vector<double>& signal) {
+  const auto measure_signal = [&](const std::vector<double>& signal) {
     const Eigen::Vector2d from = shape_.turned(light.low), to = shape_.turned(light.high);
-    light.stripes = stripes_of(signal);
+    light.stripes = measure_stripes(signal);
     light.peak = signal.empty() ? 0 : *std::max_element(signal.begin(), signal.end());
     if (light.stripes.period_lines > 0) {
-      const auto chords = is_disc(light) ? chords_of(from, to, lines.size())
-                                         : chords_within(shape_.turned(light.face), lines.size());
-      light.coherence = coherence_of(lines, chords, background, light.stripes.period_lines);
+      const auto chords = is_disc(light)
+                              ? find_chords_in_ellipse(from, to, lines.size())
+                              : find_chords_in_polygon(shape_.turned(light.face), lines.size());
+      light.coherence = compute_coherence(lines, chords, background, light.stripes.period_lines);
     }
     if (light.stripes.contrast < kMinContrast) light.clipped = clipped_fraction(lines, from, to);
   };
   if (!is_disc(light)) {
-    const auto chords = chords_within(shape_.turned(light.face), lines.size());
-    return judge(line_signal(lines, chords, background.level));
+    const auto chords = find_chords_in_polygon(shape_.turned(light.face), lines.size());
+    return measure_signal(compute_line_signal(lines, chords, background.level));
   }
   const DiscImage disc{low, high, shape_.turned(light.pixel)};
-  auto outline = refined(lines, light.outline, disc, background);
-  auto better = shape_.light_of(std::move(outline.points), background, outline.mottled);
+  auto outline = refine_outline(lines, light.outline, disc, background);
+  auto better = shape_.fit_light(std::move(outline.points), background, outline.is_mottled);
   if (better && 2 * better->outline.size() > light.outline.size()) {
     better->roundness = light.roundness;
     better->outside = light.outside;
     better->is_doubtful = light.is_doubtful;
     light = std::move(*better);
   }
-  const auto chords = chords_of(shape_.turned(light.low), shape_.turned(light.high), lines.size());
-  judge(line_signal(lines, chords, background.level));
+  const auto chords =
+      find_chords_in_ellipse(shape_.turned(light.low), shape_.turned(light.high), lines.size());
+  measure_signal(compute_line_signal(lines, chords, background.level));
 }
 
 void LightDetector::correct_shear(std::vector<Light>& lights) const {
   const auto has_sharp_circle = [](const Light& light) {
-    return !light.sums.empty() && !light.glows && !light.uneven;
+    return !light.sums.empty() && !light.is_glow && !light.is_uneven;
   };
   std::vector<OutlineSums> sums;
   for (const Light& light : lights) {
     if (has_sharp_circle(light)) sums.push_back(light.sums);
   }
-  const auto shear = Shear::common(sums);
+  const auto shear = Shear::estimate(sums);
   if (!shear) return;
   for (Light& light : lights) {
     if (!has_sharp_circle(light)) continue;
-    shape_.shift(shear->oval_of(light.sums), shear->motion_at(light.sums), light);
+    shape_.apply_shear(shear->predict_oval(light.sums), shear->motion_at(light.sums), light);
   }
 }
 
 std::vector<Light> LightDetector::detect(const ImageView& image) const {
-  const Background background = background_of(image);
-  const auto [lines, lit, memory] = lines_of(image, camera_.readout, background);
-  const auto blobs = group_runs(find_runs(lines, background.threshold, lit), max_dark_rows_);
+  const Background background = estimate_background(image);
+  const auto [lines, lit, memory] = make_scanline_image(image, camera_.readout, background);
+  const auto blobs =
+      group_pixel_runs(find_pixel_runs(lines, background.threshold, lit), max_dark_rows_);
   std::vector<LightPart> parts;
   parts.reserve(blobs.size());
   for (const Blob& blob : blobs) {
-    for (LightPart& part : parts_of(lines, blob, background)) parts.push_back(std::move(part));
+    for (LightPart& part : find_parts(lines, blob, background)) parts.push_back(std::move(part));
   }
-  std::vector<Light> lights = join(parts, shape_, background);
+  std::vector<Light> lights = join_parts(parts, shape_, background);
   for (Light& light : lights) measure(lines, background, light);
   correct_shear(lights);
   add_by_modulation(lines, blobs, background, lights);
-  for (Light& light : formless_lights(std::move(parts), lights, shape_, lines.size())) {
+  for (Light& light : make_formless_lights(std::move(parts), lights, shape_, lines.size())) {
     lights.push_back(std::move(light));
   }
   std::sort(lights.begin(), lights.end(), [](const Light& a, const Light& b) {
@@ -339,15 +345,15 @@ namespace {
 /// Adds the error of a partly hidden light to its sigma. If the aspect ratio differs from that of
 /// the lamp, an object may hide one end: the center of the visible part is offset by half of the
 /// hidden length.
-void add_hidden_end(double off, double leaned_off, Light& light) {
+void add_hidden_end_error(double off, double tilt_sd, Light& light) {
   constexpr double clear = 3;
-  if (!(off > leaned_off + clear * light.aspect_sd)) return;
+  if (!(off > tilt_sd + clear * light.aspect_sd)) return;
   const double length_px =
       std::sqrt(std::numbers::pi * light.aspect) * light.radius_px;  // its area has that radius
   light.sigma_px = std::hypot(light.sigma_px, off * length_px / 2 / std::numbers::sqrt2);
 }
 
-void refuse(Light& light, LightReason reason) {
+void reject(Light& light, LightReason reason) {
   light.lamp.reset();
   light.reason = reason;
 }
@@ -357,10 +363,11 @@ void refuse(Light& light, LightReason reason) {
 /// lights by the same factor, which is the median over the lights with clear stripes. At least
 /// three such lights are required. Other periods may differ by kMaxUnclearDrift from those of their
 /// lamps.
-void refuse_other_row_times(const LampMap& lamps, double row_time_s, std::vector<Light>& lights) {
+void reject_contradicting_periods(const LampMap& lamps, double row_time_s,
+                                  std::vector<Light>& lights) {
   constexpr std::size_t min_lights = 3;
   const auto has_clear_period = [](const Light& light) {
-    return !light.by_modulation && trustworthy(light.stripes);
+    return !light.by_modulation && is_reliable(light.stripes);
   };
   std::vector<std::pair<Light*, double>> log_ratios;
   std::vector<double> clear_ones;
@@ -373,10 +380,10 @@ void refuse_other_row_times(const LampMap& lamps, double row_time_s, std::vector
     if (has_clear_period(light)) clear_ones.push_back(log_ratio);
   }
   if (clear_ones.size() < min_lights) return;
-  const double common = (lower_median(clear_ones) + upper_median(clear_ones)) / 2;
+  const double estimate = (lower_median(clear_ones) + upper_median(clear_ones)) / 2;
   for (const auto& [light, log_ratio] : log_ratios) {
     const double max_off = kLampDrift + (has_clear_period(*light) ? kLampDrift : kMaxUnclearDrift);
-    if (std::abs(log_ratio - common) > max_off) refuse(*light, LightReason::unknown_period);
+    if (std::abs(log_ratio - estimate) > max_off) reject(*light, LightReason::unknown_period);
   }
 }
 
@@ -393,18 +400,18 @@ void keep_best_claim(int lamp, std::vector<Light>& lights) {
   }
   if (claims.size() < 2) return;
   std::sort(claims.begin(), claims.end(), [](const Light* a, const Light* b) {
-    if (a->glows != b->glows) return b->glows;
-    return a->glows ? a->radius_px > b->radius_px : a->sigma_px < b->sigma_px;
+    if (a->is_glow != b->is_glow) return b->is_glow;
+    return a->is_glow ? a->radius_px > b->radius_px : a->sigma_px < b->sigma_px;
   });
   const double ratio = std::pow(claims[0]->radius_px / claims[1]->radius_px, 2);
   const bool is_apart =
       (claims[0]->pixel - claims[1]->pixel).norm() > claims[0]->radius_px + claims[1]->radius_px;
-  const bool are_alike = claims[0]->glows == claims[1]->glows;
+  const bool are_alike = claims[0]->is_glow == claims[1]->is_glow;
   bool is_clear = !are_alike || ratio > min_area_ratio ||
-                  (!claims[0]->glows && (!is_apart || 1 / ratio > min_area_ratio));
+                  (!claims[0]->is_glow && (!is_apart || 1 / ratio > min_area_ratio));
   if (!is_clear) {
     const auto alike_end = std::find_if(claims.begin(), claims.end(), [&](const Light* claim) {
-      return claim->glows != claims[0]->glows;
+      return claim->is_glow != claims[0]->is_glow;
     });
     std::sort(claims.begin(), alike_end,
               [](const Light* a, const Light* b) { return a->peak > b->peak; });
@@ -413,26 +420,26 @@ void keep_best_claim(int lamp, std::vector<Light>& lights) {
                claims[0]->peak > min_peak_ratio * claims[1]->peak;
   }
   for (std::size_t i = is_clear ? 1 : 0; i < claims.size(); ++i) {
-    refuse(*claims[i], LightReason::reflection);
+    reject(*claims[i], LightReason::reflection);
   }
 }
 
 }  // namespace
 
-bool wholly_in_view(const Light& light, const ImageSize& size) {
+bool is_fully_in_view(const Light& light, const ImageSize& size) {
   return light.low.minCoeff() > -0.5 && light.high.x() < size.width - 0.5 &&
          light.high.y() < size.height - 0.5;
 }
 
-std::optional<int> LightDetector::lamp_of(const Stripes& stripes) const {
-  if (classifier_) return vlp::lamp_of(*classifier_, stripes);
+std::optional<int> LightDetector::identify_lamp(const Stripes& stripes) const {
+  if (classifier_) return vlp::identify_lamp(*classifier_, stripes);
   if (!camera_.row_time_s) return std::nullopt;
-  return lamp_by_frequency(lamps_, *camera_.row_time_s, stripes);
+  return identify_lamp_by_frequency(lamps_, *camera_.row_time_s, stripes);
 }
 
-std::optional<double> LightDetector::shape_off(const Light& light, int lamp) const {
+std::optional<double> LightDetector::compute_aspect_deviation(const Light& light, int lamp) const {
   // An unknown lens changes the aspect ratio by more than an unknown tilt.
-  const double max_off = shape_.has_lens() ? 2 * kLeanedOff : 0.3;
+  const double max_off = shape_.has_lens() ? 2 * kUnknownTiltSd : 0.3;
   const Lamp* mapped = find_lamp(lamps_.lamps, lamp);  // a classifier may have other lamps
   const LampShape shape = mapped != nullptr ? mapped->shape : LampShape();
   if (shape.kind != light.shape) return std::nullopt;
@@ -449,51 +456,51 @@ void LightDetector::identify(std::vector<Light>& lights, const ImageSize& size) 
   double sharpest_px = std::numeric_limits<double>::infinity(), brightest = 0;
   for (Light& light : lights) {
     if (light.kind == LightKind::formless) continue;
-    const auto steady = why_steady(light);
+    const auto steady = find_steady_reason(light);
     light.kind = steady ? LightKind::steady : LightKind::unknown;
     light.reason = steady.value_or(LightReason::unknown_period);
     if (steady) {
       light.lamp.reset();
       continue;
     }
-    if (!light.uneven && !light.glows) sharpest_px = std::min(sharpest_px, light.rise_px);
-    if (!light.by_modulation) light.lamp = lamp_of(light.stripes);
-    if (!readable(light.stripes)) light.reason = LightReason::no_clear_period;
+    if (!light.is_uneven && !light.is_glow) sharpest_px = std::min(sharpest_px, light.rise_px);
+    if (!light.by_modulation) light.lamp = identify_lamp(light.stripes);
+    if (!is_readable(light.stripes)) light.reason = LightReason::no_clear_period;
     if (!light.lamp) continue;
-    const auto off = shape_off(light, *light.lamp);
+    const auto off = compute_aspect_deviation(light, *light.lamp);
     if (!off) {
-      refuse(light, LightReason::wrong_shape);
+      reject(light, LightReason::wrong_shape);
     } else if (shape_.has_lens()) {
-      add_hidden_end(*off, shape_.knows_level() ? 0 : kLeanedOff, light);
+      add_hidden_end_error(*off, shape_.has_tilt() ? 0 : kUnknownTiltSd, light);
     }
-    if (light.lamp && !light.glows) brightest = std::max(brightest, light.peak);
+    if (light.lamp && !light.is_glow) brightest = std::max(brightest, light.peak);
   }
   for (Light& light : lights) {
     if (!light.lamp) continue;
     // The reflection of a lamp is modulated like the lamp. If too many edge points are not on the
     // lamp's outline, a circle through the others is not reliable.
-    const bool strays = light.outside > max_outside;
-    const bool is_soft = light.glows
+    const bool has_other_outline = light.outside > max_outside;
+    const bool is_soft = light.is_glow
                              ? light.peak < min_peak_ratio * brightest
-                             : !light.uneven && light.rise_px > max_rise_ratio * sharpest_px;
+                             : !light.is_uneven && light.rise_px > max_rise_ratio * sharpest_px;
     if (is_soft) {
-      refuse(light, LightReason::reflection);
-    } else if (strays || light.roundness < kMinRoundness) {
-      refuse(light, LightReason::wrong_shape);
+      reject(light, LightReason::reflection);
+    } else if (has_other_outline || light.roundness < kMinRoundness) {
+      reject(light, LightReason::wrong_shape);
     }
   }
   // A classifier does not use the frequencies of the map.
   if (camera_.row_time_s && !classifier_) {
-    refuse_other_row_times(lamps_, *camera_.row_time_s, lights);
+    reject_contradicting_periods(lamps_, *camera_.row_time_s, lights);
   }
   for (const Lamp& lamp : lamps_.lamps) keep_best_claim(lamp.id, lights);
   const bool sure = std::any_of(lights.begin(), lights.end(), [](const Light& light) {
-    return light.lamp && light.stripes.periods >= kEnoughPeriods;
+    return light.lamp && light.stripes.periods >= kMinReliablePeriods;
   });
   for (Light& light : lights) {
-    if (light.lamp && !sure) refuse(light, LightReason::too_few_periods);
+    if (light.lamp && !sure) reject(light, LightReason::too_few_periods);
     if (!light.lamp) continue;
-    light.kind = wholly_in_view(light, size) ? LightKind::lamp : LightKind::cut;
+    light.kind = is_fully_in_view(light, size) ? LightKind::lamp : LightKind::cut;
     light.reason = LightReason::identified;
   }
 }

@@ -19,11 +19,11 @@
 namespace vlp {
 
 /// Returns true if the image border cuts no part of the light.
-bool wholly_in_view(const Light& light, const ImageSize& size);
+bool is_fully_in_view(const Light& light, const ImageSize& size);
 
 /// Returns the camera of a calibration. The readout direction defaults to rows if the calibration
 /// has none.
-DetectorCamera detector_camera(const Calibration& calibration);
+DetectorCamera make_detector_camera(const Calibration& calibration);
 
 /// Detects and identifies the lamps of a map in images of a rolling-shutter camera. All methods are
 /// const and thread-safe.
@@ -31,7 +31,7 @@ DetectorCamera detector_camera(const Calibration& calibration);
 /// Center: estimated from the outline of the lit scanlines, never from brightness, see LightShape.
 /// Other shapes than discs are searched if the map has them, see ShapeDetector. Where no light with
 /// a clear outline is identified, lights are detected by their modulation, whatever their shape,
-/// see find_modulated_lights(). Their center is that of their rim, see rim_of(). Without a clear
+/// see find_modulated_lights(). Their center is that of their rim, see fit_rim(). Without a clear
 /// rim it is the centroid of the lit area.
 ///
 /// Identity: a lamp of frequency f has stripes with a period of 1 / (f row_time) scanlines (Chen
@@ -46,7 +46,7 @@ class LightDetector {
 
   /// Returns a copy of the detector for a camera with another tilt. If the tilt is unknown,
   /// ellipses are fitted in the image, as without a lens.
-  LightDetector leaning(const std::optional<Eigen::Matrix3d>& level_from_camera) const;
+  LightDetector with_tilt(const std::optional<Eigen::Matrix3d>& level_from_camera) const;
 
   /// Returns a copy of the detector for images with another readout direction.
   LightDetector with_readout(Readout readout) const;
@@ -55,8 +55,8 @@ class LightDetector {
 
  private:
   /// Fits outlines to a blob: one, or several if lights touch. Sets Light::is_doubtful.
-  std::vector<LightPart> parts_of(const ImageView& lines, const Blob& blob,
-                                  const Background& background) const;
+  std::vector<LightPart> find_parts(const ImageView& lines, const Blob& blob,
+                                    const Background& background) const;
   /// Searches for modulated lights in blobs without an identified light that has a clear outline.
   /// Replaces the lights at the position of each modulated light.
   void add_by_modulation(const ImageView& lines, const std::vector<Blob>& blobs,
@@ -68,9 +68,9 @@ class LightDetector {
   void identify(std::vector<Light>& lights, const ImageSize& size) const;
   /// Returns the absolute difference between the log aspect ratios of a light and a lamp. Returns
   /// std::nullopt if the light has another shape or the difference exceeds its limit.
-  std::optional<double> shape_off(const Light& light, int lamp) const;
+  std::optional<double> compute_aspect_deviation(const Light& light, int lamp) const;
   /// Returns the id of the lamp with these stripes; std::nullopt if no lamp or several lamps agree.
-  std::optional<int> lamp_of(const Stripes& stripes) const;
+  std::optional<int> identify_lamp(const Stripes& stripes) const;
 
   LampMap lamps_;
   DetectorCamera camera_;

@@ -7,16 +7,16 @@
 namespace vlp {
 
 std::optional<Readout> ReadoutEvidence::readout() const {
-  constexpr double times = 3, least = 1;
-  if (rows >= least && rows >= times * columns) return Readout::rows;
-  if (columns >= least && columns >= times * rows) return Readout::columns;
+  constexpr double min_ratio = 3, min_evidence = 1;
+  if (rows >= min_evidence && rows >= min_ratio * columns) return Readout::rows;
+  if (columns >= min_evidence && columns >= min_ratio * rows) return Readout::columns;
   return std::nullopt;
 }
 
-double readout_evidence(std::span<const Light> lights) {
+double compute_readout_evidence(std::span<const Light> lights) {
   double sum = 0;
   for (const Light& light : lights) {
-    if (!flickers(light)) continue;
+    if (!is_modulated(light)) continue;
     sum += light.stripes.clarity * light.stripes.contrast * light.roundness;
   }
   return sum;
@@ -24,13 +24,14 @@ double readout_evidence(std::span<const Light> lights) {
 
 void add_evidence(const ImageView& image, ReadoutEvidence& evidence) {
   const LightDetector by_rows({}, {Readout::rows, {}, {}});
-  evidence.rows += readout_evidence(by_rows.detect(image));
-  evidence.columns += readout_evidence(by_rows.with_readout(Readout::columns).detect(image));
+  evidence.rows += compute_readout_evidence(by_rows.detect(image));
+  evidence.columns +=
+      compute_readout_evidence(by_rows.with_readout(Readout::columns).detect(image));
 }
 
 std::optional<Readout> find_readout(std::size_t images,
                                     const std::function<ImageView(std::size_t)>& image) {
-  constexpr double enough = 6;
+  constexpr double sufficient_evidence = 6;
   constexpr int max_used = 8;
   ReadoutEvidence evidence;
   int used = 0;
@@ -40,20 +41,23 @@ std::optional<Readout> find_readout(std::size_t images,
     const double before = evidence.rows + evidence.columns;
     add_evidence(frame, evidence);
     if (evidence.rows + evidence.columns > before) ++used;
-    if (evidence.rows + evidence.columns >= enough && evidence.readout()) break;
+    if (evidence.rows + evidence.columns >= sufficient_evidence && evidence.readout()) break;
   }
   return evidence.readout();
 }
 
-LightsByReadout detect_either_way(const LightDetector& detector, const ImageView& image) {
-  const Readout usual = detector.readout();
-  const Readout other = usual == Readout::rows ? Readout::columns : Readout::rows;
-  LightsByReadout result{usual, detector.detect(image)};
-  std::vector<Light> lights = detector.with_readout(other).detect(image);
-  const double with_usual = readout_evidence(result.lights), with_other = readout_evidence(lights);
-  const ReadoutEvidence evidence = usual == Readout::rows ? ReadoutEvidence{with_usual, with_other}
-                                                          : ReadoutEvidence{with_other, with_usual};
-  if (evidence.readout() == other) result = {other, std::move(lights)};
+LightsWithReadout detect_with_either_readout(const LightDetector& detector,
+                                             const ImageView& image) {
+  const Readout default_readout = detector.readout();
+  const Readout other_readout = default_readout == Readout::rows ? Readout::columns : Readout::rows;
+  LightsWithReadout result{default_readout, detector.detect(image)};
+  std::vector<Light> lights = detector.with_readout(other_readout).detect(image);
+  const double default_evidence = compute_readout_evidence(result.lights),
+               other_evidence = compute_readout_evidence(lights);
+  const ReadoutEvidence evidence = default_readout == Readout::rows
+                                       ? ReadoutEvidence{default_evidence, other_evidence}
+                                       : ReadoutEvidence{other_evidence, default_evidence};
+  if (evidence.readout() == other_readout) result = {other_readout, std::move(lights)};
   return result;
 }
 

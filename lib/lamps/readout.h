@@ -27,7 +27,7 @@ struct ReadoutEvidence {
 
 /// Returns the sum of ReadoutEvidence over `lights`, which were detected with one readout
 /// direction.
-double readout_evidence(std::span<const Light> lights);
+double compute_readout_evidence(std::span<const Light> lights);
 
 /// Adds the evidence of an image. With the correct readout direction a lamp has stripes; with the
 /// other one it breaks into pieces or has no stripes.
@@ -43,13 +43,13 @@ std::optional<Readout> find_readout(std::size_t images,
                                     const std::function<ImageView(std::size_t)>& image);
 
 /// Lights of an image and the readout direction with which they were detected.
-struct LightsByReadout {
+struct LightsWithReadout {
   Readout readout;
   std::vector<Light> lights;
 };
 
 /// Detects the lights of an image with unknown readout direction. Uses the detector's direction, or
 /// the other one if the image has clear evidence for it, for example if a phone rotated the image.
-LightsByReadout detect_either_way(const LightDetector& detector, const ImageView& image);
+LightsWithReadout detect_with_either_readout(const LightDetector& detector, const ImageView& image);
 
 }  // namespace vlp

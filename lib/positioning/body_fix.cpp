@@ -30,22 +30,23 @@ Eigen::Vector3d about_z(const Eigen::Vector3d& v) { return {-v.y(), v.x(), 0}; }
 
 /// Intermediate results of q: relative to R along the level axes of time 0, without u t; along the
 /// level axes of time t; and q + arm.
-struct Way {
+struct LampTerms {
   Eigen::Vector3d still, turned_level, in_body;
   Eigen::Vector2d turn;
 };
 
-Way way_of(const PosedBody& at, const Eigen::Vector3d& lamp_m, double time_s) {
+LampTerms compute_lamp_terms(const EvaluatedState& at, const Eigen::Vector3d& lamp_m,
+                             double time_s) {
   const BodyMotion& motion = at.state.motion;
-  Way way;
-  way.still = turned_back(at.heading, lamp_m - at.state.pose.position_m);
-  Eigen::Vector3d level = way.still;
+  LampTerms terms;
+  terms.still = turned_back(at.heading, lamp_m - at.state.pose.position_m);
+  Eigen::Vector3d level = terms.still;
   level.head<2>() -= motion.velocity_m_per_s * time_s;
-  way.turn = motion.yaw_rate_rad_per_s == 0 ? Eigen::Vector2d(1, 0)
-                                            : unit(motion.yaw_rate_rad_per_s * time_s);
-  way.turned_level = turned_back(way.turn, level);
-  way.in_body = at.body_from_level * way.turned_level;
-  return way;
+  terms.turn = motion.yaw_rate_rad_per_s == 0 ? Eigen::Vector2d(1, 0)
+                                              : unit(motion.yaw_rate_rad_per_s * time_s);
+  terms.turned_level = turned_back(terms.turn, level);
+  terms.in_body = at.body_from_level * terms.turned_level;
+  return terms;
 }
 
 /// Derivative of q, a column for each state.
@@ -59,24 +60,25 @@ struct States {
   static constexpr std::size_t kCount = kLean + (lean ? 2 : 0);
   static constexpr bool kHasLean = lean;
 
-  static Columns<kCount> d_in_body(const PosedBody& at, const Way& way, double time_s) {
+  static Columns<kCount> d_in_body(const EvaluatedState& at, const LampTerms& terms,
+                                   double time_s) {
     const auto& body_from_level = at.body_from_level;
-    const Eigen::Vector2d back(way.turn.x() * at.heading.x() - way.turn.y() * at.heading.y(),
-                               -way.turn.x() * at.heading.y() - way.turn.y() * at.heading.x());
+    const Eigen::Vector2d back(terms.turn.x() * at.heading.x() - terms.turn.y() * at.heading.y(),
+                               -terms.turn.x() * at.heading.y() - terms.turn.y() * at.heading.x());
     Columns<kCount> d;
     d[0] = body_from_level * Eigen::Vector3d(-back.x(), -back.y(), 0);
     d[1] = body_from_level * Eigen::Vector3d(back.y(), -back.x(), 0);
     d[2] = -body_from_level.col(2);
-    d[3] = body_from_level * -about_z(turned_back(way.turn, way.still));
+    d[3] = body_from_level * -about_z(turned_back(terms.turn, terms.still));
     if constexpr (velocity) {
-      const Eigen::Vector2d turn = time_s * way.turn;
+      const Eigen::Vector2d turn = time_s * terms.turn;
       d[4] = body_from_level * Eigen::Vector3d(-turn.x(), turn.y(), 0);
       d[5] = body_from_level * Eigen::Vector3d(-turn.y(), -turn.x(), 0);
     }
-    if constexpr (yaw_rate) d[kYawRate] = body_from_level * (-time_s * about_z(way.turned_level));
+    if constexpr (yaw_rate) d[kYawRate] = body_from_level * (-time_s * about_z(terms.turned_level));
     if constexpr (lean) {
-      d[kLean] = Eigen::Vector3d(0, way.in_body.z(), -way.in_body.y());
-      d[kLean + 1] = way.in_body.cross(at.pitch_axis);
+      d[kLean] = Eigen::Vector3d(0, terms.in_body.z(), -terms.in_body.y());
+      d[kLean + 1] = terms.in_body.cross(at.pitch_axis);
     }
     return d;
   }
@@ -92,7 +94,7 @@ struct States {
   }
 };
 
-BodyState moved(const BodyState& from, const BodyVector& step) {
+BodyState plus(const BodyState& from, const BodyVector& step) {
   BodyState next = from;
   next.pose.position_m += step.head<3>();
   next.pose.yaw_rad += step[kBodyYaw];
@@ -105,7 +107,7 @@ BodyState moved(const BodyState& from, const BodyVector& step) {
 }
 
 /// Returns the weights of the priors: 1 / sd of each state, zero for fixed states.
-BodyVector weights_of(const BodyPrior& prior) {
+BodyVector compute_prior_weights(const BodyPrior& prior) {
   const auto inverse = [](double sd) { return sd > 0 ? 1 / sd : 0; };
   BodyVector weights = BodyVector::Zero();
   if (prior.height) weights[2] = inverse(prior.height->sd_m);
@@ -116,15 +118,15 @@ BodyVector weights_of(const BodyPrior& prior) {
 }
 
 /// Returns the prior residuals, (state - prior mean) / sd.
-BodyVector deviations_of(const BodyState& state, const BodyPrior& prior,
-                         const BodyVector& weights) {
+BodyVector compute_prior_residuals(const BodyState& state, const BodyPrior& prior,
+                                   const BodyVector& weights) {
   const BodyMotion &motion = state.motion, &mean = prior.mean;
   BodyVector deviations = BodyVector::Zero();
   if (prior.height) deviations[2] = state.pose.position_m.z() - prior.height->z_m;
   deviations.segment<2>(kBodyVelocity) = motion.velocity_m_per_s - mean.velocity_m_per_s;
   deviations[kBodyYawRate] = motion.yaw_rate_rad_per_s - mean.yaw_rate_rad_per_s;
-  deviations[kBodyRoll] = wrapped_rad(motion.inclination.roll_rad - mean.inclination.roll_rad);
-  deviations[kBodyPitch] = wrapped_rad(motion.inclination.pitch_rad - mean.inclination.pitch_rad);
+  deviations[kBodyRoll] = wrap_rad(motion.inclination.roll_rad - mean.inclination.roll_rad);
+  deviations[kBodyPitch] = wrap_rad(motion.inclination.pitch_rad - mean.inclination.pitch_rad);
   return deviations.cwiseProduct(weights);
 }
 
@@ -136,13 +138,13 @@ struct LampResidual {
   double inverse_depth;
 };
 
-LampResidual residual_of(const BodySighting& sighting, const Eigen::Vector3d& q) {
+LampResidual compute_lamp_residual(const BodyObservation& sighting, const Eigen::Vector3d& q) {
   const double inverse_depth = 1 / sighting.ray.dot(q);
   return {-inverse_depth * (sighting.whitened_pixel_from_ray * q), inverse_depth};
 }
 
 /// Returns the derivative of the lamp's pixel by q.
-Matrix23 d_pixel(const BodySighting& sighting, const LampResidual& residual) {
+Matrix23 d_pixel(const BodyObservation& sighting, const LampResidual& residual) {
   return residual.inverse_depth *
          (sighting.whitened_pixel_from_ray + residual.value * sighting.ray.transpose());
 }
@@ -154,17 +156,17 @@ struct Linearized : Normal<S::kCount> {
   double pixels_chi_squared = 0, sum_px2 = 0;
   bool lamps_ahead = true;
 
-  Linearized(std::span<const BodySighting> sightings, const Eigen::Vector3d& arm_m,
-             const BodyPrior& prior, const BodyVector& weights, const PosedBody& at) {
-    for (const BodySighting& sighting : sightings) {
-      const Way way = way_of(at, sighting.lamp_m, sighting.time_s);
-      const LampResidual residual = residual_of(sighting, way.in_body - arm_m);
+  Linearized(std::span<const BodyObservation> sightings, const Eigen::Vector3d& arm_m,
+             const BodyPrior& prior, const BodyVector& weights, const EvaluatedState& at) {
+    for (const BodyObservation& sighting : sightings) {
+      const LampTerms terms = compute_lamp_terms(at, sighting.lamp_m, sighting.time_s);
+      const LampResidual residual = compute_lamp_residual(sighting, terms.in_body - arm_m);
       if (!(residual.inverse_depth > 0)) {
         lamps_ahead = false;
         return;
       }
       const Matrix23 d_pixel_d_q = d_pixel(sighting, residual);
-      const auto d_q = S::d_in_body(at, way, sighting.time_s);
+      const auto d_q = S::d_in_body(at, terms, sighting.time_s);
       for (const int axis : {0, 1}) {
         const Eigen::Vector3d d_axis = d_pixel_d_q.row(axis);
         std::array<double, S::kCount> row;
@@ -176,7 +178,7 @@ struct Linearized : Normal<S::kCount> {
       sum_px2 += sighting.sigma_px * sighting.sigma_px * square;
     }
     pixels_chi_squared = chi_squared;
-    const BodyVector deviations = deviations_of(at.state, prior, weights);
+    const BodyVector deviations = compute_prior_residuals(at.state, prior, weights);
     constexpr auto indices = S::indices();
     for (std::size_t i = 2; i < S::kCount; ++i) {
       const double weight = weights[indices[i]];
@@ -202,7 +204,7 @@ BodyFix finished(const Linearized<S>& normal, const Cholesky<S::kCount>& factor,
                  const BodyVector& weights, const BodyState& state, double lamps) {
   BodyFix fix;
   fix.state = state;
-  fix.state.pose.yaw_rad = wrapped_rad(state.pose.yaw_rad);
+  fix.state.pose.yaw_rad = wrap_rad(state.pose.yaw_rad);
   fix.chi_squared = normal.chi_squared;
   fix.pixels_chi_squared = normal.pixels_chi_squared;
   fix.residual_px = std::sqrt(normal.sum_px2 / lamps);
@@ -220,14 +222,15 @@ BodyFix finished(const Linearized<S>& normal, const Cholesky<S::kCount>& factor,
 }
 
 template <typename S>
-std::optional<BodyFix> solve(std::span<const BodySighting> sightings, const Eigen::Vector3d& arm_m,
-                             const BodyPrior& prior, const BodyState& start) {
+std::optional<BodyFix> solve(std::span<const BodyObservation> sightings,
+                             const Eigen::Vector3d& arm_m, const BodyPrior& prior,
+                             const BodyState& start) {
   constexpr int max_iterations = 50, max_halvings = 60;
   // Near the minimum the sum of squares changes by less than it can be computed.
   constexpr double rounding = 1e-12;
   constexpr auto indices = S::indices();
-  const BodyVector weights = weights_of(prior);
-  PosedBody at(start);
+  const BodyVector weights = compute_prior_weights(prior);
+  EvaluatedState at(start);
   Linearized<S> normal(sightings, arm_m, prior, weights, at);
   if (!normal.lamps_ahead) return std::nullopt;
   const double scale_m = (sightings.front().lamp_m - start.pose.position_m).norm();
@@ -239,14 +242,15 @@ std::optional<BodyFix> solve(std::span<const BodySighting> sightings, const Eige
     for (std::size_t i = 0; i < S::kCount; ++i) step[indices[i]] = solution[i];
     if (!step.allFinite()) return std::nullopt;
     for (int halving = 0;; ++halving, step /= 2) {
-      const BodyState next_state = moved(at.state, step);
+      const BodyState next_state = plus(at.state, step);
       if (negligible(step, scale_m, halving == 0)) {
         const auto lamps = static_cast<double>(sightings.size());
         std::optional<BodyFix> fix = finished<S>(normal, factor, weights, next_state, lamps);
         if (!fix->covariance.allFinite()) fix.reset();
         return fix;
       }
-      const PosedBody next = S::kHasLean ? PosedBody(next_state) : PosedBody(next_state, at);
+      const EvaluatedState next =
+          S::kHasLean ? EvaluatedState(next_state) : EvaluatedState(next_state, at);
       const Linearized<S> next_normal(sightings, arm_m, prior, weights, next);
       if (next_normal.lamps_ahead &&
           next_normal.chi_squared <= normal.chi_squared * (1 + rounding)) {
@@ -274,7 +278,7 @@ std::optional<Eigen::Matrix<double, 2, 3>> whitened_pixel_from_ray(
   return pixel_from_ray / sigma_px;
 }
 
-PosedBody::PosedBody(const BodyState& at) : state(at), heading(unit(at.pose.yaw_rad)) {
+EvaluatedState::EvaluatedState(const BodyState& at) : state(at), heading(unit(at.pose.yaw_rad)) {
   const Eigen::Vector2d roll = unit(at.motion.inclination.roll_rad);
   const Eigen::Vector2d pitch = unit(at.motion.inclination.pitch_rad);
   const double cr = roll.x(), sr = roll.y(), cp = pitch.x(), sp = pitch.y();
@@ -282,49 +286,50 @@ PosedBody::PosedBody(const BodyState& at) : state(at), heading(unit(at.pose.yaw_
   pitch_axis = {0, cr, -sr};
 }
 
-PosedBody::PosedBody(const BodyState& at, const PosedBody& other)
+EvaluatedState::EvaluatedState(const BodyState& at, const EvaluatedState& other)
     : state(at),
       heading(unit(at.pose.yaw_rad)),
       body_from_level(other.body_from_level),
       pitch_axis(other.pitch_axis) {}
 
-Eigen::Vector3d PosedBody::lamp_in_body(const Eigen::Vector3d& lamp_m, double time_s) const {
-  return way_of(*this, lamp_m, time_s).in_body;
+Eigen::Vector3d EvaluatedState::lamp_in_body(const Eigen::Vector3d& lamp_m, double time_s) const {
+  return compute_lamp_terms(*this, lamp_m, time_s).in_body;
 }
 
-Eigen::Matrix<double, 3, kBodyStates> PosedBody::d_lamp_in_body(const Eigen::Vector3d& lamp_m,
-                                                                double time_s) const {
+Eigen::Matrix<double, 3, kBodyStates> EvaluatedState::d_lamp_in_body(const Eigen::Vector3d& lamp_m,
+                                                                     double time_s) const {
   const auto columns =
-      States<true, true, true>::d_in_body(*this, way_of(*this, lamp_m, time_s), time_s);
+      States<true, true, true>::d_in_body(*this, compute_lamp_terms(*this, lamp_m, time_s), time_s);
   Eigen::Matrix<double, 3, kBodyStates> derivative;
   for (int i = 0; i < kBodyStates; ++i) derivative.col(i) = columns[static_cast<std::size_t>(i)];
   return derivative;
 }
 
-Matrix23 d_whitened_pixel_d_lamp(const BodySighting& sighting,
+Matrix23 d_whitened_pixel_d_lamp(const BodyObservation& sighting,
                                  const Eigen::Vector3d& lamp_from_camera_m) {
-  return d_pixel(sighting, residual_of(sighting, lamp_from_camera_m));
+  return d_pixel(sighting, compute_lamp_residual(sighting, lamp_from_camera_m));
 }
 
-std::optional<double> chi_squared_of(std::span<const BodySighting> sightings,
-                                     const Eigen::Vector3d& arm_in_body_m, const BodyPrior& prior,
-                                     const BodyState& state) {
-  const PosedBody at(state);
-  double sum = deviations_of(state, prior, weights_of(prior)).squaredNorm();
-  for (const BodySighting& sighting : sightings) {
-    const Eigen::Vector3d q = way_of(at, sighting.lamp_m, sighting.time_s).in_body - arm_in_body_m;
-    const LampResidual residual = residual_of(sighting, q);
+std::optional<double> compute_chi_squared(std::span<const BodyObservation> sightings,
+                                          const Eigen::Vector3d& arm_in_body_m,
+                                          const BodyPrior& prior, const BodyState& state) {
+  const EvaluatedState at(state);
+  double sum = compute_prior_residuals(state, prior, compute_prior_weights(prior)).squaredNorm();
+  for (const BodyObservation& sighting : sightings) {
+    const Eigen::Vector3d q =
+        compute_lamp_terms(at, sighting.lamp_m, sighting.time_s).in_body - arm_in_body_m;
+    const LampResidual residual = compute_lamp_residual(sighting, q);
     if (!(residual.inverse_depth > 0)) return std::nullopt;
     sum += residual.value.squaredNorm();
   }
   return sum;
 }
 
-std::optional<BodyFix> fix_body(std::span<const BodySighting> sightings,
-                                const Eigen::Vector3d& arm_in_body_m, const BodyPrior& prior,
-                                const BodyState& start) {
-  using Solver = std::optional<BodyFix> (*)(std::span<const BodySighting>, const Eigen::Vector3d&,
-                                            const BodyPrior&, const BodyState&);
+std::optional<BodyFix> estimate_body(std::span<const BodyObservation> sightings,
+                                     const Eigen::Vector3d& arm_in_body_m, const BodyPrior& prior,
+                                     const BodyState& start) {
+  using Solver = std::optional<BodyFix> (*)(
+      std::span<const BodyObservation>, const Eigen::Vector3d&, const BodyPrior&, const BodyState&);
   static constexpr std::array<Solver, 8> solvers{
       solve<States<false, false, false>>, solve<States<true, false, false>>,
       solve<States<false, true, false>>,  solve<States<true, true, false>>,

@@ -56,7 +56,7 @@ struct BodyPrior {
 };
 
 /// Observation of a lamp of the map.
-struct BodySighting {
+struct BodyObservation {
   /// P, in the world.
   Eigen::Vector3d lamp_m;
   /// Direction to the lamp along the axes of the body, unit length.
@@ -90,11 +90,11 @@ struct BodyFix {
 };
 
 /// A state with the trigonometric terms that predictions use.
-class PosedBody {
+class EvaluatedState {
  public:
-  explicit PosedBody(const BodyState& state);
+  explicit EvaluatedState(const BodyState& state);
   /// Copies the terms of roll and pitch from `other`, which has the same roll and pitch.
-  PosedBody(const BodyState& state, const PosedBody& other);
+  EvaluatedState(const BodyState& state, const EvaluatedState& other);
 
   /// Returns q + arm of a lamp.
   Eigen::Vector3d lamp_in_body(const Eigen::Vector3d& lamp_m, double time_s) const;
@@ -111,22 +111,22 @@ class PosedBody {
 };
 
 /// Returns the derivative of a lamp's pixel, in standard deviations, by q.
-Eigen::Matrix<double, 2, 3> d_whitened_pixel_d_lamp(const BodySighting& sighting,
+Eigen::Matrix<double, 2, 3> d_whitened_pixel_d_lamp(const BodyObservation& sighting,
                                                     const Eigen::Vector3d& lamp_from_camera_m);
 
 /// Computes the sum of the squared residuals of pixels and priors over their variances at `state`.
 /// Returns std::nullopt if a lamp is behind its ray.
-std::optional<double> chi_squared_of(std::span<const BodySighting> sightings,
-                                     const Eigen::Vector3d& arm_in_body_m, const BodyPrior& prior,
-                                     const BodyState& state);
+std::optional<double> compute_chi_squared(std::span<const BodyObservation> sightings,
+                                          const Eigen::Vector3d& arm_in_body_m,
+                                          const BodyPrior& prior, const BodyState& state);
 
 /// Estimates the state by least squares over pixels and priors. Gauss-Newton from `start`; a step
 /// that does not reduce the sum of squares is halved. Returns std::nullopt if a lamp is behind its
 /// ray at `start`, if lamps and priors do not determine the state, or without convergence in 50
 /// steps.
 /// @pre `start` has the values of the states that the prior fixes
-std::optional<BodyFix> fix_body(std::span<const BodySighting> sightings,
-                                const Eigen::Vector3d& arm_in_body_m, const BodyPrior& prior,
-                                const BodyState& start);
+std::optional<BodyFix> estimate_body(std::span<const BodyObservation> sightings,
+                                     const Eigen::Vector3d& arm_in_body_m, const BodyPrior& prior,
+                                     const BodyState& start);
 
 }  // namespace vlp

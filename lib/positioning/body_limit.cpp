@@ -9,10 +9,10 @@ namespace {
 
 const Eigen::Vector3d kNoArm = Eigen::Vector3d::Zero();
 
-std::optional<BodySighting> exact_sighting(const Eigen::Vector3d& lamp_m, const Lens& lens,
-                                           const Eigen::Matrix3d& camera_from_level,
-                                           const Pose& level, double noise_px,
-                                           const std::optional<RowClock>& row_clock) {
+std::optional<BodyObservation> exact_sighting(const Eigen::Vector3d& lamp_m, const Lens& lens,
+                                              const Eigen::Matrix3d& camera_from_level,
+                                              const Pose& level, double noise_px,
+                                              const std::optional<RowClock>& row_clock) {
   const auto pixel = lens.project(camera_from_level * level_from_world(level, lamp_m));
   if (!pixel) return std::nullopt;
   const auto ray = lens.unproject(*pixel);
@@ -22,12 +22,12 @@ std::optional<BodySighting> exact_sighting(const Eigen::Vector3d& lamp_m, const 
   const auto whitened =
       whitened_pixel_from_ray(direction, level_from_camera * ray->d_direction_d_pixel, noise_px);
   if (!whitened) return std::nullopt;
-  return BodySighting{lamp_m, direction.normalized(), *whitened, noise_px,
-                      row_clock ? row_clock->time_s(*pixel) : 0};
+  return BodyObservation{lamp_m, direction.normalized(), *whitened, noise_px,
+                         row_clock ? row_clock->time_s(*pixel) : 0};
 }
 
 std::optional<Matrix4> pose_covariance(const BodyLimit& limit, const BodyPrior& prior) {
-  const auto fix = fix_body(limit.frame.span(), kNoArm, prior, limit.fix.state);
+  const auto fix = estimate_body(limit.frame.span(), kNoArm, prior, limit.fix.state);
   if (!fix) return std::nullopt;
   return Matrix4(fix->covariance.topLeftCorner<4, 4>());
 }
@@ -40,24 +40,26 @@ bool may_move(const BodyPrior& prior) {
 
 bool is_free(const BodyPrior& prior) { return may_move(prior) || prior.inclination_sd_rad > 0; }
 
-std::optional<BodyLimit> body_limit(std::span<const Eigen::Vector3d> lamps_m, const Lens& lens,
-                                    const Eigen::Matrix3d& camera_from_level, const Pose& level,
-                                    double noise_px, const BodyPrior& prior,
-                                    const std::optional<RowClock>& row_clock) {
+std::optional<BodyLimit> compute_body_limit(std::span<const Eigen::Vector3d> lamps_m,
+                                            const Lens& lens,
+                                            const Eigen::Matrix3d& camera_from_level,
+                                            const Pose& level, double noise_px,
+                                            const BodyPrior& prior,
+                                            const std::optional<RowClock>& row_clock) {
   if (lamps_m.size() < 2 || lamps_m.size() > kMaxSightings) return std::nullopt;
   // Exact observations neither contradict the fix nor fit a mirrored map: the limit has no effect.
-  constexpr double share = 0.1;
+  constexpr double residual_limit = 0.1;
   BodyLimit limit;
-  BodyFrame& frame = limit.frame;
+  BodyObservations& frame = limit.frame;
   for (const Eigen::Vector3d& lamp_m : lamps_m) {
     const auto seen = exact_sighting(lamp_m, lens, camera_from_level, level, noise_px, row_clock);
     if (!seen) return std::nullopt;
     frame.sightings[frame.size] = *seen;
     frame.nearest_m[frame.size] = std::numeric_limits<double>::infinity();
     frame.ids[frame.size] = static_cast<int>(frame.size);
-    frame.now = ++frame.size;
+    frame.num_current = ++frame.size;
   }
-  const auto [status, fix] = fix_body_frame(frame, kNoArm, prior, share);
+  const auto [status, fix] = estimate_body_robust(frame, kNoArm, prior, residual_limit);
   if (status != FixStatus::ok) return std::nullopt;
   limit.fix = fix;
   // The fix is at rest and level to rounding.

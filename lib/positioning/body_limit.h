@@ -25,7 +25,7 @@ struct BodyLimit {
   /// increase due to unknown motion; `lean` the increase due to unknown roll and pitch.
   Matrix4 noise, motion, lean;
   /// Exact observations of the lamps, and the fix from these and the prior.
-  BodyFrame frame;
+  BodyObservations frame;
   BodyFix fix;
 };
 
@@ -33,11 +33,14 @@ struct BodyLimit {
 /// rest and level.
 ///
 /// @param noise_px   standard deviation of each pixel per axis
-/// @return std::nullopt if fix_body_frame() finds no fix, or if the lens does not image a lamp
+/// @return std::nullopt if estimate_body_robust() finds no fix, or if the lens does not image a
+/// lamp
 /// @pre `row_clock` has a value if the prior leaves the motion free
-std::optional<BodyLimit> body_limit(std::span<const Eigen::Vector3d> lamps_m, const Lens& lens,
-                                    const Eigen::Matrix3d& camera_from_level, const Pose& level,
-                                    double noise_px, const BodyPrior& prior,
-                                    const std::optional<RowClock>& row_clock);
+std::optional<BodyLimit> compute_body_limit(std::span<const Eigen::Vector3d> lamps_m,
+                                            const Lens& lens,
+                                            const Eigen::Matrix3d& camera_from_level,
+                                            const Pose& level, double noise_px,
+                                            const BodyPrior& prior,
+                                            const std::optional<RowClock>& row_clock);
 
 }  // namespace vlp

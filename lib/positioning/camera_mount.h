@@ -18,9 +18,10 @@ using InclinationJacobian = Eigen::Matrix<double, 4, 2>;
 ///   robot = S - Rz(g) m,   yaw = g - yaw_in_robot
 ///
 /// @param camera   pose of the camera with the covariance from pixel noise
-/// @param by_lean  derivative of the camera pose by the inclination; m depends on the inclination,
-/// too
-PoseEstimate robot_from_camera(const PoseEstimate& camera, const InclinationJacobian& by_lean,
+/// @param d_pose_d_inclination  derivative of the camera pose by the inclination; m depends on the
+/// inclination, too
+PoseEstimate robot_from_camera(const PoseEstimate& camera,
+                               const InclinationJacobian& d_pose_d_inclination,
                                double inclination_sigma_rad, const CameraMount& mount,
                                const InclinationRotation& lean);
 

@@ -42,8 +42,8 @@ Eigen::MatrixXd known_by(const Eigen::MatrixXd& covariance, Eigen::Index first, 
   const Eigen::VectorXd inverse_sd =
       (sd.array() > 0).select(sd.cwiseInverse(), Eigen::VectorXd::Zero(size));
   const Eigen::MatrixXd scaled = columns * inverse_sd.asDiagonal();
-  const auto eigen =
-      symmetric_eigen(Eigen::MatrixXd(inverse_sd.asDiagonal() * scaled.middleRows(first, size)));
+  const auto eigen = decompose_symmetric(
+      Eigen::MatrixXd(inverse_sd.asDiagonal() * scaled.middleRows(first, size)));
   constexpr double rounding = 1e-12;
   const Eigen::ArrayXd values = eigen.values;
   const Eigen::VectorXd whitening =
@@ -83,7 +83,7 @@ const Place* find_place(const std::vector<Place>& places, int id) {
 
 CommonErrors::CommonErrors(std::span<const Lamp> lamps, const Calibration& calibration,
                            Correction correction)
-    : intrinsics_(stated_intrinsics(calibration.camera)),
+    : intrinsics_(count_reported_intrinsics(calibration.camera)),
       base_from_camera_(level_from_camera(calibration, correction)),
       camera_from_base_(base_from_camera_.inverse()) {
   const bool turned = calibration.rotation_center &&
@@ -94,8 +94,8 @@ CommonErrors::CommonErrors(std::span<const Lamp> lamps, const Calibration& calib
   if (shifted) add_turns(turns_, calibration, correction, with_offset_error);
   offset_ = intrinsics_ + (turned ? 2 : 0);
   assign_rows(lamps, calibration);
-  state_lens_and_zenith(calibration);
-  state_lamps(lamps, calibration.adjustment);
+  set_lens_and_zenith(calibration);
+  set_lamps(lamps, calibration.adjustment);
   if (turned || shifted) propagate_to_zenith_and_offset(lamps, calibration);
   stated_ =
       calibration.adjustment || covariance_.diagonal().maxCoeff() > 0 ||
@@ -134,7 +134,7 @@ Eigen::Matrix3d CommonErrors::covariance_of_lamps(std::size_t lamp, std::size_t 
   return covariance_.block<3, 3>(*row, *column);
 }
 
-void CommonErrors::state_lens_and_zenith(const Calibration& calibration) {
+void CommonErrors::set_lens_and_zenith(const Calibration& calibration) {
   const auto& center = calibration.rotation_center;
   const auto& dispersion = calibration.dispersion;
   const auto& adjustment = calibration.adjustment;
@@ -158,8 +158,8 @@ void CommonErrors::state_lens_and_zenith(const Calibration& calibration) {
   }
 }
 
-void CommonErrors::state_lamps(std::span<const Lamp> lamps,
-                               const std::optional<Adjustment>& adjustment) {
+void CommonErrors::set_lamps(std::span<const Lamp> lamps,
+                             const std::optional<Adjustment>& adjustment) {
   // Pairs of a row here and the same row of the adjustment's covariance.
   std::vector<std::pair<Eigen::Index, Eigen::Index>> adjusted;
   if (adjustment) {
@@ -237,17 +237,17 @@ std::optional<Eigen::Index> CommonErrors::find_stated_row(
   return is_stated ? row : std::nullopt;
 }
 
-CommonErrors CommonErrors::only(CommonPart part) const {
-  const std::array<Eigen::Index, kCommonParts.size() + 1> rows{0, intrinsics_, offset_, shared(),
-                                                               covariance_.rows()};
+CommonErrors CommonErrors::only(CommonErrorSource part) const {
+  const std::array<Eigen::Index, kCommonErrorSources.size() + 1> rows{0, intrinsics_, offset_,
+                                                                      shared(), covariance_.rows()};
   CommonErrors one = *this;
-  MatrixX rest = 0.5 * (covariance_ + covariance_.transpose());  // to the last bit
+  MatrixX remainder = 0.5 * (covariance_ + covariance_.transpose());  // to the last bit
   for (std::size_t i = 0;; ++i) {
-    one.covariance_ = known_by(rest, rows[i], rows[i + 1] - rows[i]);
-    if (kCommonParts[i] == part) break;
-    rest -= one.covariance_;
+    one.covariance_ = known_by(remainder, rows[i], rows[i + 1] - rows[i]);
+    if (kCommonErrorSources[i] == part) break;
+    remainder -= one.covariance_;
   }
-  if (part != CommonPart::lamps) {
+  if (part != CommonErrorSource::lamps) {
     for (LampErrors& lamp : one.lamps_) lamp.variance_m2 = 0;
   }
   one.stated_ =
@@ -257,9 +257,9 @@ CommonErrors CommonErrors::only(CommonPart part) const {
   return one;
 }
 
-CommonErrors::ByRay CommonErrors::effect_on_ray(const Eigen::Vector3d& ray_in_base,
-                                                const Lens& lens) const {
-  ByRay effect = ByRay::Zero(3, shared());
+CommonErrors::RayJacobian CommonErrors::effect_on_ray(const Eigen::Vector3d& ray_in_base,
+                                                      const Lens& lens) const {
+  RayJacobian effect = RayJacobian::Zero(3, shared());
   const Eigen::Vector3d ray = camera_from_base_ * ray_in_base;
   if (const auto seen = lens.project_with_jacobians(ray)) {
     // For a fixed pixel the ray moves within its plane of z.
@@ -281,30 +281,30 @@ CommonErrors::Effect CommonErrors::effect_on(const Sighting& sighting, const Lev
   d_z << 1, 0, -sighting.z.x(), 0, 1, -sighting.z.y();
   const Eigen::Matrix<double, 2, 3> d_z_d_base = d_z * level_from_base;
   Effect effect;
-  effect.by_lamp = predict(pose, sighting.lamp_m).d_z_d_state.leftCols<3>();
+  effect.jacobian_wrt_lamp = predict(pose, sighting.lamp_m).d_z_d_state.leftCols<3>();
   // As effect_on_ray(), the narrow products first.
   const Eigen::Vector3d ray =
       camera_from_base_ * (level_from_base.transpose() * sighting.z.homogeneous());
-  effect.by_shared.resize(2, shared());
+  effect.jacobian_wrt_shared.resize(2, shared());
   if (const auto seen = lens.project_with_jacobians(ray)) {
     const Eigen::Matrix2d d_z_d_pixel = -d_z_d_base * base_from_camera_.leftCols<2>() *
                                         seen->d_pixel_d_point.leftCols<2>().inverse();
-    effect.by_shared.leftCols(intrinsics_).noalias() =
+    effect.jacobian_wrt_shared.leftCols(intrinsics_).noalias() =
         d_z_d_pixel.lazyProduct(seen->d_pixel_d_parameters);
   } else {
-    effect.by_shared.leftCols(intrinsics_).setZero();
+    effect.jacobian_wrt_shared.leftCols(intrinsics_).setZero();
   }
   for (std::size_t i = 0; i < turns_.size(); ++i) {
-    effect.by_shared.col(intrinsics_ + static_cast<Eigen::Index>(i)) =
+    effect.jacobian_wrt_shared.col(intrinsics_ + static_cast<Eigen::Index>(i)) =
         d_z_d_base * (turns_[i] * ray);
   }
   return effect;
 }
 
-CommonErrors::Gain CommonErrors::gain_of(std::span<const Sighting> sightings,
-                                         std::span<const std::size_t> lamps,
-                                         const PoseEstimate& camera, const Lens& lens,
-                                         const Eigen::Matrix3d& level_from_base) const {
+CommonErrors::Gain CommonErrors::compute_gain(std::span<const Sighting> sightings,
+                                              std::span<const std::size_t> lamps,
+                                              const PoseEstimate& camera, const Lens& lens,
+                                              const Eigen::Matrix3d& level_from_base) const {
   const LevelPose pose(camera.pose);
   Gain gain(shared());
   for (std::size_t i = 0; i < sightings.size(); ++i) {
@@ -312,7 +312,7 @@ CommonErrors::Gain CommonErrors::gain_of(std::span<const Sighting> sightings,
     const Effect effect = effect_on(sighting, pose, lens, level_from_base);
     Eigen::Matrix<double, 4, 2> d_fix_d_z;
     if (sightings.size() == 1) {
-      // fix_one_lamp(): s = p - H e^{jg} z.
+      // compute_one_lamp_pose(): s = p - H e^{jg} z.
       d_fix_d_z.setZero();
       d_fix_d_z.topRows<2>() = -height_above(pose, sighting.lamp_m) * product_matrix(pose.heading);
     } else {
@@ -320,21 +320,21 @@ CommonErrors::Gain CommonErrors::gain_of(std::span<const Sighting> sightings,
       d_fix_d_z = camera.covariance * predict(pose, sighting.lamp_m).d_z_d_state.transpose() *
                   (whitening.transpose() * whitening);
     }
-    gain.by_shared.noalias() += d_fix_d_z.lazyProduct(effect.by_shared);
-    gain.add(lamps[i], d_fix_d_z * effect.by_lamp);
+    gain.jacobian_wrt_shared.noalias() += d_fix_d_z.lazyProduct(effect.jacobian_wrt_shared);
+    gain.add(lamps[i], d_fix_d_z * effect.jacobian_wrt_lamp);
   }
   return gain;
 }
 
-CommonErrors::BodyGain CommonErrors::gain_of(std::span<const BodySighting> sightings,
-                                             std::span<const std::size_t> lamps,
-                                             const Eigen::Vector3d& arm_m, const BodyFix& fix,
-                                             const Lens& lens,
-                                             const Eigen::Matrix3d& body_from_base) const {
-  const PosedBody body(fix.state);
+CommonErrors::BodyGain CommonErrors::compute_gain(std::span<const BodyObservation> sightings,
+                                                  std::span<const std::size_t> lamps,
+                                                  const Eigen::Vector3d& arm_m, const BodyFix& fix,
+                                                  const Lens& lens,
+                                                  const Eigen::Matrix3d& body_from_base) const {
+  const EvaluatedState body(fix.state);
   BodyGain whole(shared());
   for (std::size_t i = 0; i < sightings.size(); ++i) {
-    const BodySighting& seen = sightings[i];
+    const BodyObservation& seen = sightings[i];
     const auto d_q = body.d_lamp_in_body(seen.lamp_m, seen.time_s);
     const Eigen::Matrix<double, 2, 3> d_pixel =
         d_whitened_pixel_d_lamp(seen, body.lamp_in_body(seen.lamp_m, seen.time_s) - arm_m);
@@ -343,7 +343,7 @@ CommonErrors::BodyGain CommonErrors::gain_of(std::span<const BodySighting> sight
         fix.covariance.lazyProduct(d_pixel_d_state.transpose());
     const Eigen::Matrix<double, 2, 3> d_pixel_d_ray = seen.whitened_pixel_from_ray * body_from_base;
     const Eigen::Matrix<double, kBodyStates, 3> by_ray = gain * d_pixel_d_ray;
-    whole.by_shared.noalias() +=
+    whole.jacobian_wrt_shared.noalias() +=
         by_ray.lazyProduct(effect_on_ray(body_from_base.transpose() * seen.ray, lens));
     whole.add(lamps[i], gain * d_pixel_d_state.leftCols<3>());
   }
@@ -351,26 +351,26 @@ CommonErrors::BodyGain CommonErrors::gain_of(std::span<const BodySighting> sight
 }
 
 template <int States>
-Eigen::Matrix<double, States, States, Eigen::DontAlign> CommonErrors::covariance_of(
-    const GainOf<States>& gain) const {
-  using ByShared = typename GainOf<States>::ByShared;
-  using ByLamp = typename GainOf<States>::ByLamp;
+Eigen::Matrix<double, States, States, Eigen::DontAlign> CommonErrors::compute_covariance(
+    const GainMatrix<States>& gain) const {
+  using SharedGain = typename GainMatrix<States>::SharedGain;
+  using LampGain = typename GainMatrix<States>::LampGain;
   using Covariance = Eigen::Matrix<double, States, States>;
-  const ByShared& by_shared = gain.by_shared;
-  const auto& by_lamp = gain.by_lamp;
+  const SharedGain& jacobian_wrt_shared = gain.jacobian_wrt_shared;
+  const auto& jacobian_wrt_lamp = gain.jacobian_wrt_lamp;
   const Eigen::Index n = shared();
-  const ByShared with_shared = by_shared.lazyProduct(covariance_.topLeftCorner(n, n));
-  Covariance sum = with_shared.lazyProduct(by_shared.transpose());
+  const SharedGain with_shared = jacobian_wrt_shared.lazyProduct(covariance_.topLeftCorner(n, n));
+  Covariance sum = with_shared.lazyProduct(jacobian_wrt_shared.transpose());
   for (std::size_t i = 0; i < gain.size; ++i) {
     // Half of the lamp's own errors, the shared errors, and those of the lamps before it.
-    ByLamp other = 0.5 * by_lamp[i] * covariance_of_lamp(gain.lamps[i]);
+    LampGain other = 0.5 * jacobian_wrt_lamp[i] * covariance_of_lamp(gain.lamps[i]);
     if (const auto& row = lamps_[gain.lamps[i]].row) {
-      other += by_shared.lazyProduct(covariance_.block(0, *row, n, 3));
+      other += jacobian_wrt_shared.lazyProduct(covariance_.block(0, *row, n, 3));
     }
     for (std::size_t j = 0; j < i; ++j) {
-      other += by_lamp[j] * covariance_of_lamps(gain.lamps[j], gain.lamps[i]);
+      other += jacobian_wrt_lamp[j] * covariance_of_lamps(gain.lamps[j], gain.lamps[i]);
     }
-    const Covariance half = other * by_lamp[i].transpose();
+    const Covariance half = other * jacobian_wrt_lamp[i].transpose();
     sum += half + half.transpose();
   }
   return sum;
@@ -386,22 +386,22 @@ double CommonErrors::expected_chi_squared(std::span<const Sighting> sightings,
   for (std::size_t i = 0; i < sightings.size(); ++i) {
     const Eigen::Matrix2d whitening = sightings[i].d_pixel_d_z / sightings[i].sigma_px;
     const Effect effect = effect_on(sightings[i], pose, lens, level_from_base);
-    sum += (whitening * covariance_of(effect, lamps[i]) * whitening.transpose()).trace();
+    sum += (whitening * compute_covariance(effect, lamps[i]) * whitening.transpose()).trace();
   }
   return sum;
 }
 
-double CommonErrors::expected_chi_squared(std::span<const BodySighting> sightings,
+double CommonErrors::expected_chi_squared(std::span<const BodyObservation> sightings,
                                           std::span<const std::size_t> lamps,
                                           const Eigen::Vector3d& arm_m, const BodyFix& fix,
                                           const BodyCovariance& common, const Lens& lens,
                                           const Eigen::Matrix3d& body_from_base) const {
-  const PosedBody body(fix.state);
+  const EvaluatedState body(fix.state);
   Eigen::Matrix<double, kBodyStates, kBodyStates> information;
   information.setZero();
   double sum = 0;
   for (std::size_t i = 0; i < sightings.size(); ++i) {
-    const BodySighting& seen = sightings[i];
+    const BodyObservation& seen = sightings[i];
     const Eigen::Matrix<double, 2, 3> d_pixel =
         d_whitened_pixel_d_lamp(seen, body.lamp_in_body(seen.lamp_m, seen.time_s) - arm_m);
     const Eigen::Matrix<double, 2, kBodyStates> by_state =
@@ -410,7 +410,7 @@ double CommonErrors::expected_chi_squared(std::span<const BodySighting> sighting
     const Effect effect{
         by_ray.lazyProduct(effect_on_ray(body_from_base.transpose() * seen.ray, lens)),
         by_state.leftCols<3>()};
-    sum += covariance_of(effect, lamps[i]).trace();
+    sum += compute_covariance(effect, lamps[i]).trace();
     information += by_state.transpose() * by_state;
   }
   // States that are not estimated have no variance, and `common` is zero there.
@@ -423,37 +423,38 @@ double CommonErrors::expected_chi_squared(std::span<const BodySighting> sighting
   return sum - (with_priors * common).trace();
 }
 
-template Matrix4 CommonErrors::covariance_of(const Gain& gain) const;
-template BodyCovariance CommonErrors::covariance_of(const BodyGain& gain) const;
+template Matrix4 CommonErrors::compute_covariance(const Gain& gain) const;
+template BodyCovariance CommonErrors::compute_covariance(const BodyGain& gain) const;
 
-Matrix2 CommonErrors::covariance_of(const Effect& effect, std::size_t lamp) const {
+Matrix2 CommonErrors::compute_covariance(const Effect& effect, std::size_t lamp) const {
   const Eigen::Index n = shared();
   const Effect& e = effect;
   const Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::ColMajor, 2, 20> with_shared =
-      e.by_shared.lazyProduct(covariance_.topLeftCorner(n, n));
-  Eigen::Matrix2d sum = with_shared.lazyProduct(e.by_shared.transpose());
+      e.jacobian_wrt_shared.lazyProduct(covariance_.topLeftCorner(n, n));
+  Eigen::Matrix2d sum = with_shared.lazyProduct(e.jacobian_wrt_shared.transpose());
   Eigen::Matrix2d half = Eigen::Matrix2d::Zero();
   if (const auto& row = lamps_[lamp].row) {
     const Eigen::Matrix<double, 2, 3> mixed =
-        e.by_shared.lazyProduct(covariance_.block(0, *row, n, 3));
-    half = mixed * e.by_lamp.transpose();
+        e.jacobian_wrt_shared.lazyProduct(covariance_.block(0, *row, n, 3));
+    half = mixed * e.jacobian_wrt_lamp.transpose();
   }
-  sum += half + half.transpose() + e.by_lamp * covariance_of_lamp(lamp) * e.by_lamp.transpose();
+  sum += half + half.transpose() +
+         e.jacobian_wrt_lamp * covariance_of_lamp(lamp) * e.jacobian_wrt_lamp.transpose();
   return sum;
 }
 
-Unexplained find_unexplained(std::span<const Sighting> sightings, std::span<const Matrix2> common,
-                             const LeastSquaresFix& fix) {
-  Unexplained found;
+OutlierLamps find_outlier_lamps(std::span<const Sighting> sightings,
+                                std::span<const Matrix2> common, const LeastSquaresFix& fix) {
+  OutlierLamps found;
   if (sightings.size() < 4) return found;
   const LevelPose pose(fix.pose);
-  std::bitset<kMaxSightings> left_out;
+  std::bitset<kMaxSightings> rejected;
   for (std::size_t left = sightings.size(); left >= 3; --left) {
     Eigen::Matrix4d information = Eigen::Matrix4d::Zero();
     Eigen::Vector4d gradient = Eigen::Vector4d::Zero();
     const auto each = [&](auto&& use) {
       for (std::size_t i = 0; i < sightings.size(); ++i) {
-        if (left_out[i]) continue;
+        if (rejected[i]) continue;
         const Sighting& one = sightings[i];
         const Eigen::Matrix2d by_pixel = one.d_pixel_d_z.inverse() * one.sigma_px;
         const Eigen::Matrix2d covariance = by_pixel * by_pixel.transpose() + common[i];
@@ -467,7 +468,7 @@ Unexplained find_unexplained(std::span<const Sighting> sightings, std::span<cons
       information += weighted * jacobian;
       gradient += weighted * residual;
     });
-    const auto state_covariance = inverse_of_positive(information);
+    const auto state_covariance = invert_positive_definite(information);
     if (!state_covariance) return {};
     const Eigen::Vector4d step = *state_covariance * gradient;
     double chi_squared = 0, worst = 0;
@@ -487,7 +488,7 @@ Unexplained find_unexplained(std::span<const Sighting> sightings, std::span<cons
     if (chi_squared <= chi_squared_bound(kSigmasOfOneInTenThousand, freedom)) return found;
     // Three contradicting lamps do not determine which is wrong; nor does a minority.
     if (!(worst > 0) || left == 3 || 2 * (left - 1) <= sightings.size()) return {};
-    left_out.set(worst_lamp);
+    rejected.set(worst_lamp);
     found.lamps[found.count++] = worst_lamp;
   }
   return {};
@@ -498,27 +499,30 @@ namespace {
 /// Returns true if the calibration reports errors of its lens that `errors` lacks.
 bool lack_lens(const CommonErrors& errors, const Calibration& calibration) {
   const auto& report = calibration.intrinsics_report;
-  return report && report->covariance && !errors.stated(CommonPart::lens);
+  return report && report->covariance && !errors.stated(CommonErrorSource::lens);
 }
 
 }  // namespace
 
-std::optional<Matrix2> whole_zenith_covariance(const Calibration& calibration) {
+std::optional<Matrix2> compute_zenith_covariance(const Calibration& calibration) {
   const CommonErrors errors({}, calibration, Correction::all);
-  if (!errors.stated(CommonPart::zenith) || lack_lens(errors, calibration)) return std::nullopt;
-  const Eigen::Index zenith = stated_intrinsics(calibration.camera);
+  if (!errors.stated(CommonErrorSource::zenith) || lack_lens(errors, calibration))
+    return std::nullopt;
+  const Eigen::Index zenith = count_reported_intrinsics(calibration.camera);
   return Matrix2(errors.joint().block<2, 2>(zenith, zenith));
 }
 
-std::optional<Matrix2> whole_offset_covariance(const Calibration& calibration) {
+std::optional<Matrix2> compute_offset_covariance(const Calibration& calibration) {
   const CommonErrors errors({}, calibration, Correction::all);
-  if (!errors.stated(CommonPart::offset) || lack_lens(errors, calibration)) return std::nullopt;
+  if (!errors.stated(CommonErrorSource::offset) || lack_lens(errors, calibration))
+    return std::nullopt;
   if (!calibration.adjustment) {
     const Dispersion& dispersion = *calibration.dispersion;
     const auto& report = calibration.intrinsics_report;
     if (report && report->covariance && !dispersion.by_intrinsics) return std::nullopt;
     const bool turned = calibration.rotation_center.has_value();
-    if (turned && !(errors.stated(CommonPart::zenith) && dispersion.by_zenith)) return std::nullopt;
+    if (turned && !(errors.stated(CommonErrorSource::zenith) && dispersion.by_zenith))
+      return std::nullopt;
   }
   const Eigen::Index offset = errors.joint().rows() - 2;
   const Eigen::Vector2d focal_px = calibration.camera.focal_px();

@@ -24,9 +24,10 @@ namespace vlp {
 
 /// Sources of errors common to all fixes of a camera. The lever arm is not one: it does not affect
 /// the position of the camera.
-enum class CommonPart { lens, zenith, offset, lamps };
-inline constexpr std::array kCommonParts{CommonPart::lens, CommonPart::zenith, CommonPart::offset,
-                                         CommonPart::lamps};
+enum class CommonErrorSource { lens, zenith, offset, lamps };
+inline constexpr std::array kCommonErrorSources{CommonErrorSource::lens, CommonErrorSource::zenith,
+                                                CommonErrorSource::offset,
+                                                CommonErrorSource::lamps};
 
 /// Errors of calibration and lamp map, which are common to all fixes of a camera:
 ///   cov = (J' W J)^-1 + G C G',    G = (J' W J)^-1 J' W J_c
@@ -56,28 +57,28 @@ class CommonErrors {
   /// a wrong lamp be identified by them.
   bool complete() const { return complete_; }
   /// Returns true if the errors of the part are known, or if the calibration lacks the part.
-  bool stated(CommonPart part) const { return part_stated_[static_cast<std::size_t>(part)]; }
+  bool stated(CommonErrorSource part) const { return part_stated_[static_cast<std::size_t>(part)]; }
   /// Returns one part of C, with the others taken as exact. The parts add up to C, and no part
   /// makes a variance negative.
   ///
   /// A part is the reduction of C if its errors become known exactly, given that all earlier parts
-  /// in the order of kCommonParts already are (block Cholesky). For sequential steps a part holds
-  /// the errors of its own step. The part of the lens includes its effects on later steps. The part
-  /// of the lamps excludes errors that an offset found with the same map compensates.
-  CommonErrors only(CommonPart part) const;
+  /// in the order of kCommonErrorSources already are (block Cholesky). For sequential steps a part
+  /// holds the errors of its own step. The part of the lens includes its effects on later steps.
+  /// The part of the lamps excludes errors that an offset found with the same map compensates.
+  CommonErrors only(CommonErrorSource part) const;
   /// Returns the number of lamps of the adjustment that the map has at another position. Their
   /// correlation with the calibration is lost.
   int lamps_elsewhere() const { return lamps_elsewhere_; }
 
   /// Derivative of the ray of a pixel by the shared errors, along the axes of the base, which are
   /// those of the level camera.
-  using ByRay = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::ColMajor, 3, 20>;
-  ByRay effect_on_ray(const Eigen::Vector3d& ray_in_base, const Lens& lens) const;
+  using RayJacobian = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::ColMajor, 3, 20>;
+  RayJacobian effect_on_ray(const Eigen::Vector3d& ray_in_base, const Lens& lens) const;
 
   /// Derivatives of z of one lamp by the errors: 2 rows each.
   struct Effect {
-    Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::ColMajor, 2, 20> by_shared;
-    Eigen::Matrix<double, 2, 3> by_lamp;
+    Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::ColMajor, 2, 20> jacobian_wrt_shared;
+    Eigen::Matrix<double, 2, 3> jacobian_wrt_lamp;
   };
   /// Returns the derivatives for an observation by a camera at `pose`. Its rotation
   /// level_from_camera is level_from_base base_from_camera.
@@ -87,37 +88,39 @@ class CommonErrors {
   /// G: what the errors do to the states of a fix, by the shared ones and by each lamp's own.
   template <int States>
   /// G: derivatives of the states of a fix by the shared errors and by the errors of each lamp.
-  struct GainOf {
-    using ByShared = Eigen::Matrix<double, States, Eigen::Dynamic, Eigen::ColMajor, States, 20>;
-    using ByLamp = Eigen::Matrix<double, States, 3>;
+  struct GainMatrix {
+    using SharedGain = Eigen::Matrix<double, States, Eigen::Dynamic, Eigen::ColMajor, States, 20>;
+    using LampGain = Eigen::Matrix<double, States, 3>;
 
-    ByShared by_shared;
+    SharedGain jacobian_wrt_shared;
     /// Derivatives by the lamps of the fix, and the indices of these lamps in the map. The first
     /// `size` elements are valid.
-    std::array<ByLamp, kMaxSightings> by_lamp;
+    std::array<LampGain, kMaxSightings> jacobian_wrt_lamp;
     std::array<std::size_t, kMaxSightings> lamps;
     std::size_t size = 0;
 
-    explicit GainOf(Eigen::Index shared) : by_shared(ByShared::Zero(States, shared)) {}
-    void add(std::size_t lamp, const ByLamp& effect) {
-      by_lamp[size] = effect;
+    explicit GainMatrix(Eigen::Index shared)
+        : jacobian_wrt_shared(SharedGain::Zero(States, shared)) {}
+    void add(std::size_t lamp, const LampGain& effect) {
+      jacobian_wrt_lamp[size] = effect;
       lamps[size++] = lamp;
     }
   };
   /// Gains of (X, Y, Z, yaw), and of all states of a body (BodyIndex).
-  using Gain = GainOf<4>;
-  using BodyGain = GainOf<kBodyStates>;
-  /// Returns the gain of a least-squares fix (fix_least_squares) with the covariance of `camera`.
-  /// `lamps` are the indices in the map of the observed lamps. For a single lamp, returns the gain
-  /// of fix_one_lamp().
-  Gain gain_of(std::span<const Sighting> sightings, std::span<const std::size_t> lamps,
-               const PoseEstimate& camera, const Lens& lens,
-               const Eigen::Matrix3d& level_from_base) const;
+  using Gain = GainMatrix<4>;
+  using BodyGain = GainMatrix<kBodyStates>;
+  /// Returns the gain of a least-squares fix (estimate_pose_least_squares) with the covariance of
+  /// `camera`. `lamps` are the indices in the map of the observed lamps. For a single lamp, returns
+  /// the gain of compute_one_lamp_pose().
+  Gain compute_gain(std::span<const Sighting> sightings, std::span<const std::size_t> lamps,
+                    const PoseEstimate& camera, const Lens& lens,
+                    const Eigen::Matrix3d& level_from_base) const;
   /// Returns the gain of a body with the camera at `arm_m`. The gain of the pixels, in standard
-  /// deviations, is that of the least-squares fix (fix_body).
-  BodyGain gain_of(std::span<const BodySighting> sightings, std::span<const std::size_t> lamps,
-                   const Eigen::Vector3d& arm_m, const BodyFix& fix, const Lens& lens,
-                   const Eigen::Matrix3d& body_from_base) const;
+  /// deviations, is that of the least-squares fix (estimate_body).
+  BodyGain compute_gain(std::span<const BodyObservation> sightings,
+                        std::span<const std::size_t> lamps, const Eigen::Vector3d& arm_m,
+                        const BodyFix& fix, const Lens& lens,
+                        const Eigen::Matrix3d& body_from_base) const;
   /// Computes the expected contribution of the errors to chi-squared, from the common covariance
   /// `common` = G C G' of the fix:
   ///   tr(R C R') = tr(W J_c C J_c') - tr(N common),   R = W^1/2 (J_c - J G),   N = J' W J.
@@ -126,16 +129,16 @@ class CommonErrors {
                               std::span<const std::size_t> lamps, const PoseEstimate& camera,
                               const Matrix4& common, const Lens& lens,
                               const Eigen::Matrix3d& level_from_base) const;
-  double expected_chi_squared(std::span<const BodySighting> sightings,
+  double expected_chi_squared(std::span<const BodyObservation> sightings,
                               std::span<const std::size_t> lamps, const Eigen::Vector3d& arm_m,
                               const BodyFix& fix, const BodyCovariance& common, const Lens& lens,
                               const Eigen::Matrix3d& body_from_base) const;
   /// Returns G C G' of a gain.
   template <int States>
-  Eigen::Matrix<double, States, States, Eigen::DontAlign> covariance_of(
-      const GainOf<States>& gain) const;
+  Eigen::Matrix<double, States, States, Eigen::DontAlign> compute_covariance(
+      const GainMatrix<States>& gain) const;
   /// Returns the covariance of z of one observation.
-  Matrix2 covariance_of(const Effect& effect, std::size_t lamp) const;
+  Matrix2 compute_covariance(const Effect& effect, std::size_t lamp) const;
 
   /// Returns the joint covariance: intrinsics, zenith and offset, as far as they exist. Lamps with
   /// correlated errors follow, in the order of the map.
@@ -162,9 +165,9 @@ class CommonErrors {
   /// Returns the covariance of two lamps of the map.
   Eigen::Matrix3d covariance_of_lamps(std::size_t lamp, std::size_t other) const;
   /// Sets which parts are stated, and the covariances of lens and zenith without an adjustment.
-  void state_lens_and_zenith(const Calibration& calibration);
+  void set_lens_and_zenith(const Calibration& calibration);
   /// Sets the covariances of the lamps, and all that an adjustment states.
-  void state_lamps(std::span<const Lamp> lamps, const std::optional<Adjustment>& adjustment);
+  void set_lamps(std::span<const Lamp> lamps, const std::optional<Adjustment>& adjustment);
   /// Adds the effects of earlier steps to zenith and offset. @pre one of them is applied
   void propagate_to_zenith_and_offset(std::span<const Lamp> lamps, const Calibration& calibration);
   /// Returns the first row of a lamp of the dispersion if the map has it at the same place and
@@ -180,12 +183,12 @@ class CommonErrors {
   MatrixX covariance_;
   std::vector<LampErrors> lamps_;
   bool stated_ = false, complete_ = false;
-  std::array<bool, kCommonParts.size()> part_stated_ = {};
+  std::array<bool, kCommonErrorSources.size()> part_stated_ = {};
   int lamps_elsewhere_ = 0;
 };
 
 /// Lamps that are rejected, as indices in the frame: none, one or several.
-struct Unexplained {
+struct OutlierLamps {
   std::array<std::size_t, kMaxSightings> lamps;
   std::size_t count = 0;
 };
@@ -197,18 +200,19 @@ struct Unexplained {
 /// majority.
 ///
 /// @param common  covariance of z of each observation from the common errors
-Unexplained find_unexplained(std::span<const Sighting> sightings, std::span<const Matrix2> common,
-                             const LeastSquaresFix& fix);
+OutlierLamps find_outlier_lamps(std::span<const Sighting> sightings,
+                                std::span<const Matrix2> common, const LeastSquaresFix& fix);
 
 /// Computes the covariance of the zenith's normalized point from all its sources: its captures and
 /// the lens, or the adjustment if there is one. Returns std::nullopt if a source is not reported,
 /// or if the derivative by the lens is unknown.
 /// @pre there is a rotation center
-std::optional<Matrix2> whole_zenith_covariance(const Calibration& calibration);
+std::optional<Matrix2> compute_zenith_covariance(const Calibration& calibration);
 
 /// Computes the covariance of the dispersion's offset in px^2 from all its sources: its captures,
-/// the zenith, and the lens, which affects both. Returns std::nullopt as whole_zenith_covariance().
+/// the zenith, and the lens, which affects both. Returns std::nullopt as
+/// compute_zenith_covariance().
 /// @pre there is a dispersion
-std::optional<Matrix2> whole_offset_covariance(const Calibration& calibration);
+std::optional<Matrix2> compute_offset_covariance(const Calibration& calibration);
 
 }  // namespace vlp

@@ -20,8 +20,8 @@ struct Row {
   Eigen::Vector2d z;
 };
 
-std::optional<Row> row_of(const Eigen::Vector3d& lamp_m, const Lens& lens,
-                          const LevelPose& camera) {
+std::optional<Row> linearize_lamp(const Eigen::Vector3d& lamp_m, const Lens& lens,
+                                  const LevelPose& camera) {
   if (!(height_above(camera, lamp_m) > 0)) return std::nullopt;
   const Prediction prediction = predict(camera, lamp_m);
   const auto projection = lens.project_with_jacobians({prediction.z.x(), prediction.z.y(), 1});
@@ -38,15 +38,16 @@ Eigen::Matrix<double, 2, 3> d_pixel_d_lamp(const Row& row) {
 
 }  // namespace
 
-std::optional<ErrorBudget> error_budget(std::span<const Eigen::Vector3d> lamps_m, const Lens& lens,
-                                        const Pose& level, const ErrorSources& sources) {
+std::optional<ErrorBudget> compute_error_budget(std::span<const Eigen::Vector3d> lamps_m,
+                                                const Lens& lens, const Pose& level,
+                                                const ErrorSources& sources) {
   if (lamps_m.size() < 2) return std::nullopt;
   const LevelPose camera(level);
   Eigen::Matrix4d information = Eigen::Matrix4d::Zero();
   Matrix42 center_gradient = Matrix42::Zero(), tilt_gradient = Matrix42::Zero();
   Eigen::Matrix4d lamp_map_gradient = Eigen::Matrix4d::Zero();
   for (const Eigen::Vector3d& lamp_m : lamps_m) {
-    const auto row = row_of(lamp_m, lens, camera);
+    const auto row = linearize_lamp(lamp_m, lens, camera);
     if (!row) return std::nullopt;
     const Matrix42 transposed = row->d_pixel_d_state.transpose();
     information += transposed * row->d_pixel_d_state;
@@ -55,7 +56,7 @@ std::optional<ErrorBudget> error_budget(std::span<const Eigen::Vector3d> lamps_m
     const Matrix43 lamp_gradient = transposed * d_pixel_d_lamp(*row);
     lamp_map_gradient += lamp_gradient * lamp_gradient.transpose();
   }
-  const auto inverse = inverse_of_positive(information);
+  const auto inverse = invert_positive_definite(information);
   if (!inverse) return std::nullopt;
   const Matrix42 by_center = sources.center_px * *inverse * center_gradient;
   const Matrix42 by_tilt = sources.tilt_rad * *inverse * tilt_gradient;
@@ -65,18 +66,18 @@ std::optional<ErrorBudget> error_budget(std::span<const Eigen::Vector3d> lamps_m
       sources.lamp_map_m * sources.lamp_map_m * *inverse * lamp_map_gradient * *inverse};
 }
 
-std::optional<ErrorBudget> error_budget(std::span<const Eigen::Vector3d> lamps_m, const Lens& lens,
-                                        const Pose& level, const ErrorSources& sources,
-                                        const BodyPrior& prior,
-                                        const std::optional<RowClock>& row_clock) {
-  const auto limit = body_limit(lamps_m, lens, Eigen::Matrix3d::Identity(), level, sources.noise_px,
-                                prior, row_clock);
+std::optional<ErrorBudget> compute_error_budget(std::span<const Eigen::Vector3d> lamps_m,
+                                                const Lens& lens, const Pose& level,
+                                                const ErrorSources& sources, const BodyPrior& prior,
+                                                const std::optional<RowClock>& row_clock) {
+  const auto limit = compute_body_limit(lamps_m, lens, Eigen::Matrix3d::Identity(), level,
+                                        sources.noise_px, prior, row_clock);
   if (!limit) return std::nullopt;
-  const PosedBody body(limit->fix.state);
+  const EvaluatedState body(limit->fix.state);
   const Eigen::Matrix<double, 4, kBodyStates> covariance = limit->fix.covariance.topRows<4>();
   Matrix42 by_center = Matrix42::Zero(), by_tilt = Matrix42::Zero();
   Eigen::Matrix4d of_lamps = Eigen::Matrix4d::Zero();
-  for (const BodySighting& seen : limit->frame.span()) {
+  for (const BodyObservation& seen : limit->frame.span()) {
     const Eigen::Vector3d in_body = body.lamp_in_body(seen.lamp_m, seen.time_s);
     const Eigen::Matrix<double, 2, kBodyStates> d_pixel_d_state =
         d_whitened_pixel_d_lamp(seen, in_body) * body.d_lamp_in_body(seen.lamp_m, seen.time_s);

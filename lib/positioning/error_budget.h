@@ -49,17 +49,18 @@ struct ErrorBudget {
 /// `lamps_m` (positions in the world) with equal weights. Propagates each source through the
 /// least-squares fix to first order. Returns std::nullopt for fewer than two lamps, for lamps that
 /// the lens does not image, or for lamps that do not determine a fix.
-std::optional<ErrorBudget> error_budget(std::span<const Eigen::Vector3d> lamps_m, const Lens& lens,
-                                        const Pose& level, const ErrorSources& sources);
+std::optional<ErrorBudget> compute_error_budget(std::span<const Eigen::Vector3d> lamps_m,
+                                                const Lens& lens, const Pose& level,
+                                                const ErrorSources& sources);
 
 /// Computes the error budget of a camera that may move and be tilted, with the prior `prior`. Its
 /// mean is at rest and level. Returns std::nullopt also if lamps and prior do not determine a fix
-/// (fix_body_frame). If the tilt is estimated, an error of the calibrated tilt has almost no
+/// (estimate_body_robust). If the tilt is estimated, an error of the calibrated tilt has almost no
 /// effect.
 /// @pre `row_clock` has a value if the prior leaves the motion free
-std::optional<ErrorBudget> error_budget(std::span<const Eigen::Vector3d> lamps_m, const Lens& lens,
-                                        const Pose& level, const ErrorSources& sources,
-                                        const BodyPrior& prior,
-                                        const std::optional<RowClock>& row_clock);
+std::optional<ErrorBudget> compute_error_budget(std::span<const Eigen::Vector3d> lamps_m,
+                                                const Lens& lens, const Pose& level,
+                                                const ErrorSources& sources, const BodyPrior& prior,
+                                                const std::optional<RowClock>& row_clock);
 
 }  // namespace vlp

@@ -48,7 +48,7 @@ const Entry& entry_of(FixStatus status) { return kStatuses[static_cast<std::size
 
 }  // namespace
 
-std::string_view name_of(FixStatus status) { return entry_of(status).name; }
-std::string_view explanation_of(FixStatus status) { return entry_of(status).explanation; }
+std::string_view to_string(FixStatus status) { return entry_of(status).name; }
+std::string_view describe(FixStatus status) { return entry_of(status).explanation; }
 
 }  // namespace vlp

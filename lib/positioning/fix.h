@@ -12,7 +12,7 @@
 
 namespace vlp {
 
-/// Status of a fix. name_of() returns the word in fixes.csv.
+/// Status of a fix. to_string() returns the word in fixes.csv.
 enum class FixStatus {
   ok,
   too_few_lamps,      // fewer than two lamps of the map
@@ -30,10 +30,10 @@ enum class FixStatus {
 };
 
 /// Returns the enumerator as a word, for example "too_few_lamps".
-std::string_view name_of(FixStatus status);
+std::string_view to_string(FixStatus status);
 
 /// Returns a human-readable explanation with the remedy.
-std::string_view explanation_of(FixStatus status);
+std::string_view describe(FixStatus status);
 
 /// A pose and the covariance of its (X, Y, Z, yaw) in meters and radians.
 struct PoseEstimate {

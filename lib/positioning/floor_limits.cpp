@@ -14,13 +14,13 @@ namespace vlp {
 namespace {
 
 int places_along(double min_m, double max_m, double step_m) {
-  constexpr double most = 1e7, rounding = 1e-9;
-  const double places = std::floor((max_m - min_m) / step_m + rounding) + 1;
+  constexpr double max_places = 1e7, tolerance = 1e-9;
+  const double places = std::floor((max_m - min_m) / step_m + tolerance) + 1;
   if (!(step_m > 0) || !(places >= 1)) {
     throw std::invalid_argument(
         "the floor should have x_min <= x_max, y_min <= y_max and a positive step");
   }
-  if (!(places <= most))
+  if (!(places <= max_places))
     throw std::invalid_argument("the floor has more than ten million places: take a larger step");
   return static_cast<int>(places);
 }
@@ -42,7 +42,8 @@ std::vector<FloorLimits::Place> places_on(const FloorGrid& grid, double z_m, dou
   return places;
 }
 
-std::vector<Eigen::Vector3d> places_of(const LampMap& map, const std::vector<std::size_t>& lamps) {
+std::vector<Eigen::Vector3d> positions_of(const LampMap& map,
+                                          const std::vector<std::size_t>& lamps) {
   std::vector<Eigen::Vector3d> places_m;
   places_m.reserve(lamps.size());
   for (const std::size_t lamp : lamps) places_m.push_back(map.lamps[lamp].position_m);
@@ -53,7 +54,7 @@ using Source = FloorLimits::Source;
 constexpr Source kLampMap{"lamp map", "lamp_map"};
 
 /// Returns the sources that are independent between images.
-std::vector<Source> sources_of(const BodyPrior& prior) {
+std::vector<Source> image_sources(const BodyPrior& prior) {
   std::vector<Source> sources{{"noise", "noise"}};
   if (may_move(prior)) sources.push_back({"motion", "motion"});
   if (prior.inclination_sd_rad > 0) sources.push_back({"lean", "lean"});
@@ -70,7 +71,7 @@ std::vector<Matrix4> parts_of_image(const Budget& budget, const BodyPrior& prior
 
 }  // namespace
 
-FloorGrid floor_under(const LampMap& map, double step_m) {
+FloorGrid make_floor_grid(const LampMap& map, double step_m) {
   const Eigen::Vector3d& first = map.lamps.front().position_m;
   FloorGrid grid{first.x(), first.x(), first.y(), first.y(), step_m};
   for (const Lamp& lamp : map.lamps) {
@@ -82,10 +83,10 @@ FloorGrid floor_under(const LampMap& map, double step_m) {
   return grid;
 }
 
-std::vector<Eigen::Vector3d> visible_lamps(const LampMap& map, const Camera& camera,
-                                           const Pose& pose) {
-  return places_of(map, lamps_in_view(map, Lens(camera.lens_model, camera.intrinsics),
-                                      camera.imager_px, Eigen::Matrix3d::Identity(), pose));
+std::vector<Eigen::Vector3d> find_visible_lamps(const LampMap& map, const Camera& camera,
+                                                const Pose& pose) {
+  return positions_of(map, find_lamps_in_view(map, Lens(camera.lens_model, camera.intrinsics),
+                                              camera.imager_px, Eigen::Matrix3d::Identity(), pose));
 }
 
 Matrix4 FloorLimits::Place::total() const {
@@ -94,23 +95,23 @@ Matrix4 FloorLimits::Place::total() const {
   return sum;
 }
 
-FloorLimits floor_limits(const LampMap& map, const Camera& camera, const FloorGrid& grid,
-                         double z_m, double yaw_rad, const ErrorSources& sources,
-                         const BodyPrior& prior) {
+FloorLimits compute_floor_limits(const LampMap& map, const Camera& camera, const FloorGrid& grid,
+                                 double z_m, double yaw_rad, const ErrorSources& sources,
+                                 const BodyPrior& prior) {
   const Lens lens(camera.lens_model, camera.intrinsics);
-  const auto row_clock = row_clock_of(camera);
-  FloorLimits limits{sources_of(prior), places_on(grid, z_m, yaw_rad)};
+  const auto row_clock = make_row_clock(camera);
+  FloorLimits limits{image_sources(prior), places_on(grid, z_m, yaw_rad)};
   for (const auto& source : {Source{"centre", "center"}, {"tilt", "tilt"}, kLampMap}) {
     limits.sources.push_back(source);
   }
   for (FloorLimits::Place& place : limits.places) {
     const auto lamps =
-        lamps_in_view(map, lens, camera.imager_px, Eigen::Matrix3d::Identity(), place.camera);
+        find_lamps_in_view(map, lens, camera.imager_px, Eigen::Matrix3d::Identity(), place.camera);
     place.lamps = static_cast<int>(lamps.size());
-    const auto lamps_m = places_of(map, lamps);
-    const auto budget = is_free(prior)
-                            ? error_budget(lamps_m, lens, place.camera, sources, prior, row_clock)
-                            : error_budget(lamps_m, lens, place.camera, sources);
+    const auto lamps_m = positions_of(map, lamps);
+    const auto budget = is_free(prior) ? compute_error_budget(lamps_m, lens, place.camera, sources,
+                                                              prior, row_clock)
+                                       : compute_error_budget(lamps_m, lens, place.camera, sources);
     if (!budget) continue;
     place.parts = parts_of_image(*budget, prior);
     place.parts.insert(place.parts.end(), {budget->center, budget->tilt, budget->lamp_map});
@@ -118,15 +119,15 @@ FloorLimits floor_limits(const LampMap& map, const Camera& camera, const FloorGr
   return limits;
 }
 
-FloorLimits floor_limits(const UnitErrors& unit, const FloorGrid& grid, double z_m, double yaw_rad,
-                         double noise_px, const BodyPrior& prior) {
-  FloorLimits limits{sources_of(prior), places_on(grid, z_m, yaw_rad)};
+FloorLimits compute_floor_limits(const UnitErrors& unit, const FloorGrid& grid, double z_m,
+                                 double yaw_rad, double noise_px, const BodyPrior& prior) {
+  FloorLimits limits{image_sources(prior), places_on(grid, z_m, yaw_rad)};
   limits.sources.push_back({"lens", "lens"});
   limits.sources.push_back({"zenith", "zenith"});
   if (unit.has_offset()) limits.sources.push_back({"offset", "offset"});
   limits.sources.push_back(kLampMap);
   for (FloorLimits::Place& place : limits.places) {
-    const auto lamps = unit.lamps_seen_from(place.camera);
+    const auto lamps = unit.find_visible_lamps(place.camera);
     place.lamps = static_cast<int>(lamps.size());
     const auto budget = is_free(prior) ? unit.budget(place.camera, lamps, noise_px, prior)
                                        : unit.budget(place.camera, lamps, noise_px);

@@ -24,7 +24,7 @@ struct FloorGrid {
 
 /// Returns the smallest grid around the lamps.
 /// @pre the map has lamps
-FloorGrid floor_under(const LampMap& map, double step_m);
+FloorGrid make_floor_grid(const LampMap& map, double step_m);
 
 /// Error budget of each position on a floor.
 struct FloorLimits {
@@ -51,8 +51,8 @@ struct FloorLimits {
 /// Returns the positions of the lamps that are fully visible to a level camera at `pose`. Such a
 /// lamp has its center, and its rim if the diameter is known, in front of the camera and within the
 /// image.
-std::vector<Eigen::Vector3d> visible_lamps(const LampMap& map, const Camera& camera,
-                                           const Pose& pose);
+std::vector<Eigen::Vector3d> find_visible_lamps(const LampMap& map, const Camera& camera,
+                                                const Pose& pose);
 
 /// Computes the error budget at every position of the grid, for a level camera at height `z_m` and
 /// yaw `yaw_rad`. Sources: noise, center, tilt, lamp map. Motion and lean follow the noise if the
@@ -60,14 +60,14 @@ std::vector<Eigen::Vector3d> visible_lamps(const LampMap& map, const Camera& cam
 /// @throws std::invalid_argument if the step is not positive, if the grid has no extent or more
 /// than ten million positions, or if the intrinsics do not match the lens model
 /// @pre the camera has row time and readout direction if it may move
-FloorLimits floor_limits(const LampMap& map, const Camera& camera, const FloorGrid& grid,
-                         double z_m, double yaw_rad, const ErrorSources& sources,
-                         const BodyPrior& prior = {});
+FloorLimits compute_floor_limits(const LampMap& map, const Camera& camera, const FloorGrid& grid,
+                                 double z_m, double yaw_rad, const ErrorSources& sources,
+                                 const BodyPrior& prior = {});
 
 /// Computes the same for a calibrated camera with its tilt, from the reported uncertainties of
 /// calibration and lamp map. Sources: noise, motion, lean, lens, zenith, offset if there is one,
 /// lamp map.
-FloorLimits floor_limits(const UnitErrors& unit, const FloorGrid& grid, double z_m, double yaw_rad,
-                         double noise_px, const BodyPrior& prior = {});
+FloorLimits compute_floor_limits(const UnitErrors& unit, const FloorGrid& grid, double z_m,
+                                 double yaw_rad, double noise_px, const BodyPrior& prior = {});
 
 }  // namespace vlp

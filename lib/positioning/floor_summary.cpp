@@ -16,32 +16,33 @@ struct MedianAndWorst {
 };
 
 /// @pre `values` is not empty
-MedianAndWorst summary_of(const std::vector<double>& values) {
+MedianAndWorst compute_median_and_worst(const std::vector<double>& values) {
   return {lower_median(values), *std::max_element(values.begin(), values.end())};
 }
 
 /// Summarizes `covariance(place)` over the places that have a fix.
 template <typename Covariance>
-FloorSummary::Row row_of(const FloorLimits::Source& source, const FloorLimits& limits,
-                         const Covariance& covariance) {
+FloorSummary::Row summarize_source(const FloorLimits::Source& source, const FloorLimits& limits,
+                                   const Covariance& covariance) {
   std::vector<double> horizontal_m, height_m, yaw_rad;
   double part = 0, whole = 0;
   for (const FloorLimits::Place& place : limits.places) {
     if (place.parts.empty()) continue;
-    const FixSpread spread = spread_of(covariance(place));
+    const FixSds spread = compute_fix_sds(covariance(place));
     horizontal_m.push_back(spread.horizontal_m);
     height_m.push_back(spread.height_m);
     yaw_rad.push_back(spread.yaw_rad);
     part += spread.horizontal_m * spread.horizontal_m;
     whole += place.total().topLeftCorner<2, 2>().trace();
   }
-  const auto h = summary_of(horizontal_m), z = summary_of(height_m), yaw = summary_of(yaw_rad);
+  const auto h = compute_median_and_worst(horizontal_m), z = compute_median_and_worst(height_m),
+             yaw = compute_median_and_worst(yaw_rad);
   return {source, {h.median, z.median, yaw.median}, {h.worst, z.worst, yaw.worst}, part / whole};
 }
 
 }  // namespace
 
-FixSpread spread_of(const Matrix4& covariance) {
+FixSds compute_fix_sds(const Matrix4& covariance) {
   // The rounding errors of a zero part may be negative.
   const auto root = [](double variance) { return variance < 0 ? 0 : std::sqrt(variance); };
   return {root(covariance(0, 0) + covariance(1, 1)), root(covariance(2, 2)),
@@ -50,7 +51,7 @@ FixSpread spread_of(const Matrix4& covariance) {
 
 const FloorSummary::Row& FloorSummary::largest() const {
   return *std::max_element(sources.begin(), sources.end(),
-                           [](const Row& a, const Row& b) { return a.share < b.share; });
+                           [](const Row& a, const Row& b) { return a.fraction < b.fraction; });
 }
 
 std::optional<FloorSummary> summarize(const FloorLimits& limits) {
@@ -59,13 +60,13 @@ std::optional<FloorSummary> summarize(const FloorLimits& limits) {
                     [](const FloorLimits::Place& place) { return !place.parts.empty(); });
   if (with_fix == 0) return std::nullopt;
   using Place = FloorLimits::Place;
-  FloorSummary summary{
-      {},
-      row_of({"together", "horizontal"}, limits, [](const Place& place) { return place.total(); }),
-      static_cast<std::size_t>(with_fix)};
+  FloorSummary summary{{},
+                       summarize_source({"together", "horizontal"}, limits,
+                                        [](const Place& place) { return place.total(); }),
+                       static_cast<std::size_t>(with_fix)};
   for (std::size_t i = 0; i < limits.sources.size(); ++i) {
-    summary.sources.push_back(
-        row_of(limits.sources[i], limits, [i](const Place& place) { return place.parts[i]; }));
+    summary.sources.push_back(summarize_source(limits.sources[i], limits,
+                                               [i](const Place& place) { return place.parts[i]; }));
   }
   return summary;
 }

@@ -12,14 +12,14 @@ namespace vlp {
 
 /// Standard deviations of a fix. `horizontal_m` is the root of the sum of the variances of x and y.
 /// Negative variances, which result from rounding, count as zero.
-struct FixSpread {
+struct FixSds {
   double horizontal_m;
   double height_m;
   double yaw_rad;
 };
 
 /// Returns the standard deviations of a covariance of (X, Y, Z, yaw).
-FixSpread spread_of(const Matrix4& covariance);
+FixSds compute_fix_sds(const Matrix4& covariance);
 
 /// Summary of the error budget of a floor: median and maximum for each source alone and for all
 /// sources together. Taken over the positions where at least two lamps are visible, for each
@@ -28,10 +28,10 @@ struct FloorSummary {
   struct Row {
     /// As in FloorLimits.
     FloorLimits::Source source;
-    FixSpread median;
-    FixSpread worst;
+    FixSds median;
+    FixSds worst;
     /// Fraction of the sum of the horizontal variances that is due to this source.
-    double share;
+    double fraction;
   };
   /// In the order of the sources.
   std::vector<Row> sources;

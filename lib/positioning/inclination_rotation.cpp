@@ -6,7 +6,8 @@
 
 namespace vlp {
 
-InclinationRotation inclination_rotation(const Inclination& inclination, double yaw_in_robot_rad) {
+InclinationRotation compute_inclination_rotation(const Inclination& inclination,
+                                                 double yaw_in_robot_rad) {
   const Eigen::Matrix3d base_from_robot = rotation_about_z(-yaw_in_robot_rad);
   const double pitch_rad = inclination.pitch_rad;
   InclinationRotation lean;

@@ -21,6 +21,7 @@ struct InclinationRotation {
 ///   level_from_base = Rz(-yaw_in_robot) Ry(pitch) Rx(roll) Rz(yaw_in_robot)
 /// An error of the pitch rotates about y, an error of the roll about the pitched x axis, (cos p, 0,
 /// -sin p).
-InclinationRotation inclination_rotation(const Inclination& inclination, double yaw_in_robot_rad);
+InclinationRotation compute_inclination_rotation(const Inclination& inclination,
+                                                 double yaw_in_robot_rad);
 
 }  // namespace vlp

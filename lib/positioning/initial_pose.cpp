@@ -33,7 +33,7 @@ double disagreement(const Pose& pose, std::span<const Sighting> sightings) {
   double sum = 0;
   for (const Sighting& sighting : sightings) {
     sum += height_above(camera, sighting.lamp_m) > 0
-               ? (sighting.z - predicted_z(camera, sighting.lamp_m)).squaredNorm()
+               ? (sighting.z - predict_z(camera, sighting.lamp_m)).squaredNorm()
                : 1e6;
   }
   return sum;
@@ -41,14 +41,14 @@ double disagreement(const Pose& pose, std::span<const Sighting> sightings) {
 
 }  // namespace
 
-InitialPose initial_pose(std::span<const Sighting> sightings) {
+InitialPose compute_initial_pose(std::span<const Sighting> sightings) {
   if (sightings.size() > 2 && at_one_height(sightings)) {
-    const auto pose = fix_coplanar_lamps(sightings);
+    const auto pose = compute_coplanar_pose(sightings);
     if (!pose) return {FixStatus::degenerate, {}};
     return {FixStatus::ok, *pose};
   }
   const Sighting& first = farthest_from(sightings.front(), sightings);
-  const TwoLampFix pair = fix_two_lamps(first, farthest_from(first, sightings));
+  const TwoLampPoses pair = compute_two_lamp_poses(first, farthest_from(first, sightings));
   if (pair.count == 0) {
     return {pair.lamp_below_camera ? FixStatus::lamp_below_camera : FixStatus::degenerate, {}};
   }
@@ -59,7 +59,7 @@ InitialPose initial_pose(std::span<const Sighting> sightings) {
   return {FixStatus::ok, pair.poses[second ? 1 : 0]};
 }
 
-std::optional<Pose> fix_coplanar_lamps(std::span<const Sighting> sightings) {
+std::optional<Pose> compute_coplanar_pose(std::span<const Sighting> sightings) {
   const auto similarity = fit_similarity(
       sightings.size(), [&](std::size_t i) { return sightings[i].z; },
       [&](std::size_t i) -> Eigen::Vector2d { return sightings[i].lamp_m.head<2>(); });

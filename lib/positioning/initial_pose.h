@@ -15,7 +15,7 @@ namespace vlp {
 /// least-squares similarity p = s + c z gives H = |c|, g = arg c (the method of [19] in Chen and
 /// Guan). All lamps have equal weights. Returns std::nullopt if the lamps coincide in the image.
 /// @pre the lamps have equal heights; their mean is used
-std::optional<Pose> fix_coplanar_lamps(std::span<const Sighting> sightings);
+std::optional<Pose> compute_coplanar_pose(std::span<const Sighting> sightings);
 
 /// A pose in closed form and its status.
 struct InitialPose {
@@ -25,8 +25,8 @@ struct InitialPose {
 };
 
 /// Computes a pose from two or more lamps in closed form, exact without noise. Two lamps:
-/// fix_two_lamps(). Lamps at one height: the similarity. Otherwise the solutions from the two lamps
-/// that are far apart in the image; of these, the one that fits the other lamps best.
-InitialPose initial_pose(std::span<const Sighting> sightings);
+/// compute_two_lamp_poses(). Lamps at one height: the similarity. Otherwise the solutions from the
+/// two lamps that are far apart in the image; of these, the one that fits the other lamps best.
+InitialPose compute_initial_pose(std::span<const Sighting> sightings);
 
 }  // namespace vlp

@@ -6,10 +6,10 @@
 
 namespace vlp {
 
-std::vector<std::size_t> lamps_in_view(const LampMap& map, const Lens& lens,
-                                       const std::array<int, 2>& imager_px,
-                                       const Eigen::Matrix3d& camera_from_level,
-                                       const Pose& level) {
+std::vector<std::size_t> find_lamps_in_view(const LampMap& map, const Lens& lens,
+                                            const std::array<int, 2>& imager_px,
+                                            const Eigen::Matrix3d& camera_from_level,
+                                            const Pose& level) {
   const auto in_image = [&](const Eigen::Vector3d& x_in_world) {
     const auto pixel = lens.project(camera_from_level * level_from_world(level, x_in_world));
     return pixel && pixel->minCoeff() >= -0.5 && pixel->x() <= imager_px[0] - 0.5 &&

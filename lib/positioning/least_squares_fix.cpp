@@ -42,16 +42,15 @@ LevelPose moved(const LevelPose& pose, const Eigen::Vector4d& step) {
 double residual_px(std::span<const Sighting> sightings, const LevelPose& camera) {
   double sum = 0;
   for (const Sighting& sighting : sightings) {
-    sum +=
-        (sighting.d_pixel_d_z * (sighting.z - predicted_z(camera, sighting.lamp_m))).squaredNorm();
+    sum += (sighting.d_pixel_d_z * (sighting.z - predict_z(camera, sighting.lamp_m))).squaredNorm();
   }
   return std::sqrt(sum / static_cast<double>(sightings.size()));
 }
 
 }  // namespace
 
-std::optional<LeastSquaresFix> fix_least_squares(std::span<const Sighting> sightings,
-                                                 const Pose& start) {
+std::optional<LeastSquaresFix> estimate_pose_least_squares(std::span<const Sighting> sightings,
+                                                           const Pose& start) {
   constexpr int max_iterations = 50;
   // Relative to the distance and to 1 rad: far below any noise, far above rounding.
   constexpr double small_step = 1e-10;
@@ -85,8 +84,8 @@ std::optional<LeastSquaresFix> fix_least_squares(std::span<const Sighting> sight
   return std::nullopt;
 }
 
-Eigen::Matrix<double, 4, 3> rotation_effect(std::span<const Sighting> sightings,
-                                            const LeastSquaresFix& fix) {
+Eigen::Matrix<double, 4, 3> compute_rotation_jacobian(std::span<const Sighting> sightings,
+                                                      const LeastSquaresFix& fix) {
   const LevelPose camera(fix.pose);
   Eigen::Matrix<double, 4, 2> gradient = Eigen::Matrix<double, 4, 2>::Zero();
   for (const Sighting& sighting : sightings) {

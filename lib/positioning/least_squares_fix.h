@@ -30,13 +30,13 @@ struct LeastSquaresFix {
 ///
 /// Returns std::nullopt if a lamp is not above `start`, if the lamps do not determine the state, or
 /// without convergence in 50 steps.
-std::optional<LeastSquaresFix> fix_least_squares(std::span<const Sighting> sightings,
-                                                 const Pose& start);
+std::optional<LeastSquaresFix> estimate_pose_least_squares(std::span<const Sighting> sightings,
+                                                           const Pose& start);
 
 /// Returns the derivative of (X, Y, Zs, g) of `fix` by small rotations about the axes of the level
 /// frame. Units: meters and radians per radian.
-/// @pre fix_least_squares() computed `fix` from `sightings`
-Eigen::Matrix<double, 4, 3> rotation_effect(std::span<const Sighting> sightings,
-                                            const LeastSquaresFix& fix);
+/// @pre estimate_pose_least_squares() computed `fix` from `sightings`
+Eigen::Matrix<double, 4, 3> compute_rotation_jacobian(std::span<const Sighting> sightings,
+                                                      const LeastSquaresFix& fix);
 
 }  // namespace vlp

@@ -19,8 +19,8 @@ Eigen::Vector2d compute_lamp_from_center_m(const Sighting& sighting, double heig
 
 }  // namespace
 
-std::optional<Pose> fix_one_lamp(const Sighting& sighting, const HeightAndYaw& known,
-                                 const MotionAtReadout& readout) {
+std::optional<Pose> compute_one_lamp_pose(const Sighting& sighting, const HeightAndYaw& known,
+                                          const MotionAtReadout& readout) {
   const double height_m = sighting.lamp_m.z() - known.z_m;
   if (!(height_m > 0)) return std::nullopt;
   const Eigen::Vector2d lamp_from_camera_m =
@@ -31,7 +31,7 @@ std::optional<Pose> fix_one_lamp(const Sighting& sighting, const HeightAndYaw& k
   return Pose{{s.x(), s.y(), known.z_m}, known.yaw_rad};
 }
 
-Matrix4 one_lamp_covariance(const Sighting& sighting, const Pose& pose) {
+Matrix4 compute_one_lamp_covariance(const Sighting& sighting, const Pose& pose) {
   const Eigen::Matrix2d d_pixel_d_xy =
       sighting.d_pixel_d_z * predict(LevelPose(pose), sighting.lamp_m).d_z_d_state.leftCols<2>();
   const Eigen::Matrix2d d_xy_d_pixel = d_pixel_d_xy.inverse();
@@ -66,7 +66,8 @@ Matrix4 compute_one_lamp_sensor_covariance(const Sighting& sighting, const Pose&
   return by_sd * by_sd.transpose();
 }
 
-Eigen::Matrix<double, 4, 3> one_lamp_rotation_effect(const Sighting& sighting, const Pose& pose) {
+Eigen::Matrix<double, 4, 3> compute_one_lamp_rotation_jacobian(const Sighting& sighting,
+                                                               const Pose& pose) {
   Eigen::Matrix<double, 2, 3> d_z;
   d_z << tilt_jacobian(sighting.z), Eigen::Vector2d(-sighting.z.y(), sighting.z.x());
   const LevelPose camera(pose);

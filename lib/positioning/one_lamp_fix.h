@@ -25,22 +25,23 @@ struct MotionAtReadout {
 ///   s = p - e^{jg} (H e^{jwt} z + (e^{jwt} - 1) a + u t)
 ///   u, w  velocity and yaw rate;   a  arm;   t  time of the readout
 /// Returns std::nullopt if the lamp is not above the camera.
-std::optional<Pose> fix_one_lamp(const Sighting& sighting, const HeightAndYaw& known,
-                                 const MotionAtReadout& readout = {});
+std::optional<Pose> compute_one_lamp_pose(const Sighting& sighting, const HeightAndYaw& known,
+                                          const MotionAtReadout& readout = {});
 
 /// Returns the covariance of (X, Y, Zs, g) from the pixel noise alone.
-/// @pre fix_one_lamp() computed `pose`
-Matrix4 one_lamp_covariance(const Sighting& sighting, const Pose& pose);
+/// @pre compute_one_lamp_pose() computed `pose`
+Matrix4 compute_one_lamp_covariance(const Sighting& sighting, const Pose& pose);
 
 /// Returns the covariance of (X, Y, Zs, g) from the errors of height, yaw and motion.
-/// @pre fix_one_lamp() computed `pose`
+/// @pre compute_one_lamp_pose() computed `pose`
 Matrix4 compute_one_lamp_sensor_covariance(const Sighting& sighting, const Pose& pose,
                                            const HeightAndYaw& known,
                                            const MotionAtReadout& readout);
 
 /// Returns the derivative of (X, Y, Zs, g) by a small rotation of the level frame about each of its
 /// axes.
-/// @pre fix_one_lamp() computed `pose`
-Eigen::Matrix<double, 4, 3> one_lamp_rotation_effect(const Sighting& sighting, const Pose& pose);
+/// @pre compute_one_lamp_pose() computed `pose`
+Eigen::Matrix<double, 4, 3> compute_one_lamp_rotation_jacobian(const Sighting& sighting,
+                                                               const Pose& pose);
 
 }  // namespace vlp

@@ -133,14 +133,14 @@ BodyEstimate in_world(const BodyFix& fix, const BodyCovariance& common) {
 }
 
 template <typename Frame>
-void name_rejected(const Frame& frame, Fix& fix) {
+void set_rejected(const Frame& frame, Fix& fix) {
   fix.rejected_lamps = frame.rejected_lamps;
   const auto listed =
       std::min(static_cast<std::size_t>(frame.rejected_lamps), fix.rejected_ids.size());
   std::copy_n(frame.rejected_ids.begin(), listed, fix.rejected_ids.begin());
 }
 
-Fix refused(FixStatus status, int unknown_lamps) {
+Fix without_fix(FixStatus status, int unknown_lamps) {
   Fix fix;
   fix.status = status;
   fix.unknown_lamps = unknown_lamps;
@@ -162,33 +162,33 @@ class Positioner::Impl {
 
  private:
   template <typename Frame, typename Add>
-  FixStatus look_up(std::span<const Detection> detections, Frame& frame, int& unknown_lamps,
-                    const Add& add) const;
+  FixStatus find_lamps(std::span<const Detection> detections, Frame& frame, int& unknown_lamps,
+                       const Add& add) const;
   FixStatus sight(std::span<const Detection> detections, const Eigen::Matrix3d& level_from_base,
-                  SightedFrame& frame) const;
-  std::size_t index_of(int id) const;
-  void reject_unexplained(SightedFrame& frame, const Eigen::Matrix3d& level_from_base,
-                          ConsistentFix& solution) const;
+                  FrameObservations& frame) const;
+  std::size_t find_index(int id) const;
+  void reject_outlier_lamps(FrameObservations& frame, const Eigen::Matrix3d& level_from_base,
+                            ConsistentFix& solution) const;
   /// Returns G C G'. Sets fix.common_chi_squared if PositionerOptions require it.
-  Matrix4 common_covariance(const SightedFrame& frame, const Eigen::Matrix3d& level_from_base,
+  Matrix4 common_covariance(const FrameObservations& frame, const Eigen::Matrix3d& level_from_base,
                             Fix& fix) const;
-  BodyCovariance common_covariance(const BodyFrame& frame, const Eigen::Vector3d& arm_m,
+  BodyCovariance common_covariance(const BodyObservations& frame, const Eigen::Vector3d& arm_m,
                                    const BodyFix& solution, Fix& fix) const;
   /// Replaces covariance and redundancy for equal noise in the undistorted image, by which the fix
   /// weighs its sightings, by those for equal noise in the image:
   ///   A = N^-1 J' W,   cov = A V A',   redundancy = tr(W V) - tr(N cov),   N = J' W J.
-  void convert_to_image_noise(const SightedFrame& frame, const Eigen::Matrix3d& level_from_base,
-                              Fix& fix) const;
+  void convert_to_image_noise(const FrameObservations& frame,
+                              const Eigen::Matrix3d& level_from_base, Fix& fix) const;
   /// Returns the motion of the camera when a lamp is read, or std::nullopt if it moves and the row
   /// time is not known.
   std::optional<MotionAtReadout> motion_at_readout(std::span<const Detection> detections, int lamp,
                                                    const Sensors& sensors) const;
   /// Adds the covariances of a fix of lamps, and transfers it to the robot if there is a mount.
-  void add_covariances(const SightedFrame& frame, const InclinationRotation& lean,
-                       const InclinationJacobian& by_lean, const Sensors& sensors,
-                       const Matrix4& by_height_and_yaw, Fix& fix) const;
-  FixStatus sight_from_body(std::span<const Detection> detections, double time_s, BodyFrame& frame,
-                            int& unknown_lamps) const;
+  void add_covariances(const FrameObservations& frame, const InclinationRotation& lean,
+                       const InclinationJacobian& d_pose_d_inclination, const Sensors& sensors,
+                       const Matrix4& height_and_yaw_covariance, Fix& fix) const;
+  FixStatus sight_from_body(std::span<const Detection> detections, double time_s,
+                            BodyObservations& frame, int& unknown_lamps) const;
   /// Returns std::nullopt if the frame has fewer than two lamps of the map.
   std::optional<Fix> locate_body(std::span<const Detection> detections, const Sensors& sensors,
                                  std::span<const EarlierFrame> earlier) const;
@@ -222,7 +222,7 @@ Positioner::Impl::Impl(const LampMap& map, const Calibration& calibration,
       max_residual_share_(options.max_residual_share),
       unstated_sigma_px_(options.unstated_sigma_px),
       computes_common_chi_squared_(options.computes_common_chi_squared),
-      row_clock_(row_clock_of(calibration.camera)) {
+      row_clock_(make_row_clock(calibration.camera)) {
   for (Lamp& lamp : lamps_) lamp.position_m -= origin_m_;
   nearest_m_ = distances_to_nearest(lamps_);
   if (mount_ &&
@@ -238,8 +238,8 @@ Positioner::Impl::Impl(const LampMap& map, const Calibration& calibration,
 /// Adds each detection of a lamp of the map to the frame: `add` takes it, its lamp, its ray and its
 /// standard deviation, and fills the frame's sighting.
 template <typename Frame, typename Add>
-FixStatus Positioner::Impl::look_up(std::span<const Detection> detections, Frame& frame,
-                                    int& unknown_lamps, const Add& add) const {
+FixStatus Positioner::Impl::find_lamps(std::span<const Detection> detections, Frame& frame,
+                                       int& unknown_lamps, const Add& add) const {
   const auto ids_begin = frame.ids.begin() + static_cast<std::ptrdiff_t>(frame.size);
   for (const Detection& detection : detections) {
     const auto lamp =
@@ -266,45 +266,46 @@ FixStatus Positioner::Impl::look_up(std::span<const Detection> detections, Frame
   return FixStatus::ok;
 }
 
-std::size_t Positioner::Impl::index_of(int id) const {
+std::size_t Positioner::Impl::find_index(int id) const {
   const auto lamp =
       std::lower_bound(lamps_.begin(), lamps_.end(), id,
                        [](const Lamp& candidate, int sought) { return candidate.id < sought; });
   return static_cast<std::size_t>(lamp - lamps_.begin());
 }
 
-/// Rejects lamps by the reported uncertainties if all are known; otherwise fix_robustly() decides.
-void Positioner::Impl::reject_unexplained(SightedFrame& frame,
-                                          const Eigen::Matrix3d& level_from_base,
-                                          ConsistentFix& solution) const {
+/// Rejects lamps by the reported uncertainties if all are known; otherwise estimate_pose_robust()
+/// decides.
+void Positioner::Impl::reject_outlier_lamps(FrameObservations& frame,
+                                            const Eigen::Matrix3d& level_from_base,
+                                            ConsistentFix& solution) const {
   if (solution.status != FixStatus::ok || frame.size < 4) return;
   // If the noise alone explains the residuals, no other error is needed.
   if (solution.fix.chi_squared <= static_cast<double>(2 * frame.size - 4)) return;
   const LevelPose pose(solution.fix.pose);
   std::array<Matrix2, max_lamps> common;
   for (std::size_t i = 0; i < frame.size; ++i) {
-    common[i] =
-        common_.covariance_of(common_.effect_on(frame.sightings[i], pose, lens_, level_from_base),
-                              index_of(frame.ids[i]));
+    common[i] = common_.compute_covariance(
+        common_.effect_on(frame.sightings[i], pose, lens_, level_from_base),
+        find_index(frame.ids[i]));
   }
-  const Unexplained wrong =
-      find_unexplained(frame.span(), {common.data(), frame.size}, solution.fix);
+  const OutlierLamps wrong =
+      find_outlier_lamps(frame.span(), {common.data(), frame.size}, solution.fix);
   if (wrong.count == 0) return;
   std::bitset<kMaxSightings> kept;
   kept.set();
   for (std::size_t i = 0; i < wrong.count; ++i) kept.reset(wrong.lamps[i]);
   frame.keep(kept);
-  solution = fix_consistent(frame.span(), std::numeric_limits<double>::infinity());
+  solution = estimate_pose_checked(frame.span(), std::numeric_limits<double>::infinity());
 }
 
-Matrix4 Positioner::Impl::common_covariance(const SightedFrame& frame,
+Matrix4 Positioner::Impl::common_covariance(const FrameObservations& frame,
                                             const Eigen::Matrix3d& level_from_base,
                                             Fix& fix) const {
   std::array<std::size_t, max_lamps> lamps;
-  for (std::size_t i = 0; i < frame.size; ++i) lamps[i] = index_of(frame.ids[i]);
+  for (std::size_t i = 0; i < frame.size; ++i) lamps[i] = find_index(frame.ids[i]);
   const std::span<const std::size_t> in_map(lamps.data(), frame.size);
-  const Matrix4 common = common_.covariance_of(
-      common_.gain_of(frame.span(), in_map, fix.estimate, lens_, level_from_base));
+  const Matrix4 common = common_.compute_covariance(
+      common_.compute_gain(frame.span(), in_map, fix.estimate, lens_, level_from_base));
   if (computes_common_chi_squared_ && fix.redundancy > 0) {
     fix.common_chi_squared = common_.expected_chi_squared(frame.span(), in_map, fix.estimate,
                                                           common, lens_, level_from_base);
@@ -312,14 +313,14 @@ Matrix4 Positioner::Impl::common_covariance(const SightedFrame& frame,
   return common;
 }
 
-BodyCovariance Positioner::Impl::common_covariance(const BodyFrame& frame,
+BodyCovariance Positioner::Impl::common_covariance(const BodyObservations& frame,
                                                    const Eigen::Vector3d& arm_m,
                                                    const BodyFix& solution, Fix& fix) const {
   std::array<std::size_t, max_lamps> lamps;
-  for (std::size_t i = 0; i < frame.size; ++i) lamps[i] = index_of(frame.ids[i]);
+  for (std::size_t i = 0; i < frame.size; ++i) lamps[i] = find_index(frame.ids[i]);
   const std::span<const std::size_t> in_map(lamps.data(), frame.size);
-  const BodyCovariance common = common_.covariance_of(
-      common_.gain_of(frame.span(), in_map, arm_m, solution, lens_, body_from_base_));
+  const BodyCovariance common = common_.compute_covariance(
+      common_.compute_gain(frame.span(), in_map, arm_m, solution, lens_, body_from_base_));
   if (computes_common_chi_squared_ && fix.redundancy > 0) {
     fix.common_chi_squared = common_.expected_chi_squared(frame.span(), in_map, arm_m, solution,
                                                           common, lens_, body_from_base_);
@@ -329,7 +330,7 @@ BodyCovariance Positioner::Impl::common_covariance(const BodyFrame& frame,
 
 FixStatus Positioner::Impl::sight(std::span<const Detection> detections,
                                   const Eigen::Matrix3d& level_from_base,
-                                  SightedFrame& frame) const {
+                                  FrameObservations& frame) const {
   const Eigen::Matrix3d level_from_camera = level_from_base * base_from_camera_;
   const auto add = [&](const Detection& detection, const Lamp& lamp, const Lens::Ray& ray,
                        double sigma_px) {
@@ -347,11 +348,11 @@ FixStatus Positioner::Impl::sight(std::span<const Detection> detections,
     }
     return FixStatus::ok;
   };
-  return look_up(detections, frame, frame.unknown_lamps, add);
+  return find_lamps(detections, frame, frame.unknown_lamps, add);
 }
 
 FixStatus Positioner::Impl::sight_from_body(std::span<const Detection> detections, double time_s,
-                                            BodyFrame& frame, int& unknown_lamps) const {
+                                            BodyObservations& frame, int& unknown_lamps) const {
   const auto add = [&](const Detection& detection, const Lamp& lamp, const Lens::Ray& ray,
                        double sigma_px) {
     const Eigen::Vector3d direction = body_from_camera_ * ray.direction;
@@ -363,14 +364,14 @@ FixStatus Positioner::Impl::sight_from_body(std::span<const Detection> detection
                                    time_s + read_s};
     return FixStatus::ok;
   };
-  return look_up(detections, frame, unknown_lamps, add);
+  return find_lamps(detections, frame, unknown_lamps, add);
 }
 
 std::optional<Fix> Positioner::Impl::locate_body(std::span<const Detection> detections,
                                                  const Sensors& sensors,
                                                  std::span<const EarlierFrame> earlier) const {
   const KnownMotion motion = sensors.motion.value_or(KnownMotion());
-  if (moves(motion) && !row_clock_) return refused(FixStatus::row_time_unknown, 0);
+  if (moves(motion) && !row_clock_) return without_fix(FixStatus::row_time_unknown, 0);
   BodyPrior prior{{motion.velocity_m_per_s, motion.yaw_rate_rad_per_s,
                    sensors.inclination.value_or(Inclination{0, 0})},
                   motion.velocity_sd_m_per_s,
@@ -379,23 +380,23 @@ std::optional<Fix> Positioner::Impl::locate_body(std::span<const Detection> dete
                   sensors.height};
   if (prior.height) prior.height->z_m -= origin_m_.z();
   Fix fix;
-  BodyFrame frame;
+  BodyObservations frame;
   const FixStatus seen = sight_from_body(detections, 0, frame, fix.unknown_lamps);
-  if (seen != FixStatus::ok) return refused(seen, fix.unknown_lamps);
-  frame.now = frame.size;
+  if (seen != FixStatus::ok) return without_fix(seen, fix.unknown_lamps);
+  frame.num_current = frame.size;
   for (const EarlierFrame& before : earlier) {
     int unknown_lamps = 0;
     const FixStatus status =
         sight_from_body(before.detections, -before.before_s, frame, unknown_lamps);
-    if (status != FixStatus::ok) return refused(status, fix.unknown_lamps);
+    if (status != FixStatus::ok) return without_fix(status, fix.unknown_lamps);
   }
-  if (frame.now < 2) return std::nullopt;
+  if (frame.num_current < 2) return std::nullopt;
   // If common errors are known, the noise alone must not reject lamps.
   if (common_.complete()) frame.noise_is_stated = false;
   const Eigen::Vector3d arm_m =
       mount_ ? mount_->position_in_robot_m : Eigen::Vector3d(Eigen::Vector3d::Zero());
-  const auto [status, solution] = fix_body_frame(frame, arm_m, prior, max_residual_share_);
-  if (status != FixStatus::ok) return refused(status, fix.unknown_lamps);
+  const auto [status, solution] = estimate_body_robust(frame, arm_m, prior, max_residual_share_);
+  if (status != FixStatus::ok) return without_fix(status, fix.unknown_lamps);
   fix.status = status;
   fix.redundancy = solution.redundancy;
   fix.chi_squared = solution.pixels_chi_squared;
@@ -405,9 +406,9 @@ std::optional<Fix> Positioner::Impl::locate_body(std::span<const Detection> dete
   fix.estimate = {solution.state.pose, fix.body->covariance.topLeftCorner<4, 4>()};
   fix.estimate.pose.position_m += origin_m_;
   fix.residual_px = solution.residual_px;
-  fix.lamps = static_cast<int>(frame.now);
+  fix.lamps = static_cast<int>(frame.num_current);
   fix.sightings = static_cast<int>(frame.size);
-  name_rejected(frame, fix);
+  set_rejected(frame, fix);
   fix.time_s = sensors.time_s;
   return fix;
 }
@@ -417,12 +418,12 @@ Fix Positioner::Impl::locate(std::span<const Detection> detections, const Sensor
   const bool finite_times =
       std::all_of(earlier.begin(), earlier.end(),
                   [](const EarlierFrame& before) { return std::isfinite(before.before_s); });
-  if (!finite(sensors) || !finite_times) return refused(FixStatus::not_finite, 0);
+  if (!finite(sensors) || !finite_times) return without_fix(FixStatus::not_finite, 0);
   if (const auto fix = locate_body(detections, sensors, earlier)) return *fix;
   return locate(detections, sensors);
 }
 
-void Positioner::Impl::convert_to_image_noise(const SightedFrame& frame,
+void Positioner::Impl::convert_to_image_noise(const FrameObservations& frame,
                                               const Eigen::Matrix3d& level_from_base,
                                               Fix& fix) const {
   const LevelPose pose(fix.estimate.pose);
@@ -449,24 +450,27 @@ void Positioner::Impl::convert_to_image_noise(const SightedFrame& frame,
   fix.estimate.covariance = covariance;
 }
 
-void Positioner::Impl::add_covariances(const SightedFrame& frame, const InclinationRotation& lean,
-                                       const InclinationJacobian& by_lean, const Sensors& sensors,
-                                       const Matrix4& by_height_and_yaw, Fix& fix) const {
+void Positioner::Impl::add_covariances(const FrameObservations& frame,
+                                       const InclinationRotation& lean,
+                                       const InclinationJacobian& d_pose_d_inclination,
+                                       const Sensors& sensors,
+                                       const Matrix4& height_and_yaw_covariance, Fix& fix) const {
   const double sigma_rad = sensors.inclination_sigma_rad;
   const Matrix4 common = common_.stated() ? common_covariance(frame, lean.level_from_base, fix)
                                           : Matrix4(Matrix4::Zero());
   if (!frame.is_weighed_by_noise) convert_to_image_noise(frame, lean.level_from_base, fix);
-  fix.estimate.covariance += by_height_and_yaw;
+  fix.estimate.covariance += height_and_yaw_covariance;
   // The error of the inclination is independent between frames, too.
   if (mount_) {
     PoseEstimate whole = fix.estimate;
     whole.covariance += common;
     fix.noise_covariance =
-        robot_from_camera(fix.estimate, by_lean, sigma_rad, *mount_, lean).covariance;
-    fix.estimate = robot_from_camera(whole, by_lean, sigma_rad, *mount_, lean);
+        robot_from_camera(fix.estimate, d_pose_d_inclination, sigma_rad, *mount_, lean).covariance;
+    fix.estimate = robot_from_camera(whole, d_pose_d_inclination, sigma_rad, *mount_, lean);
   } else {
     if (sigma_rad > 0) {
-      fix.estimate.covariance += sigma_rad * sigma_rad * by_lean * by_lean.transpose();
+      fix.estimate.covariance +=
+          sigma_rad * sigma_rad * d_pose_d_inclination * d_pose_d_inclination.transpose();
     }
     fix.noise_covariance = fix.estimate.covariance;
     fix.estimate.covariance += common;
@@ -491,55 +495,56 @@ std::optional<MotionAtReadout> Positioner::Impl::motion_at_readout(
 }
 
 Fix Positioner::Impl::locate(std::span<const Detection> detections, const Sensors& sensors) const {
-  if (!finite(sensors)) return refused(FixStatus::not_finite, 0);
+  if (!finite(sensors)) return without_fix(FixStatus::not_finite, 0);
   if (needs_body(sensors) && detections.size() > 1) {
     if (auto fix = locate_body(detections, sensors, {})) return *fix;
   }
   const InclinationRotation lean =
-      sensors.inclination
-          ? inclination_rotation(*sensors.inclination, mount_ ? mount_->yaw_in_robot_rad : 0)
-          : InclinationRotation();
-  SightedFrame frame;
+      sensors.inclination ? compute_inclination_rotation(*sensors.inclination,
+                                                         mount_ ? mount_->yaw_in_robot_rad : 0)
+                          : InclinationRotation();
+  FrameObservations frame;
   const FixStatus seen = sight(detections, lean.level_from_base, frame);
-  if (seen != FixStatus::ok) return refused(seen, frame.unknown_lamps);
+  if (seen != FixStatus::ok) return without_fix(seen, frame.unknown_lamps);
 
   Fix fix;
-  Matrix4 by_height_and_yaw = Matrix4::Zero();
-  InclinationJacobian by_lean = InclinationJacobian::Zero();
+  Matrix4 height_and_yaw_covariance = Matrix4::Zero();
+  InclinationJacobian d_pose_d_inclination = InclinationJacobian::Zero();
   if (frame.size > 1) {
     // If common errors are known, the noise alone must not reject lamps.
     const bool total = common_.complete();
     if (total) frame.noise_is_stated = false;
-    ConsistentFix found = fix_robustly(frame, max_residual_share_);
-    if (total) reject_unexplained(frame, lean.level_from_base, found);
+    ConsistentFix found = estimate_pose_robust(frame, max_residual_share_);
+    if (total) reject_outlier_lamps(frame, lean.level_from_base, found);
     const auto& [status, solution] = found;
-    if (status != FixStatus::ok) return refused(status, frame.unknown_lamps);
+    if (status != FixStatus::ok) return without_fix(status, frame.unknown_lamps);
     fix.estimate = {solution.pose, solution.covariance};
     fix.residual_px = solution.residual_px;
     fix.chi_squared = solution.chi_squared;
     if (sensors.inclination_sigma_rad > 0)
-      by_lean = rotation_effect(frame.span(), solution) * lean.error_axes;
+      d_pose_d_inclination = compute_rotation_jacobian(frame.span(), solution) * lean.error_axes;
   } else if (frame.size == 1 && sensors.height_and_yaw) {
     const auto readout = motion_at_readout(detections, frame.ids.front(), sensors);
-    if (!readout) return refused(FixStatus::row_time_unknown, frame.unknown_lamps);
+    if (!readout) return without_fix(FixStatus::row_time_unknown, frame.unknown_lamps);
     const Sighting& sighting = frame.sightings.front();
     HeightAndYaw known = *sensors.height_and_yaw;
     known.z_m -= origin_m_.z();
-    const auto pose = fix_one_lamp(sighting, known, *readout);
-    if (!pose) return refused(FixStatus::lamp_below_camera, frame.unknown_lamps);
-    fix.estimate = {*pose, one_lamp_covariance(sighting, *pose)};
-    by_height_and_yaw = compute_one_lamp_sensor_covariance(sighting, *pose, known, *readout);
-    by_lean = one_lamp_rotation_effect(sighting, *pose) * lean.error_axes;
+    const auto pose = compute_one_lamp_pose(sighting, known, *readout);
+    if (!pose) return without_fix(FixStatus::lamp_below_camera, frame.unknown_lamps);
+    fix.estimate = {*pose, compute_one_lamp_covariance(sighting, *pose)};
+    height_and_yaw_covariance =
+        compute_one_lamp_sensor_covariance(sighting, *pose, known, *readout);
+    d_pose_d_inclination = compute_one_lamp_rotation_jacobian(sighting, *pose) * lean.error_axes;
   } else {
-    return refused(FixStatus::too_few_lamps, frame.unknown_lamps);
+    return without_fix(FixStatus::too_few_lamps, frame.unknown_lamps);
   }
   fix.status = FixStatus::ok;
   fix.lamps = fix.sightings = static_cast<int>(frame.size);
   fix.redundancy = frame.size < 3 ? 0 : 2 * static_cast<double>(frame.size) - 4;
   fix.time_s = sensors.time_s;
-  name_rejected(frame, fix);
+  set_rejected(frame, fix);
   fix.unknown_lamps = frame.unknown_lamps;
-  add_covariances(frame, lean, by_lean, sensors, by_height_and_yaw, fix);
+  add_covariances(frame, lean, d_pose_d_inclination, sensors, height_and_yaw_covariance, fix);
   fix.estimate.pose.position_m += origin_m_;
   return fix;
 }

@@ -31,8 +31,8 @@ struct PositionerOptions {
   std::optional<CameraMount> mount;
   /// Residual limit as a fraction of the RMS radius of all lamps in the image. Lamps are
   /// inconsistent if the residual of one exceeds it, or if it is too close to another lamp
-  /// (fix_robustly). Noise, lens and an uncorrected tilt of 5 degrees cause residuals of 0.05 or
-  /// less.
+  /// (estimate_pose_robust). Noise, lens and an uncorrected tilt of 5 degrees cause residuals of
+  /// 0.05 or less.
   double max_residual_share = 0.1;
   /// Standard deviation per axis, in the image, of detections without sigma_px. It scales the
   /// covariance and decides if lamps close together are `degenerate`. Poses do not depend on it,
@@ -104,12 +104,13 @@ class Positioner {
   /// Computes the fix of one frame. Neither allocates memory nor throws.
   ///
   /// Methods, by the number of lamps:
-  ///   one   fix_one_lamp()
+  ///   one   compute_one_lamp_pose()
   ///   two   closed form
-  ///   more  fix_least_squares() from initial_pose(), without outliers (fix_robustly)
-  /// With two lamps or more fix_body_frame() is used instead if the sensors leave motion or
+  ///   more  estimate_pose_least_squares() from compute_initial_pose(), without outliers
+  ///   (estimate_pose_robust)
+  /// With two lamps or more estimate_body_robust() is used instead if the sensors leave motion or
   /// inclination free, or give a height. If the covariances of calibration or survey cover every
-  /// lamp, lamps that contradict all uncertainties together are rejected, too (find_unexplained).
+  /// lamp, lamps that contradict all uncertainties together are rejected, too (find_outlier_lamps).
   Fix locate(std::span<const Detection> detections, const Sensors& sensors = {}) const noexcept;
   /// Computes the fix of one frame together with frames from shortly before. Velocity, yaw rate,
   /// roll and pitch are assumed constant over the frames. If the current frame has fewer than two

@@ -40,17 +40,17 @@ struct ConsistentFix {
   LeastSquaresFix fix;
 };
 
-/// Computes the least-squares fix of two lamps or more from initial_pose() and checks it:
+/// Computes the least-squares fix of two lamps or more from compute_initial_pose() and checks it:
 ///   degenerate    the lamps do not determine it: the standard deviation of the height exceeds the
 ///                 height
 ///   inconsistent  of three lamps or more, one has a residual of z above `max_residual`
-ConsistentFix fix_consistent(std::span<const Sighting> sightings, double max_residual);
+ConsistentFix estimate_pose_checked(std::span<const Sighting> sightings, double max_residual);
 
 /// Computes the RMS distance of the observations from their mean, in z.
-double spread_of(std::span<const Sighting> sightings);
+double compute_rms_radius(std::span<const Sighting> sightings);
 
 /// Lamps observed in one frame. The arrays have a fixed size, so that no memory is allocated.
-struct SightedFrame {
+struct FrameObservations {
   std::array<Sighting, kMaxSightings> sightings;
   std::array<int, kMaxSightings> ids;
   /// Horizontal distance from each lamp to the nearest other lamp of the map.
@@ -84,6 +84,6 @@ struct SightedFrame {
 /// the mirror image fits a hundred times better, the status is `mirrored_map`. If all noise is
 /// reported, and explains the residuals of a majority a hundred times better, the other lamps are
 /// rejected.
-ConsistentFix fix_robustly(SightedFrame& frame, double max_residual_share);
+ConsistentFix estimate_pose_robust(FrameObservations& frame, double max_residual_share);
 
 }  // namespace vlp

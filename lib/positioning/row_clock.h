@@ -20,7 +20,7 @@ struct RowClock {
 };
 
 /// Returns the row clock of a camera; std::nullopt if its row time or readout direction is unknown.
-inline std::optional<RowClock> row_clock_of(const Camera& camera) {
+inline std::optional<RowClock> make_row_clock(const Camera& camera) {
   if (!camera.row_time_s || !camera.readout) return std::nullopt;
   const int rows = camera.imager_px[*camera.readout == Readout::rows ? 1 : 0];
   return RowClock{*camera.row_time_s, (rows - 1) / 2.0, *camera.readout};

@@ -52,7 +52,7 @@ inline double height_above(const LevelPose& camera, const Eigen::Vector3d& lamp_
 
 /// Computes z of a lamp from a pose.
 /// @pre the lamp is above the camera
-inline Eigen::Vector2d predicted_z(const LevelPose& camera, const Eigen::Vector3d& lamp_m) {
+inline Eigen::Vector2d predict_z(const LevelPose& camera, const Eigen::Vector3d& lamp_m) {
   const Eigen::Vector2d offset = (lamp_m - camera.position_m).head<2>();
   return conj_product(camera.heading, offset) / height_above(camera, lamp_m);
 }
@@ -62,7 +62,7 @@ inline Eigen::Vector2d predicted_z(const LevelPose& camera, const Eigen::Vector3
 inline Prediction predict(const LevelPose& camera, const Eigen::Vector3d& lamp_m) {
   const double inverse_height = 1 / height_above(camera, lamp_m);
   const double c = camera.heading.x() * inverse_height, s = camera.heading.y() * inverse_height;
-  const Eigen::Vector2d z = predicted_z(camera, lamp_m);
+  const Eigen::Vector2d z = predict_z(camera, lamp_m);
   Prediction prediction{z, {}};
   prediction.d_z_d_state << -c, -s, z.x() * inverse_height, z.y(),  //
       s, -c, z.y() * inverse_height, -z.x();

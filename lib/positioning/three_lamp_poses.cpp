@@ -53,7 +53,7 @@ Eigen::Matrix3d adjugate(const Eigen::Matrix3d& a) {
 
 /// Returns the two lines whose product is the conic of rank two; std::nullopt if they are not
 /// real.
-int lines_of(const Eigen::Matrix3d& conic, std::array<Eigen::Vector3d, 2>& lines) {
+int factor_conic(const Eigen::Matrix3d& conic, std::array<Eigen::Vector3d, 2>& lines) {
   const Eigen::Matrix3d adj = adjugate(conic);
   Eigen::Index i = 0;
   adj.diagonal().cwiseAbs().maxCoeff(&i);
@@ -74,8 +74,8 @@ struct Cones {
   double a01, a02, a12;
 };
 
-Cones cones_of(const std::array<Eigen::Vector3d, 3>& points_m,
-               const std::array<Eigen::Vector3d, 3>& rays) {
+Cones make_cones(const std::array<Eigen::Vector3d, 3>& points_m,
+                 const std::array<Eigen::Vector3d, 3>& rays) {
   const double c01 = rays[0].dot(rays[1]), c02 = rays[0].dot(rays[2]), c12 = rays[1].dot(rays[2]);
   Cones cones;
   cones.m01 << 1, -c01, 0, -c01, 1, 0, 0, 0, 0;
@@ -105,8 +105,8 @@ void polish(const Cones& cones, Eigen::Vector3d& distances) {
 
 /// Returns the frame of three points: columns along the first side, perpendicular to it in the
 /// plane, and normal to the plane.
-Eigen::Matrix3d frame_of(const Eigen::Vector3d& p0, const Eigen::Vector3d& p1,
-                         const Eigen::Vector3d& p2) {
+Eigen::Matrix3d compute_point_frame(const Eigen::Vector3d& p0, const Eigen::Vector3d& p1,
+                                    const Eigen::Vector3d& p2) {
   Eigen::Matrix3d frame;
   frame.col(0) = (p1 - p0).normalized();
   frame.col(2) = frame.col(0).cross(p2 - p0).normalized();
@@ -116,10 +116,10 @@ Eigen::Matrix3d frame_of(const Eigen::Vector3d& p0, const Eigen::Vector3d& p1,
 
 }  // namespace
 
-ThreeLampPoses three_lamp_poses(const std::array<Eigen::Vector3d, 3>& points_m,
-                                const std::array<Eigen::Vector3d, 3>& rays) {
+ThreeLampPoses compute_three_lamp_poses(const std::array<Eigen::Vector3d, 3>& points_m,
+                                        const std::array<Eigen::Vector3d, 3>& rays) {
   ThreeLampPoses found;
-  const Cones cones = cones_of(points_m, rays);
+  const Cones cones = make_cones(points_m, rays);
   Eigen::Matrix3d first = cones.a12 * cones.m01 - cones.a01 * cones.m12;
   Eigen::Matrix3d second = cones.a12 * cones.m02 - cones.a02 * cones.m12;
   // One conic is already a pair of lines if a lamp has equal distances and angles to both others.
@@ -133,8 +133,8 @@ ThreeLampPoses three_lamp_poses(const std::array<Eigen::Vector3d, 3>& points_m,
   const double x = steep_root(quadratic / cubic, linear / cubic, constant / cubic);
   if (!std::isfinite(x)) return found;
   std::array<Eigen::Vector3d, 2> lines;
-  const int count = lines_of(first + x * second, lines);
-  const Eigen::Matrix3d world_frame = frame_of(points_m[0], points_m[1], points_m[2]);
+  const int count = factor_conic(first + x * second, lines);
+  const Eigen::Matrix3d world_frame = compute_point_frame(points_m[0], points_m[1], points_m[2]);
   if (!(world_frame.col(2).squaredNorm() > 0.5)) return found;  // on one line
   for (int i = 0; i < count; ++i) {
     // Two directions span the line; the conic along a + s b is a quadratic in s.
@@ -160,7 +160,7 @@ ThreeLampPoses three_lamp_poses(const std::array<Eigen::Vector3d, 3>& points_m,
       if (!(distances.minCoeff() > 0) || !distances.allFinite()) continue;
       const std::array<Eigen::Vector3d, 3> seen{distances[0] * rays[0], distances[1] * rays[1],
                                                 distances[2] * rays[2]};
-      const Eigen::Matrix3d seen_frame = frame_of(seen[0], seen[1], seen[2]);
+      const Eigen::Matrix3d seen_frame = compute_point_frame(seen[0], seen[1], seen[2]);
       if (!(seen_frame.col(2).squaredNorm() > 0.5)) continue;
       FreePose pose;
       pose.camera_from_world = seen_frame * world_frame.transpose();

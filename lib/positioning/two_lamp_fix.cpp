@@ -26,11 +26,11 @@ Roots solve_quadratic(double a, double b, double c) {
 
 }  // namespace
 
-TwoLampFix fix_two_lamps(const Sighting& first, const Sighting& second) {
+TwoLampPoses compute_two_lamp_poses(const Sighting& first, const Sighting& second) {
   const Eigen::Vector2d d = (second.lamp_m - first.lamp_m).head<2>();
   const Eigen::Vector2d difference = second.z - first.z;
   const double h = second.lamp_m.z() - first.lamp_m.z();
-  TwoLampFix fix;
+  TwoLampPoses fix;
   constexpr double rounding = 4 * std::numeric_limits<double>::epsilon();
   const double a = difference.squaredNorm();
   if (!(a > rounding * rounding * (first.z.squaredNorm() + second.z.squaredNorm()))) return fix;

@@ -10,7 +10,7 @@
 namespace vlp {
 
 /// The poses from two lamps: none, one or two.
-struct TwoLampFix {
+struct TwoLampPoses {
   int count = 0;
   std::array<Pose, 2> poses;
   /// True if a pose would exist with a lamp at or below the camera's height.
@@ -24,6 +24,6 @@ struct TwoLampFix {
 ///
 /// Lamps at different heights have two solutions if both are far from the image center and close
 /// together (|h z_2| > |D|); otherwise one. Returns none if the lamps coincide in the image.
-TwoLampFix fix_two_lamps(const Sighting& first, const Sighting& second);
+TwoLampPoses compute_two_lamp_poses(const Sighting& first, const Sighting& second);
 
 }  // namespace vlp

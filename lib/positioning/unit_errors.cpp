@@ -18,12 +18,12 @@ UnitErrors::UnitErrors(const LampMap& map, const Calibration& calibration)
       lens_(camera_.lens_model, camera_.intrinsics),
       camera_from_level_(level_from_camera(calibration, Correction::all).inverse()),
       whole_(map_.lamps, calibration, Correction::all),
-      parts_{whole_.only(CommonPart::lens), whole_.only(CommonPart::zenith),
-             whole_.only(CommonPart::offset), whole_.only(CommonPart::lamps)},
+      parts_{whole_.only(CommonErrorSource::lens), whole_.only(CommonErrorSource::zenith),
+             whole_.only(CommonErrorSource::offset), whole_.only(CommonErrorSource::lamps)},
       has_offset_(calibration.dispersion.has_value()) {}
 
-std::vector<std::size_t> UnitErrors::lamps_seen_from(const Pose& level) const {
-  return lamps_in_view(map_, lens_, camera_.imager_px, camera_from_level_, level);
+std::vector<std::size_t> UnitErrors::find_visible_lamps(const Pose& level) const {
+  return find_lamps_in_view(map_, lens_, camera_.imager_px, camera_from_level_, level);
 }
 
 std::optional<UnitBudget> UnitErrors::budget(const Pose& level, std::span<const std::size_t> lamps,
@@ -44,15 +44,15 @@ std::optional<UnitBudget> UnitErrors::budget(const Pose& level, std::span<const 
     const Eigen::Matrix<double, 2, 4> by_state = d_pixel_d_z * seen.d_z_d_state / noise_px;
     information += by_state.transpose() * by_state;
   }
-  const auto noise = inverse_of_positive(information);
+  const auto noise = invert_positive_definite(information);
   if (!noise) return std::nullopt;
   const CommonErrors::Gain gain =
-      whole_.gain_of(sightings, lamps, {level, *noise}, lens_, Eigen::Matrix3d::Identity());
-  const auto part = [&](CommonPart of) {
-    return parts_[static_cast<std::size_t>(of)].covariance_of(gain);
+      whole_.compute_gain(sightings, lamps, {level, *noise}, lens_, Eigen::Matrix3d::Identity());
+  const auto part = [&](CommonErrorSource of) {
+    return parts_[static_cast<std::size_t>(of)].compute_covariance(gain);
   };
-  return UnitBudget{*noise, part(CommonPart::lens), part(CommonPart::zenith),
-                    part(CommonPart::offset), part(CommonPart::lamps)};
+  return UnitBudget{*noise, part(CommonErrorSource::lens), part(CommonErrorSource::zenith),
+                    part(CommonErrorSource::offset), part(CommonErrorSource::lamps)};
 }
 
 std::optional<UnitBudget> UnitErrors::budget(const Pose& level, std::span<const std::size_t> lamps,
@@ -60,20 +60,21 @@ std::optional<UnitBudget> UnitErrors::budget(const Pose& level, std::span<const 
   std::vector<Eigen::Vector3d> lamps_m;
   lamps_m.reserve(lamps.size());
   for (const std::size_t lamp : lamps) lamps_m.push_back(map_.lamps[lamp].position_m);
-  const auto limit =
-      body_limit(lamps_m, lens_, camera_from_level_, level, noise_px, prior, row_clock_of(camera_));
+  const auto limit = compute_body_limit(lamps_m, lens_, camera_from_level_, level, noise_px, prior,
+                                        make_row_clock(camera_));
   if (!limit) return std::nullopt;
   const CommonErrors::BodyGain gain =
-      whole_.gain_of(limit->frame.span(), lamps, Eigen::Vector3d::Zero(), limit->fix, lens_,
-                     Eigen::Matrix3d::Identity());
-  const auto part = [&](CommonPart of) {
-    return Matrix4(parts_[static_cast<std::size_t>(of)].covariance_of(gain).topLeftCorner<4, 4>());
+      whole_.compute_gain(limit->frame.span(), lamps, Eigen::Vector3d::Zero(), limit->fix, lens_,
+                          Eigen::Matrix3d::Identity());
+  const auto part = [&](CommonErrorSource of) {
+    return Matrix4(
+        parts_[static_cast<std::size_t>(of)].compute_covariance(gain).topLeftCorner<4, 4>());
   };
   return UnitBudget{limit->noise,
-                    part(CommonPart::lens),
-                    part(CommonPart::zenith),
-                    part(CommonPart::offset),
-                    part(CommonPart::lamps),
+                    part(CommonErrorSource::lens),
+                    part(CommonErrorSource::zenith),
+                    part(CommonErrorSource::offset),
+                    part(CommonErrorSource::lamps),
                     limit->motion,
                     limit->lean};
 }

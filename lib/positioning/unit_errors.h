@@ -45,7 +45,7 @@ class UnitErrors {
   /// Returns the indices in the map of the lamps that are fully visible to the camera with its
   /// calibrated tilt. `level` is the pose of its level frame. Such a lamp has its center, and its
   /// rim if the diameter is known, in the image.
-  std::vector<std::size_t> lamps_seen_from(const Pose& level) const;
+  std::vector<std::size_t> find_visible_lamps(const Pose& level) const;
 
   /// Computes the budget of a fix from these lamps, with noise `noise_px` per axis. Agrees with the
   /// covariance of Positioner::locate(). Returns std::nullopt for fewer than two lamps or more than
@@ -53,7 +53,7 @@ class UnitErrors {
   /// fix.
   std::optional<UnitBudget> budget(const Pose& level, std::span<const std::size_t> lamps,
                                    double noise_px) const;
-  /// Computes the budget of a camera that may move and be tilted, as error_budget().
+  /// Computes the budget of a camera that may move and be tilted, as compute_error_budget().
   /// @pre the calibration has row time and readout direction if the prior leaves the motion free
   std::optional<UnitBudget> budget(const Pose& level, std::span<const std::size_t> lamps,
                                    double noise_px, const BodyPrior& prior) const;
@@ -64,7 +64,7 @@ class UnitErrors {
   Lens lens_;
   Eigen::Matrix3d camera_from_level_;
   CommonErrors whole_;
-  std::array<CommonErrors, kCommonParts.size()> parts_;
+  std::array<CommonErrors, kCommonErrorSources.size()> parts_;
   bool has_offset_;
 };
 

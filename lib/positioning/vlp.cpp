@@ -56,7 +56,7 @@ std::int32_t failed(std::int32_t code, std::string_view message) {
   return code;
 }
 
-PositionerOptions options_of(const vlp_options& options) {
+PositionerOptions convert_options(const vlp_options& options) {
   PositionerOptions result;
   if (options.has_mount != 0) {
     result.mount = CameraMount{Eigen::Vector3d(options.mount_position_m), options.mount_yaw_rad};
@@ -66,7 +66,7 @@ PositionerOptions options_of(const vlp_options& options) {
   return result;
 }
 
-Sensors sensors_of(const vlp_sensors& sensors) {
+Sensors convert_sensors(const vlp_sensors& sensors) {
   Sensors result;
   if (sensors.has_inclination != 0) {
     result.inclination = Inclination{sensors.roll_rad, sensors.pitch_rad};
@@ -164,7 +164,7 @@ std::int32_t failed_by_exception() {
   }
 }
 
-ImageView view_of(const vlp_image& image) {
+ImageView make_view(const vlp_image& image) {
   const std::ptrdiff_t row_bytes = std::ptrdiff_t{image.width} * (image.bits / 8);
   return {image.data, image.width, image.height, image.stride != 0 ? image.stride : row_bytes,
           image.bits};
@@ -219,7 +219,7 @@ int32_t vlp_open_room(const char* lamps_yaml, const char* room, const char* cali
     const LampMapFile lamps = read_lamps_with_rooms(lamps_yaml, room != nullptr ? room : "");
     const Calibration calibration = read_calibration(calibration_yaml);
     const PositionerOptions chosen =
-        options != nullptr ? options_of(*options) : PositionerOptions();
+        options != nullptr ? convert_options(*options) : PositionerOptions();
     std::optional<LampDetector> detector;
     if (calibration.camera.row_time_s) detector.emplace(lamps.map, calibration);
     std::string room_error = explain_missing_room(lamps, "the argument room of vlp_open_room()");
@@ -248,7 +248,7 @@ int32_t vlp_detect(const vlp_positioner* positioner, const vlp_image* image,
   }
   if (!positioner->room_error.empty()) return failed(VLP_BAD_FILE, positioner->room_error);
   try {
-    const auto seen = positioner->detector->detect(view_of(*image));
+    const auto seen = positioner->detector->detect(make_view(*image));
     for (std::size_t i = 0; i < std::min(seen.size(), capacity); ++i) {
       detections[i] = {seen[i].lamp, seen[i].pixel.x(), seen[i].pixel.y(),
                        seen[i].sigma_px.value_or(0)};
@@ -290,7 +290,7 @@ int32_t vlp_locate_with_earlier(const vlp_positioner* positioner, const vlp_dete
     if (!buffer.has_room_for(one.count)) return fix->status = VLP_TOO_MANY_LAMPS;
     before[frames++] = {buffer.add(one.detections, one.count), one.before_s};
   }
-  const Sensors known = sensors != nullptr ? sensors_of(*sensors) : Sensors();
+  const Sensors known = sensors != nullptr ? convert_sensors(*sensors) : Sensors();
   const Positioner& with = positioner->positioner;
   fill(frames > 0 ? with.locate(frame, known, {before.data(), frames}) : with.locate(frame, known),
        known, *fix);
@@ -313,7 +313,7 @@ const char* vlp_explanation(int32_t code) {
       break;
   }
   if (code < VLP_OK || code > VLP_ROW_TIME_UNKNOWN) return "no code of this library";
-  return vlp::explanation_of(static_cast<vlp::FixStatus>(code)).data();
+  return vlp::describe(static_cast<vlp::FixStatus>(code)).data();
 }
 
 const char* vlp_last_error(void) { return vlp::last_error.data(); }

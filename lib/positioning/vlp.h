@@ -154,7 +154,8 @@ const char* vlp_version(void);
 int32_t vlp_open(const char* lamps_yaml, const char* calibration_yaml, const vlp_options* options,
                  vlp_positioner** positioner);
 
-/* Does what vlp_open() does, with the lamps of one room of a map whose lamps state a `room`. Null or
+/* Does what vlp_open() does, with the lamps of one room of a map whose lamps state a `room`. Null
+ * or
  * "" takes all lamps, as vlp_open() does. If lamps of two rooms then share a frequency,
  * vlp_detect() returns VLP_BAD_FILE, and the names of the rooms are in vlp_last_error(). */
 int32_t vlp_open_room(const char* lamps_yaml, const char* room, const char* calibration_yaml,
@@ -190,9 +191,9 @@ int32_t vlp_locate_with_earlier(const vlp_positioner* positioner, const vlp_dete
 /* Returns one line with the meaning of a status or an error and the remedy. Never null. */
 const char* vlp_explanation(int32_t code);
 
-/* Returns the message of the last vlp_open(), vlp_open_room() or vlp_detect() of this thread that failed: file,
- * line and key, or the problem with the image. "" before the first failure. Valid until the next call of
- * this thread. */
+/* Returns the message of the last vlp_open(), vlp_open_room() or vlp_detect() of this thread that
+ * failed: file, line and key, or the problem with the image. "" before the first failure. Valid
+ * until the next call of this thread. */
 const char* vlp_last_error(void);
 
 #ifdef __cplusplus

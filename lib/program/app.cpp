@@ -57,9 +57,9 @@ CLI::Validator number_check(const std::string& name, bool (*accepts)(double)) {
   return CLI::Validator(
       [name, accepts](const std::string& text) {
         double value = 0;
-        const bool good =
+        const bool is_valid =
             CLI::detail::lexical_cast(text, value) && std::isfinite(value) && accepts(value);
-        return good ? std::string() : "'" + text + "' should be a " + name + " number";
+        return is_valid ? std::string() : "'" + text + "' should be a " + name + " number";
       },
       "");
 }
@@ -106,15 +106,15 @@ int check_stdout(int exit_code) {
 
 /// Returns true if two outputs, which need not exist, are the same file; false for an empty name.
 bool same_file(const std::string& one, const std::string& other) {
-  const auto of = [](const std::string& file) {
+  const auto canonical_path = [](const std::string& file) {
     return std::filesystem::weakly_canonical(std::filesystem::absolute(file));
   };
-  return !one.empty() && !other.empty() && of(one) == of(other);
+  return !one.empty() && !other.empty() && canonical_path(one) == canonical_path(other);
 }
 
 }  // namespace
 
-int all_cores() { return static_cast<int>(std::max(1U, std::thread::hardware_concurrency())); }
+int count_cores() { return static_cast<int>(std::max(1U, std::thread::hardware_concurrency())); }
 
 CLI::Validator finite() {
   return number_check("finite", [](double) { return true; });
@@ -134,7 +134,7 @@ CLI::Validator ends_in(const std::string& ending) {
       "");
 }
 
-CLI::Validator is_picture() {
+CLI::Validator is_plot_file() {
   return CLI::Validator(
       [](const std::string& name) {
         const bool known = name.ends_with(".png") || name.ends_with(".svg");
@@ -181,7 +181,7 @@ int run_app(CLI::App& app, int argc, char** argv, const std::function<void()>& r
   std::signal(SIGXFSZ,
               SIG_IGN);  // a write beyond the size limit fails; temporary files are removed
   if (argc == 3 && std::string_view(argv[1]) == "--reference") {
-    const std::string text = reference_of(app, argv[2]);
+    const std::string text = format_reference(app, argv[2]);
     if (!text.empty()) {  // the parser reports other names
       std::fputs(text.c_str(), stdout);
       return check_stdout(kDone);

@@ -30,7 +30,7 @@ class GateNotMet : public std::runtime_error {
 };
 
 /// Returns the default number of threads: the number of cores, at least 1.
-int all_cores();
+int count_cores();
 
 /// Return validators of options that accept finite numbers: any, positive, or not negative.
 CLI::Validator finite();
@@ -40,7 +40,7 @@ CLI::Validator finite_not_negative();
 /// Returns a validator that accepts file names with this ending.
 CLI::Validator ends_in(const std::string& ending);
 /// Returns a validator that accepts file names of plots: .png or .svg.
-CLI::Validator is_picture();
+CLI::Validator is_plot_file();
 
 /// Adds --threads. `what` describes the parallel items in --help.
 void add_threads_option(CLI::App& app, int& threads, const std::string& what = "Images at a time");

@@ -12,7 +12,7 @@ namespace vlp {
 
 Progress::Progress(std::string things)
     : things_(std::move(things)),
-      shown_(spdlog::should_log(spdlog::level::info)),
+      is_shown_(spdlog::should_log(spdlog::level::info)),
       terminal_(::isatty(STDERR_FILENO) == 1) {}
 
 Progress::~Progress() {
@@ -23,9 +23,9 @@ void Progress::update(std::size_t done, std::size_t total, std::size_t skipped) 
   using namespace std::chrono_literals;
   const auto now = Clock::now();
   const bool due = now - last_ >= (terminal_ ? 100ms : 5000ms) || (terminal_ && done == total);
-  if (!shown_ || !due || done == skipped) return;
+  if (!is_shown_ || !due || done == skipped) return;
   last_ = now;
-  const double seconds = std::chrono::duration<double>(now - begin_).count();
+  const double seconds = std::chrono::duration<double>(now - start_).count();
   const double rate = static_cast<double>(done - skipped) / seconds;
   const long left_s = std::lround(static_cast<double>(total - done) / rate);
   const std::string text = fmt::format("{} of {} {}, {:.1f} a second, {}:{:02} left", done, total,

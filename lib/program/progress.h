@@ -27,8 +27,8 @@ class Progress {
   using Clock = std::chrono::steady_clock;
 
   std::string things_;
-  bool shown_, terminal_, line_open_ = false;
-  Clock::time_point begin_ = Clock::now(), last_ = begin_;
+  bool is_shown_, terminal_, line_open_ = false;
+  Clock::time_point start_ = Clock::now(), last_ = start_;
 };
 
 }  // namespace vlp

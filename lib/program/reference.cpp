@@ -19,21 +19,21 @@ namespace {
 using Options = std::vector<const CLI::Option*>;
 
 /// Returns the options in --help, in its order.
-Options options_in(const CLI::App& app) {
+Options find_options(const CLI::App& app) {
   return app.get_options([](const CLI::Option* option) {
     return option->nonpositional() && !option->get_group().empty();
   });
 }
-Options positionals_in(const CLI::App& app) {
+Options find_positionals(const CLI::App& app) {
   return app.get_options([](const CLI::Option* option) { return option->get_positional(); });
 }
-std::vector<const CLI::App*> commands_in(const CLI::App& app) {
+std::vector<const CLI::App*> find_commands(const CLI::App& app) {
   return app.get_subcommands(std::function<bool(const CLI::App*)>(
       [](const CLI::App* command) { return !command->get_name().empty(); }));
 }
 
 /// Returns the names of an option: "-o", "--output", and "--no-report" of a flag that has it.
-std::vector<std::string> names_of(const CLI::Option& option) {
+std::vector<std::string> collect_names(const CLI::Option& option) {
   std::vector<std::string> names;
   for (const std::string& name : option.get_snames()) names.push_back("-" + name);
   for (const std::string& name : option.get_lnames()) names.push_back("--" + name);
@@ -41,7 +41,7 @@ std::vector<std::string> names_of(const CLI::Option& option) {
 }
 
 /// Returns the choices of an option of type "a|b" or "TEXT:{a,b}"; empty for other types.
-std::vector<std::string> choices_of(const CLI::Option& option) {
+std::vector<std::string> parse_choices(const CLI::Option& option) {
   std::string list = option.get_type_name();
   char separator = '|';
   if (const auto brace = list.find(":{"); brace != std::string::npos) {
@@ -58,9 +58,9 @@ std::vector<std::string> choices_of(const CLI::Option& option) {
 
 enum class Value { none, choice, file, other };
 
-Value value_of(const CLI::Option& option) {
+Value classify_value(const CLI::Option& option) {
   if (option.get_items_expected_max() == 0) return Value::none;  // a flag
-  if (!choices_of(option).empty()) return Value::choice;
+  if (!parse_choices(option).empty()) return Value::choice;
   const std::string type = option.get_type_name();
   const std::string word = type.substr(0, type.find_first_of(": ["));
   const bool file = word == "TEXT" || word == "FILE" || word == "SET" || word == "FIXES";
@@ -68,7 +68,7 @@ Value value_of(const CLI::Option& option) {
 }
 
 /// Returns `text` with a backslash before each of `letters`.
-std::string escaped(const std::string& text, std::string_view letters) {
+std::string escape(const std::string& text, std::string_view letters) {
   std::string result;
   for (const char letter : text) {
     if (letters.find(letter) != std::string_view::npos) result += '\\';
@@ -77,14 +77,14 @@ std::string escaped(const std::string& text, std::string_view letters) {
   return result;
 }
 
-std::string in_words(const std::vector<std::string>& words) {
+std::string join_words(const std::vector<std::string>& words) {
   std::string line;
   for (const std::string& word : words) line.append(line.empty() ? "" : " ").append(word);
   return line;
 }
 
 /// Returns a line of roff that prints `text`.
-std::string roff(const std::string& text) {
+std::string escape_roff(const std::string& text) {
   std::string line;
   for (const char letter : text) {
     if (letter == '\\') {
@@ -99,25 +99,25 @@ std::string roff(const std::string& text) {
 
 /// Formats text in roff: lines that begin with a blank, or all if `verbatim`, unchanged; other
 /// lines as paragraphs.
-std::string roff_paragraphs(const std::string& text, bool verbatim) {
+std::string format_roff_paragraphs(const std::string& text, bool verbatim) {
   std::istringstream lines(text);
   std::string page;
-  bool as_is = false;
+  bool was_unfilled = false;
   for (std::string line; std::getline(lines, line);) {
-    const bool now = verbatim || line.starts_with(' ');
-    if (now != as_is) page.append(now ? ".PP\n.nf\n" : ".fi\n");
-    as_is = now;
+    const bool is_unfilled = verbatim || line.starts_with(' ');
+    if (is_unfilled != was_unfilled) page.append(is_unfilled ? ".PP\n.nf\n" : ".fi\n");
+    was_unfilled = is_unfilled;
     // Examples are written for the build tree; installed programs are in the path.
     for (auto at = line.find("build/bin/"); at != std::string::npos; at = line.find("build/bin/")) {
       line.erase(at, 10);
     }
-    page.append(line.empty() ? (now ? "" : ".PP") : roff(line)).append("\n");
+    page.append(line.empty() ? (is_unfilled ? "" : ".PP") : escape_roff(line)).append("\n");
   }
-  return page.append(as_is ? ".fi\n" : "");
+  return page.append(was_unfilled ? ".fi\n" : "");
 }
 
 /// Returns the line "vlp-locate - positions from ...": the description up to its first stop.
-std::string name_line(const CLI::App& app) {
+std::string format_name_line(const CLI::App& app) {
   std::string summary = app.get_description();
   std::replace(summary.begin(), summary.end(), '\n', ' ');
   for (std::size_t i = 0; i + 1 < summary.size(); ++i) {
@@ -128,87 +128,88 @@ std::string name_line(const CLI::App& app) {
   if (!summary.empty()) {
     summary[0] = static_cast<char>(std::tolower(static_cast<unsigned char>(summary[0])));
   }
-  return roff(app.get_name()) + " \\- " + roff(summary) + "\n";
+  return escape_roff(app.get_name()) + " \\- " + escape_roff(summary) + "\n";
 }
 
-std::string roff_options(const Options& options, bool positional) {
+std::string format_roff_options(const Options& options, bool positional) {
   const HelpFormatter formatter;
   std::string page;
   for (const CLI::Option* option : options) {
     page.append(".TP\n.B ")
-        .append(roff(formatter.make_option_name(option, positional) +
-                     formatter.make_option_opts(option)))
+        .append(escape_roff(formatter.make_option_name(option, positional) +
+                            formatter.make_option_opts(option)))
         .append("\n")
-        .append(roff(option->get_description()))
+        .append(escape_roff(option->get_description()))
         .append("\n");
   }
   return page;
 }
 
 /// Returns the name of the shell function for a program.
-std::string function_of(const std::string& program) {
+std::string make_function_name(const std::string& program) {
   std::string name = "_" + program;
   std::replace(name.begin(), name.end(), '-', '_');
   return name;
 }
 
-std::string bash_options(const CLI::App& app, const std::string& indent) {
+std::string format_bash_options(const CLI::App& app, const std::string& indent) {
   std::vector<std::string> names, quiet, files;
   std::string cases;
-  for (const CLI::Option* option : options_in(app)) {
-    const auto of_option = names_of(*option);
-    names.insert(names.end(), of_option.begin(), of_option.end());
-    const Value value = value_of(*option);
+  for (const CLI::Option* option : find_options(app)) {
+    const auto option_names = collect_names(*option);
+    names.insert(names.end(), option_names.begin(), option_names.end());
+    const Value value = classify_value(*option);
     if (value == Value::none) continue;
     std::string pattern;
-    for (const std::string& name : of_option)
+    for (const std::string& name : option_names)
       pattern.append(pattern.empty() ? "" : "|").append(name);
     cases.append(indent).append("  ").append(pattern).append(") ");
-    if (value == Value::choice) cases.append("words='" + in_words(choices_of(*option)) + "'; ");
+    if (value == Value::choice)
+      cases.append("words='" + join_words(parse_choices(*option)) + "'; ");
     if (value == Value::file) cases.append("files=yes; ");
     cases.append("value=yes ;;\n");
   }
-  return indent + "options='" + in_words(names) + "'\n" + indent + "case $previous in\n" + cases +
+  return indent + "options='" + join_words(names) + "'\n" + indent + "case $previous in\n" + cases +
          indent + "esac\n";
 }
 
 /// Returns an argument for _arguments of zsh: '(-o --output)'{-o,--output}'[text]:value:_files'.
-std::string zsh_option(const CLI::Option& option) {
-  const auto names = names_of(option);
-  const bool again = option.get_expected_max() > 1;
-  std::string text = escaped(option.get_description(), "[]:\\");
+std::string format_zsh_option(const CLI::Option& option) {
+  const auto names = collect_names(option);
+  const bool is_repeatable = option.get_expected_max() > 1;
+  std::string text = escape(option.get_description(), "[]:\\");
   for (auto at = text.find('\''); at != std::string::npos; at = text.find('\'', at + 4)) {
     text.replace(at, 1, "'\\''");
   }
   std::string spec;
-  if (again) {
+  if (is_repeatable) {
     spec = "'*'";
   } else if (names.size() > 1) {
-    spec = "'(" + in_words(names) + ")'";
+    spec = "'(" + join_words(names) + ")'";
   }
   std::string list;
   for (const std::string& name : names) list.append(list.empty() ? "" : ",").append(name);
   spec.append(names.size() > 1 ? "{" + list + "}" : list).append("'[" + text + "]");
-  const Value value = value_of(option);
+  const Value value = classify_value(option);
   const int values = value == Value::none ? 0 : std::max(1, option.get_items_expected_min());
   for (int i = 0; i < values; ++i) {
     spec.append(":value:");
-    if (value == Value::choice) spec.append("(" + in_words(choices_of(option)) + ")");
+    if (value == Value::choice) spec.append("(" + join_words(parse_choices(option)) + ")");
     if (value == Value::file) spec.append("_files");
   }
   return spec + "'";
 }
 
-std::string zsh_arguments(const CLI::App& app, const std::string& indent) {
-  std::string text = indent + "_arguments -s" + (commands_in(app).empty() ? "" : " -C");
-  for (const CLI::Option* option : options_in(app)) {
-    text.append(" \\\n").append(indent).append("  ").append(zsh_option(*option));
+std::string format_zsh_arguments(const CLI::App& app, const std::string& indent) {
+  std::string text = indent + "_arguments -s" + (find_commands(app).empty() ? "" : " -C");
+  for (const CLI::Option* option : find_options(app)) {
+    text.append(" \\\n").append(indent).append("  ").append(format_zsh_option(*option));
   }
-  if (!positionals_in(app).empty()) text.append(" \\\n" + indent + "  '*:file:_files'");
+  if (!find_positionals(app).empty()) text.append(" \\\n" + indent + "  '*:file:_files'");
   return text;
 }
 
-std::vector<std::string> names_of(const std::vector<const CLI::App*>& commands) {
+std::vector<std::string> collect_names(const std::vector<const CLI::App*>& commands) {
   std::vector<std::string> names(commands.size());
   std::transform(commands.begin(), commands.end(), names.begin(),
                  [](const CLI::App* command) { return command->get_name(); });
@@ -217,28 +218,29 @@ std::vector<std::string> names_of(const std::vector<const CLI::App*>& commands) 
 
 }  // namespace
 
-std::string manual_page(const CLI::App& app) {
+std::string format_manual_page(const CLI::App& app) {
   const HelpFormatter formatter;
-  std::string page = ".TH " + roff(app.get_name()) + " 1 \"\" \"vlp " VLP_VERSION "\" \"VLP\"\n";
-  page.append(".SH NAME\n").append(name_line(app));
-  page.append(".SH SYNOPSIS\n.B ").append(roff(app.get_name())).append("\n[OPTIONS]");
-  for (const CLI::Option* option : positionals_in(app)) {
-    page.append(" ").append(roff(formatter.make_option_usage(option)));
+  std::string page =
+      ".TH " + escape_roff(app.get_name()) + " 1 \"\" \"vlp " VLP_VERSION "\" \"VLP\"\n";
+  page.append(".SH NAME\n").append(format_name_line(app));
+  page.append(".SH SYNOPSIS\n.B ").append(escape_roff(app.get_name())).append("\n[OPTIONS]");
+  for (const CLI::Option* option : find_positionals(app)) {
+    page.append(" ").append(escape_roff(formatter.make_option_usage(option)));
   }
-  page.append(commands_in(app).empty() ? "\n" : " COMMAND ...\n");
-  page.append(".SH DESCRIPTION\n").append(roff_paragraphs(app.get_description(), false));
-  if (!positionals_in(app).empty()) {
-    page.append(".SH ARGUMENTS\n").append(roff_options(positionals_in(app), true));
+  page.append(find_commands(app).empty() ? "\n" : " COMMAND ...\n");
+  page.append(".SH DESCRIPTION\n").append(format_roff_paragraphs(app.get_description(), false));
+  if (!find_positionals(app).empty()) {
+    page.append(".SH ARGUMENTS\n").append(format_roff_options(find_positionals(app), true));
   }
-  page.append(".SH OPTIONS\n").append(roff_options(options_in(app), false));
-  for (const CLI::App* command : commands_in(app)) {
-    page.append(".SH COMMAND ").append(roff(command->get_name())).append("\n");
-    page.append(roff_paragraphs(command->get_description(), false));
-    page.append(roff_options(positionals_in(*command), true));
-    page.append(roff_options(options_in(*command), false));
+  page.append(".SH OPTIONS\n").append(format_roff_options(find_options(app), false));
+  for (const CLI::App* command : find_commands(app)) {
+    page.append(".SH COMMAND ").append(escape_roff(command->get_name())).append("\n");
+    page.append(format_roff_paragraphs(command->get_description(), false));
+    page.append(format_roff_options(find_positionals(*command), true));
+    page.append(format_roff_options(find_options(*command), false));
   }
   if (!app.get_footer().empty()) {
-    page.append(".SH FURTHER\n").append(roff_paragraphs(app.get_footer(), true));
+    page.append(".SH FURTHER\n").append(format_roff_paragraphs(app.get_footer(), true));
   }
   page.append(
       ".SH EXIT STATUS\n"
@@ -249,10 +251,10 @@ std::string manual_page(const CLI::App& app) {
   return page;
 }
 
-std::string bash_completion(const CLI::App& app) {
-  const std::string function = function_of(app.get_name());
-  const auto commands = commands_in(app);
-  const auto names = names_of(commands);
+std::string format_bash_completion(const CLI::App& app) {
+  const std::string function = make_function_name(app.get_name());
+  const auto commands = find_commands(app);
+  const auto names = collect_names(commands);
   std::string text =
       "# Completion of " + app.get_name() + " for bash; made from its options.\n" + function +
       "() {\n"
@@ -261,20 +263,21 @@ std::string bash_completion(const CLI::App& app) {
       "  COMPREPLY=()\n";
   if (!commands.empty()) {
     text.append("  for word in \"${COMP_WORDS[@]:1:COMP_CWORD-1}\"; do\n    case $word in\n      ");
-    std::string pattern = in_words(names);
+    std::string pattern = join_words(names);
     std::replace(pattern.begin(), pattern.end(), ' ', '|');
     text.append(pattern).append(") command=$word; break ;;\n    esac\n  done\n");
     text.append("  case $command in\n");
     for (const CLI::App* command : commands) {
-      text.append("    " + command->get_name() + ")\n").append(bash_options(*command, "      "));
+      text.append("    " + command->get_name() + ")\n")
+          .append(format_bash_options(*command, "      "));
       text.append("      ;;\n");
     }
-    text.append("    *)\n").append(bash_options(app, "      "));
-    text.append("      [ \"$value\" ] || words='" + in_words(names) + "'\n      ;;\n  esac\n");
+    text.append("    *)\n").append(format_bash_options(app, "      "));
+    text.append("      [ \"$value\" ] || words='" + join_words(names) + "'\n      ;;\n  esac\n");
   } else {
-    text.append(bash_options(app, "  "));
+    text.append(format_bash_options(app, "  "));
   }
-  if (commands.empty() && !positionals_in(app).empty())
+  if (commands.empty() && !find_positionals(app).empty())
     text.append("  [ \"$value\" ] || files=yes\n");
   text.append(
       "  if [[ $current == -* && ! $value ]]; then\n"
@@ -290,25 +293,25 @@ std::string bash_completion(const CLI::App& app) {
   return text + "complete -F " + function + " " + app.get_name() + "\n";
 }
 
-std::string zsh_completion(const CLI::App& app) {
-  const auto commands = commands_in(app);
+std::string format_zsh_completion(const CLI::App& app) {
+  const auto commands = find_commands(app);
   std::string text = "#compdef " + app.get_name() + "\n# Made from its options.\n";
-  if (commands.empty()) return text + zsh_arguments(app, "") + "\n";
-  const auto names = names_of(commands);
-  text.append("local curcontext=$curcontext state line\n").append(zsh_arguments(app, ""));
-  text.append(" \\\n  '1:command:(" + in_words(names) + ")' \\\n  '*::argument:->command'\n");
+  if (commands.empty()) return text + format_zsh_arguments(app, "") + "\n";
+  const auto names = collect_names(commands);
+  text.append("local curcontext=$curcontext state line\n").append(format_zsh_arguments(app, ""));
+  text.append(" \\\n  '1:command:(" + join_words(names) + ")' \\\n  '*::argument:->command'\n");
   text.append("[[ $state == command ]] || return\ncase $words[1] in\n");
   for (const CLI::App* command : commands) {
-    text.append("  " + command->get_name() + ")\n").append(zsh_arguments(*command, "    "));
+    text.append("  " + command->get_name() + ")\n").append(format_zsh_arguments(*command, "    "));
     text.append("\n    ;;\n");
   }
   return text + "esac\n";
 }
 
-std::string reference_of(const CLI::App& app, std::string_view which) {
-  if (which == "man") return manual_page(app);
-  if (which == "bash") return bash_completion(app);
-  if (which == "zsh") return zsh_completion(app);
+std::string format_reference(const CLI::App& app, std::string_view which) {
+  if (which == "man") return format_manual_page(app);
+  if (which == "bash") return format_bash_completion(app);
+  if (which == "zsh") return format_zsh_completion(app);
   return {};
 }
 

@@ -14,15 +14,15 @@ class App;
 namespace vlp {
 
 /// Returns the manual page for section 1, in roff.
-std::string manual_page(const CLI::App& app);
+std::string format_manual_page(const CLI::App& app);
 
 /// Return the completion scripts: options, subcommands, the choices of an option, and files for
 /// options that take a text.
-std::string bash_completion(const CLI::App& app);
-std::string zsh_completion(const CLI::App& app);
+std::string format_bash_completion(const CLI::App& app);
+std::string format_zsh_completion(const CLI::App& app);
 
-/// Returns manual_page() for "man", bash_completion() for "bash", zsh_completion() for "zsh", and
-/// an empty string for other names.
-std::string reference_of(const CLI::App& app, std::string_view which);
+/// Returns format_manual_page() for "man", format_bash_completion() for "bash",
+/// format_zsh_completion() for "zsh", and an empty string for other names.
+std::string format_reference(const CLI::App& app, std::string_view which);
 
 }  // namespace vlp

@@ -28,18 +28,18 @@ namespace {
 
 using File = std::unique_ptr<std::FILE, int (*)(std::FILE*)>;
 
-constexpr unsigned kLongest_s = 86400;
+constexpr unsigned kMaxLimit_s = 86400;
 
 struct Request {
   std::vector<std::string> arguments;
   unsigned limit_s;
 };
 
-Request request_in(const std::string& line) {
+Request parse_request(const std::string& line) {
   try {
     const auto json = nlohmann::json::parse(line);
     const auto& limit_s = json.at("limit_s");
-    if (limit_s.is_number_unsigned() && limit_s >= 1U && limit_s <= kLongest_s) {
+    if (limit_s.is_number_unsigned() && limit_s >= 1U && limit_s <= kMaxLimit_s) {
       return {json.at("arguments").get<std::vector<std::string>>(), limit_s.get<unsigned>()};
     }
   } catch (const nlohmann::json::exception&) {  // reported below
@@ -49,16 +49,16 @@ Request request_in(const std::string& line) {
 }
 
 /// Runs the program in the forked process, with stdout and stderr redirected to `said`.
-[[noreturn]] void become(const char* name, Request request, std::FILE* said, pid_t parent,
-                         const std::function<int(int, char**)>& program) {
+[[noreturn]] void run_in_child(const char* name, Request request, std::FILE* output, pid_t parent,
+                               const std::function<int(int, char**)>& program) {
   // The process ends with its parent: an orphan could write to the files of its successor.
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (::getppid() != parent) std::_Exit(kBadInput);
   // freopen() would also reset the read position of stdin of the parent.
   const int nothing = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
   const bool ready = ::dup2(nothing, STDIN_FILENO) >= 0 &&
-                     ::dup2(::fileno(said), STDOUT_FILENO) >= 0 &&
-                     ::dup2(::fileno(said), STDERR_FILENO) >= 0;
+                     ::dup2(::fileno(output), STDOUT_FILENO) >= 0 &&
+                     ::dup2(::fileno(output), STDERR_FILENO) >= 0;
   if (!ready) std::_Exit(kBadInput);
   ::alarm(request.limit_s);
   request.arguments.insert(request.arguments.begin(), name);
@@ -70,28 +70,28 @@ Request request_in(const std::string& line) {
   std::_Exit(code);
 }
 
-std::string end_of(std::FILE* said) {
-  constexpr long most = 4096;
-  std::fseek(said, 0, SEEK_END);
-  std::fseek(said, std::max(0L, std::ftell(said) - most), SEEK_SET);
-  std::string text(most, '\0');
-  text.resize(std::fread(text.data(), 1, text.size(), said));
+std::string read_tail(std::FILE* output) {
+  constexpr long max_bytes = 4096;
+  std::fseek(output, 0, SEEK_END);
+  std::fseek(output, std::max(0L, std::ftell(output) - max_bytes), SEEK_SET);
+  std::string text(max_bytes, '\0');
+  text.resize(std::fread(text.data(), 1, text.size(), output));
   return text;
 }
 
-double seconds(const timeval& time) {
+double to_seconds(const timeval& time) {
   constexpr double microsecond = 1e-6;
   return static_cast<double>(time.tv_sec) + microsecond * static_cast<double>(time.tv_usec);
 }
 
-std::string answer_to(const char* name, const Request& request,
-                      const std::function<int(int, char**)>& program) {
+std::string run_request(const char* name, const Request& request,
+                        const std::function<int(int, char**)>& program) {
   const int memory = ::memfd_create("said", MFD_CLOEXEC);
-  const File said(memory < 0 ? nullptr : ::fdopen(memory, "w+"), &std::fclose);
-  if (!said) throw std::runtime_error("there is no memory left for what a process says");
+  const File output(memory < 0 ? nullptr : ::fdopen(memory, "w+"), &std::fclose);
+  if (!output) throw std::runtime_error("there is no memory left for what a process says");
   const pid_t parent = ::getpid(), process = ::fork();
   if (process < 0) throw std::runtime_error("no process can be split off");
-  if (process == 0) become(name, request, said.get(), parent, program);
+  if (process == 0) run_in_child(name, request, output.get(), parent, program);
   int status = 0;
   rusage used{};
   while (::wait4(process, &status, 0, &used) < 0) {
@@ -99,8 +99,8 @@ std::string answer_to(const char* name, const Request& request,
   }
   const nlohmann::json answer{
       {"exit_code", WIFSIGNALED(status) ? -WTERMSIG(status) : WEXITSTATUS(status)},
-      {"cpu_s", seconds(used.ru_utime) + seconds(used.ru_stime)},
-      {"said", end_of(said.get())}};
+      {"cpu_s", to_seconds(used.ru_utime) + to_seconds(used.ru_stime)},
+      {"said", read_tail(output.get())}};
   return answer.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
@@ -109,7 +109,7 @@ std::string answer_to(const char* name, const Request& request,
 void run_each(const char* name, const std::function<int(int argc, char** argv)>& program) {
   std::string line;
   while (std::getline(std::cin, line)) {
-    fmt::print("{}\n", answer_to(name, request_in(line), program));
+    fmt::print("{}\n", run_request(name, parse_request(line), program));
     if (std::fflush(stdout) != 0) break;  // which run_app() reports
   }
 }

@@ -48,7 +48,7 @@ constexpr int kStatuses = static_cast<int>(FixStatus::row_time_unknown) + 1;
 Doubles doubles(std::vector<py::ssize_t> shape) { return Doubles(std::move(shape)); }
 
 /// Returns the number of rows of an array with `columns` columns.
-std::size_t rows_of(const Doubles& array, py::ssize_t columns, const char* name) {
+std::size_t count_rows(const Doubles& array, py::ssize_t columns, const char* name) {
   if (array.ndim() != 2 || array.shape(1) != columns) {
     throw std::invalid_argument(std::string(name) + " should have the shape (n, " +
                                 std::to_string(columns) + ")");
@@ -64,7 +64,7 @@ bool all_fit(const py::array& array) {
 }
 
 /// Converts to integers with checks: numpy would truncate 1.7 to 1 and wrap larger numbers.
-Integers integers_of(const py::object& given, const char* name) {
+Integers to_integers(const py::object& given, const char* name) {
   const auto array = py::array::ensure(given);
   const char kind = array ? array.dtype().kind() : '?';
   // numpy converts an empty list to an array of floats.
@@ -83,11 +83,11 @@ void check_length(const py::array& array, std::size_t length, const char* name) 
 }
 
 template <typename Vector>
-Doubles array_of(const Vector& values) {
+Doubles to_array(const Vector& values) {
   return Doubles(static_cast<py::ssize_t>(values.size()), values.data());
 }
 
-Doubles array_of(const Matrix4& matrix) {
+Doubles to_array(const Matrix4& matrix) {
   Doubles array = doubles({4, 4});
   Eigen::Map<Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(array.mutable_data()) = matrix;
   return array;
@@ -119,14 +119,14 @@ Integers ids_of(const LampMapFile& lamps) {
   return ids;
 }
 
-Lens lens_of(const std::string& model, const std::vector<double>& intrinsics) {
+Lens make_lens(const std::string& model, const std::vector<double>& intrinsics) {
   const auto known = lens_model_from_name(model);
   if (!known) throw std::invalid_argument("there are " + lens_model_names());
   return Lens(*known, intrinsics);
 }
 
 Doubles project(const Lens& lens, const Doubles& points) {
-  const std::size_t n = rows_of(points, 3, "points");
+  const std::size_t n = count_rows(points, 3, "points");
   Doubles pixels = doubles({static_cast<py::ssize_t>(n), 2});
   for (std::size_t i = 0; i < n; ++i) {
     const auto pixel = lens.project(Eigen::Vector3d(points.data() + 3 * i));
@@ -137,7 +137,7 @@ Doubles project(const Lens& lens, const Doubles& points) {
 }
 
 Doubles unproject(const Lens& lens, const Doubles& pixels) {
-  const std::size_t n = rows_of(pixels, 2, "pixels");
+  const std::size_t n = count_rows(pixels, 2, "pixels");
   Doubles rays = doubles({static_cast<py::ssize_t>(n), 3});
   for (std::size_t i = 0; i < n; ++i) {
     const auto ray = lens.unproject(Eigen::Vector2d(pixels.data() + 2 * i));
@@ -150,7 +150,7 @@ Doubles unproject(const Lens& lens, const Doubles& pixels) {
 
 // Fixes
 
-Correction correction_of(const std::string& name) {
+Correction parse_correction(const std::string& name) {
   const std::array<std::pair<const char*, Correction>, 4> all = {
       {{"none", Correction::none},
        {"rotation", Correction::rotation},
@@ -162,23 +162,23 @@ Correction correction_of(const std::string& name) {
   throw std::invalid_argument("correction should be none, rotation, dispersion or all");
 }
 
-Positioner positioner_of(const LampMapFile& lamps, const Calibration& calibration,
-                         const std::string& correction,
-                         const std::optional<std::array<double, 4>>& mount,
-                         double unstated_sigma_px, double max_residual_share) {
+Positioner make_positioner(const LampMapFile& lamps, const Calibration& calibration,
+                           const std::string& correction,
+                           const std::optional<std::array<double, 4>>& mount,
+                           double unstated_sigma_px, double max_residual_share) {
   PositionerOptions options;
-  options.correction = correction_of(correction);
+  options.correction = parse_correction(correction);
   if (mount) options.mount = CameraMount{{(*mount)[0], (*mount)[1], (*mount)[2]}, (*mount)[3]};
   options.unstated_sigma_px = unstated_sigma_px;
   options.max_residual_share = max_residual_share;
   return {lamps.map, calibration, options};
 }
 
-Sensors sensors_of(const std::optional<Pair>& inclination_rad, double inclination_sigma_rad,
-                   const std::optional<Pair>& height_and_yaw, const Pair& height_and_yaw_sd,
-                   const std::optional<Pair>& velocity_m_per_s, double velocity_sd_m_per_s,
-                   double yaw_rate_rad_per_s, double yaw_rate_sd_rad_per_s,
-                   const std::optional<Pair>& height_m, const std::optional<double>& time_s) {
+Sensors make_sensors(const std::optional<Pair>& inclination_rad, double inclination_sigma_rad,
+                     const std::optional<Pair>& height_and_yaw, const Pair& height_and_yaw_sd,
+                     const std::optional<Pair>& velocity_m_per_s, double velocity_sd_m_per_s,
+                     double yaw_rate_rad_per_s, double yaw_rate_sd_rad_per_s,
+                     const std::optional<Pair>& height_m, const std::optional<double>& time_s) {
   Sensors sensors;
   if (inclination_rad) sensors.inclination = {(*inclination_rad)[0], (*inclination_rad)[1]};
   sensors.inclination_sigma_rad = inclination_sigma_rad;
@@ -197,9 +197,9 @@ Sensors sensors_of(const std::optional<Pair>& inclination_rad, double inclinatio
   return sensors;
 }
 
-std::vector<Detection> detections_of(const Integers& lamps, const Doubles& pixels,
-                                     const std::optional<Doubles>& sigma_px) {
-  const std::size_t n = rows_of(pixels, 2, "pixels");
+std::vector<Detection> make_detections(const Integers& lamps, const Doubles& pixels,
+                                       const std::optional<Doubles>& sigma_px) {
+  const std::size_t n = count_rows(pixels, 2, "pixels");
   check_length(lamps, n, "lamps");
   if (sigma_px) check_length(*sigma_px, n, "sigma_px");
   std::vector<Detection> detections(n);
@@ -217,19 +217,19 @@ using EarlierArrays = std::tuple<py::object, Doubles, std::optional<Doubles>, do
 Fix locate(const Positioner& positioner, const py::object& lamps, const Doubles& pixels,
            const std::optional<Doubles>& sigma_px, const Sensors& sensors,
            const std::vector<EarlierArrays>& earlier) {
-  const auto detections = detections_of(integers_of(lamps, "lamps"), pixels, sigma_px);
+  const auto detections = make_detections(to_integers(lamps, "lamps"), pixels, sigma_px);
   if (earlier.empty()) return positioner.locate(detections, sensors);
   std::vector<std::vector<Detection>> before;
   std::vector<EarlierFrame> frames;
   for (const auto& [ids, at, sigma, before_s] : earlier) {
-    before.push_back(detections_of(integers_of(ids, "lamps"), at, sigma));
+    before.push_back(make_detections(to_integers(ids, "lamps"), at, sigma));
     frames.push_back({before.back(), before_s});  // a frame's detections keep their address
   }
   return positioner.locate(detections, sensors, frames);
 }
 
 /// Returns the index at which each run of equal numbers begins, and the number of elements.
-std::vector<std::size_t> frames_in(const Integers& frames) {
+std::vector<std::size_t> find_frame_begins(const Integers& frames) {
   const auto n = static_cast<std::size_t>(frames.shape(0));
   std::vector<std::size_t> begins;
   for (std::size_t i = 0; i < n; ++i) {
@@ -242,10 +242,10 @@ std::vector<std::size_t> frames_in(const Integers& frames) {
 py::dict locate_frames(const Positioner& positioner, const py::object& frame_of_each,
                        const py::object& lamps, const Doubles& pixels,
                        const std::optional<Doubles>& sigma_px, const Sensors& sensors) {
-  const auto detections = detections_of(integers_of(lamps, "lamps"), pixels, sigma_px);
-  const Integers frames = integers_of(frame_of_each, "frames");
+  const auto detections = make_detections(to_integers(lamps, "lamps"), pixels, sigma_px);
+  const Integers frames = to_integers(frame_of_each, "frames");
   check_length(frames, detections.size(), "frames");
-  const auto begins = frames_in(frames);
+  const auto begins = find_frame_begins(frames);
   const auto n = static_cast<py::ssize_t>(begins.size()) - 1;
   Integers frame(n), status(n), used(n);
   Doubles position = doubles({n, 3}), yaw = doubles({n}), residual = doubles({n});
@@ -305,7 +305,7 @@ std::vector<int> rejected_ids(const Fix& fix) {
 }
 
 std::string shown(const Fix& fix) {
-  if (!fix.ok()) return "<vlp.Fix: " + std::string(name_of(fix.status)) + ">";
+  if (!fix.ok()) return "<vlp.Fix: " + std::string(to_string(fix.status)) + ">";
   const Pose& pose = fix.estimate.pose;
   std::array<char, 160> text{};
   std::snprintf(text.data(), text.size(), "<vlp.Fix: x %.4f m, y %.4f m, z %.4f m, yaw %.4f rad>",
@@ -316,7 +316,7 @@ std::string shown(const Fix& fix) {
 // Lamps in images
 
 /// Returns a view of the array's memory, whose rows are in order.
-ImageView image_of(const py::array& array) {
+ImageView make_image_view(const py::array& array) {
   const bool bytes = py::isinstance<py::array_t<std::uint8_t>>(array);
   if (array.ndim() != 2 || array.size() == 0 ||
       !(bytes || py::isinstance<py::array_t<std::uint16_t>>(array))) {
@@ -326,7 +326,7 @@ ImageView image_of(const py::array& array) {
           array.strides(0), bytes ? 8 : 16};
 }
 
-py::tuple arrays_of(const std::vector<Detection>& detections) {
+py::tuple to_arrays(const std::vector<Detection>& detections) {
   const auto n = static_cast<py::ssize_t>(detections.size());
   Integers lamps(n);
   Doubles pixels = doubles({n, 2}), sigma_px = doubles({n});
@@ -351,7 +351,7 @@ std::string in_px(int width, int height) {
 py::tuple detect(const ImageDetector& of_camera, const py::array& array) {
   const auto& [detector, imager_px] = of_camera;
   const auto rows = py::array::ensure(array, py::array::c_style);
-  const ImageView image = image_of(rows);
+  const ImageView image = make_image_view(rows);
   if (image.width != imager_px[0] || image.height != imager_px[1]) {
     throw std::invalid_argument("the image is " + in_px(image.width, image.height) +
                                 ", the calibration's camera has " +
@@ -366,11 +366,11 @@ py::tuple detect(const ImageDetector& of_camera, const py::array& array) {
       }
     }
   }
-  return arrays_of(detections);
+  return to_arrays(detections);
 }
 
-ImageDetector detector_of(const LampMapFile& lamps, const Calibration& calibration,
-                          const std::optional<std::filesystem::path>& classifier) {
+ImageDetector make_detector(const LampMapFile& lamps, const Calibration& calibration,
+                            const std::optional<std::filesystem::path>& classifier) {
   if (!calibration.camera.row_time_s) {
     throw std::invalid_argument("the calibration has no row_time_s, by which lamps are told apart");
   }
@@ -381,7 +381,7 @@ ImageDetector detector_of(const LampMapFile& lamps, const Calibration& calibrati
              !error.empty()) {
     throw InputError(lamps.file, error);
   }
-  return {{lamps.map, detector_camera(calibration), std::move(trained)},
+  return {{lamps.map, make_detector_camera(calibration), std::move(trained)},
           calibration.camera.imager_px};
 }
 
@@ -397,7 +397,7 @@ py::dict detections_table(const std::filesystem::path& file) {
     all.insert(all.end(), frame.detections.begin(), frame.detections.end());
     images.append(frame.image);
   }
-  const py::tuple arrays = arrays_of(all);
+  const py::tuple arrays = to_arrays(all);
   py::dict table;
   table["images"] = images;
   table["frames"] = Integers(static_cast<py::ssize_t>(frames.size()), frames.data());
@@ -470,13 +470,13 @@ void check_numpy() {
 void define_statuses(py::module_& m) {
   using namespace pybind11::literals;
   py::list statuses;
-  for (int i = 0; i < kStatuses; ++i) statuses.append(name_of(static_cast<FixStatus>(i)));
+  for (int i = 0; i < kStatuses; ++i) statuses.append(to_string(static_cast<FixStatus>(i)));
   m.attr("STATUSES") = py::tuple(statuses);
   m.def(
       "explanation",
       [](int status) {
         if (status < 0 || status >= kStatuses) throw std::invalid_argument("no such status");
-        return explanation_of(static_cast<FixStatus>(status));
+        return describe(static_cast<FixStatus>(status));
       },
       "status"_a, "What a status, an index of STATUSES, means and what to do.");
 }
@@ -492,7 +492,7 @@ void define_calibration(py::module_& m) {
       .def("__len__", [](const LampMapFile& lamps) { return lamps.map.lamps.size(); });
 
   py::class_<Lens>(m, "Lens", "A lens: directions to pixels and back.")
-      .def(py::init(&lens_of), "model"_a, "intrinsics"_a, "By mrcal's name, with its parameters.")
+      .def(py::init(&make_lens), "model"_a, "intrinsics"_a, "By mrcal's name, with its parameters.")
       .def("project", &project, "points"_a,
            "Pixels (n, 2) of points (n, 3) in the camera; NaN where the lens has none.")
       .def("unproject", &unproject, "pixels"_a,
@@ -504,9 +504,9 @@ void define_calibration(py::module_& m) {
       .def_property_readonly(
           "imager_px", [](const Calibration& c) { return c.camera.imager_px; }, "Width and height.")
       .def_property_readonly("lens_model",
-                             [](const Calibration& c) { return name_of(c.camera.lens_model); })
+                             [](const Calibration& c) { return to_string(c.camera.lens_model); })
       .def_property_readonly("intrinsics",
-                             [](const Calibration& c) { return array_of(c.camera.intrinsics); })
+                             [](const Calibration& c) { return to_array(c.camera.intrinsics); })
       .def_property_readonly("row_time_s", [](const Calibration& c) { return c.camera.row_time_s; })
       .def_property_readonly("lens", [](const Calibration& c) {
         return Lens(c.camera.lens_model, c.camera.intrinsics);
@@ -517,22 +517,21 @@ void define_calibration(py::module_& m) {
 void define_fix(py::module_& m) {
   py::class_<Fix>(m, "Fix", "The answer to one frame; figures are NaN where it is not ok.")
       .def_property_readonly("ok", &Fix::ok)
-      .def_property_readonly("status", [](const Fix& fix) { return name_of(fix.status); })
-      .def_property_readonly("explanation",
-                             [](const Fix& fix) { return explanation_of(fix.status); })
+      .def_property_readonly("status", [](const Fix& fix) { return to_string(fix.status); })
+      .def_property_readonly("explanation", [](const Fix& fix) { return describe(fix.status); })
       .def_property_readonly("position_m",
                              [](const Fix& fix) {
-                               return array_of(fix.ok() ? fix.estimate.pose.position_m : kNowhere);
+                               return to_array(fix.ok() ? fix.estimate.pose.position_m : kNowhere);
                              })
       .def_property_readonly(
           "yaw_rad", [](const Fix& fix) { return fix.ok() ? fix.estimate.pose.yaw_rad : kNone; })
       .def_property_readonly(
           "covariance",
-          [](const Fix& fix) { return array_of(fix.ok() ? fix.estimate.covariance : kUnknown); },
+          [](const Fix& fix) { return to_array(fix.ok() ? fix.estimate.covariance : kUnknown); },
           "(4, 4), of x, y, z, yaw: all that is known of the error.")
       .def_property_readonly(
           "noise_covariance",
-          [](const Fix& fix) { return array_of(fix.ok() ? fix.noise_covariance : kUnknown); },
+          [](const Fix& fix) { return to_array(fix.ok() ? fix.noise_covariance : kUnknown); },
           "The part that is of this frame alone and averages out.")
       .def_property_readonly(
           "lean_rad",
@@ -568,7 +567,7 @@ void define_fix(py::module_& m) {
 void define_positioner(py::module_& m) {
   using namespace pybind11::literals;
   py::class_<Sensors>(m, "Sensors", "What a robot knows of a frame besides the image.")
-      .def(py::init(&sensors_of), py::kw_only(), "inclination_rad"_a = py::none(),
+      .def(py::init(&make_sensors), py::kw_only(), "inclination_rad"_a = py::none(),
            "inclination_sigma_rad"_a = 0.0, "height_and_yaw"_a = py::none(),
            "height_and_yaw_sd"_a = Pair{0, 0}, "velocity_m_per_s"_a = py::none(),
            "velocity_sd_m_per_s"_a = 0.0, "yaw_rate_rad_per_s"_a = 0.0,
@@ -580,7 +579,7 @@ void define_positioner(py::module_& m) {
            "standard deviation that is positive.");
 
   py::class_<Positioner>(m, "Positioner", "From identified lamps in an image to a position.")
-      .def(py::init(&positioner_of), "lamp_map"_a, "calibration"_a, py::kw_only(),
+      .def(py::init(&make_positioner), "lamp_map"_a, "calibration"_a, py::kw_only(),
            "correction"_a = "all", "mount"_a = py::none(), "unstated_sigma_px"_a = 1.0,
            "max_residual_share"_a = 0.1,
            "mount: (x, y, z, yaw) of the camera on the robot, whose fixes it then makes.")
@@ -597,7 +596,7 @@ void define_positioner(py::module_& m) {
           "STATUSES, 0: ok), position_m, yaw_rad, covariance, residual_px, lamps.");
 
   py::class_<ImageDetector>(m, "LampDetector", "Finds and identifies the lamps of a map in images.")
-      .def(py::init(&detector_of), "lamp_map"_a, "calibration"_a, "classifier"_a = py::none(),
+      .def(py::init(&make_detector), "lamp_map"_a, "calibration"_a, "classifier"_a = py::none(),
            "classifier: the file of one that vlp-train made, instead of the map's frequencies.")
       .def("detect", &detect, "image"_a,
            "(lamps, pixels, sigma_px) of the lamps wholly in view, as Positioner.locate takes "

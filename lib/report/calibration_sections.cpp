@@ -12,20 +12,20 @@
 namespace vlp {
 namespace {
 
-std::string six_digits(double value) { return significant(value, 6); }
+std::string format_six_digits(double value) { return significant(value, 6); }
 
 /// Formats a standard deviation.
-std::string rough(double value) { return significant(value, 2); }
+std::string format_sd(double value) { return significant(value, 2); }
 
-std::string pair(const Eigen::Vector2d& values, const std::string& unit) {
-  return six_digits(values.x()) + ", " + six_digits(values.y()) + " " + unit;
+std::string format_pair(const Eigen::Vector2d& values, const std::string& unit) {
+  return format_six_digits(values.x()) + ", " + format_six_digits(values.y()) + " " + unit;
 }
 
 /// Returns "; standard deviation 0.1, 0.2 px" for a pair; empty without a covariance.
-std::string deviations(const std::optional<Matrix2>& covariance, double scale,
+std::string format_sds(const std::optional<Matrix2>& covariance, double scale,
                        const std::string& unit) {
   if (!covariance) return "";
-  const auto sd = [&](int i) { return rough(scale * std::sqrt((*covariance)(i, i))); };
+  const auto sd = [&](int i) { return format_sd(scale * std::sqrt((*covariance)(i, i))); };
   return "; standard deviation " + sd(0) + ", " + sd(1) + " " + unit;
 }
 
@@ -33,24 +33,25 @@ std::string deviations(const std::optional<Matrix2>& covariance, double scale,
 
 std::string camera_table(const Camera& camera) {
   HtmlTable table;
-  const auto line = [&](const char* label, std::string value) {
+  const auto add_row = [&](const char* label, std::string value) {
     table.rows.push_back({label, std::move(value)});
   };
   const auto& [width_px, height_px] = camera.imager_px;
-  if (!camera.id.empty()) line("camera", camera.id);
-  line("image", std::to_string(width_px) + " x " + std::to_string(height_px) + " px");
-  line("lens model", std::string(name_of(camera.lens_model)));
+  if (!camera.id.empty()) add_row("camera", camera.id);
+  add_row("image", std::to_string(width_px) + " x " + std::to_string(height_px) + " px");
+  add_row("lens model", std::string(to_string(camera.lens_model)));
   const std::vector<double>& k = camera.intrinsics;
-  line("focal length", pair({k[0], k[1]}, "px"));
-  line("principal point", pair({k[2], k[3]}, "px"));
+  add_row("focal length", format_pair({k[0], k[1]}, "px"));
+  add_row("principal point", format_pair({k[2], k[3]}, "px"));
   std::string distortion;
   for (std::size_t i = 4; i < k.size(); ++i) {
-    distortion.append(i > 4 ? ", " : "").append(six_digits(k[i]));
+    distortion.append(i > 4 ? ", " : "").append(format_six_digits(k[i]));
   }
-  if (!distortion.empty()) line("distortion", distortion);
-  if (camera.pixel_pitch_m) line("pixel pitch", six_digits(1e6 * *camera.pixel_pitch_m) + " um");
-  if (camera.row_time_s) line("row time", six_digits(1e6 * *camera.row_time_s) + " us");
-  if (camera.readout) line("read-out", *camera.readout == Readout::rows ? "rows" : "columns");
+  if (!distortion.empty()) add_row("distortion", distortion);
+  if (camera.pixel_pitch_m)
+    add_row("pixel pitch", format_six_digits(1e6 * *camera.pixel_pitch_m) + " um");
+  if (camera.row_time_s) add_row("row time", format_six_digits(1e6 * *camera.row_time_s) + " us");
+  if (camera.readout) add_row("read-out", *camera.readout == Readout::rows ? "rows" : "columns");
   return html_table(table);
 }
 
@@ -83,13 +84,13 @@ std::string rotation_table(const RotationCenter& center) {
   HtmlTable table{"",
                   {},
                   {{"rotation centre in the undistorted image",
-                    pair(center.center_px, "px") + deviations(center.covariance, 1, "px")},
+                    format_pair(center.center_px, "px") + format_sds(center.covariance, 1, "px")},
                    {"tilt of the camera", significant(deg_from_rad(tilt_rad), 4) + " degrees"},
                    {"correction", center.model == RotationModel::tilt ? "tilt" : "shift"}}};
   if (center.lever_arm_m) {
     table.rows.push_back({"from the axis of rotation to the camera",
-                          pair(1e3 * *center.lever_arm_m, "mm") +
-                              deviations(center.lever_arm_covariance, 1e3, "mm")});
+                          format_pair(1e3 * *center.lever_arm_m, "mm") +
+                              format_sds(center.lever_arm_covariance, 1e3, "mm")});
   }
   return html_table(table);
 }
@@ -104,15 +105,15 @@ std::string dispersion_table(const Dispersion& dispersion, const Eigen::Vector2d
         {"its centre from the station",
          mm(dispersion.center_m.x()) + ", " + mm(dispersion.center_m.y()) + " mm"},
         {"offset taken off the image",
-         pair(dispersion.offset_px, "px") +
-             deviations(offset_covariance_with_map(dispersion, focal_px), 1, "px")}}});
+         format_pair(dispersion.offset_px, "px") +
+             format_sds(offset_covariance_with_map(dispersion, focal_px), 1, "px")}}});
 }
 
 std::string history_list(const std::vector<HistoryEntry>& entries) {
-  constexpr std::size_t most_unfolded = 8;
+  constexpr std::size_t max_unfolded = 8;
   std::string html;
   for (const auto& entry : entries) {
-    html += entry.inputs.size() > most_unfolded ? "<details>\n" : "<details open>\n";
+    html += entry.inputs.size() > max_unfolded ? "<details>\n" : "<details open>\n";
     html += html_element("summary", entry.part + ": " + entry.program + " " + entry.version + ", " +
                                         std::to_string(entry.inputs.size()) +
                                         (entry.inputs.size() == 1 ? " input" : " inputs"));

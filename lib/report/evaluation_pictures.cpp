@@ -18,50 +18,51 @@
 namespace vlp {
 namespace {
 
-Eigen::Vector2d place_m(const FixRow& row) { return row.fix->pose.position_m.head<2>(); }
+Eigen::Vector2d fix_position_m(const FixRow& row) { return row.fix->pose.position_m.head<2>(); }
 
 ErrorPlot make_floor_plan(const EvaluationInput& input, const std::vector<FixError>& errors,
                           const LampMap& lamps) {
   ErrorPlot plot{"Fixes on the floor", {}, {}, lamps};
-  std::vector<bool> found(input.truth ? input.truth->rows.size() : 0);
+  std::vector<bool> has_fix(input.truth ? input.truth->rows.size() : 0);
   plot.fixes.reserve(errors.size());
   for (const FixError& error : errors) {
-    const Eigen::Vector2d fix_m = place_m(input.fixes.rows[error.fix]);
+    const Eigen::Vector2d fix_m = fix_position_m(input.fixes.rows[error.fix]);
     plot.fixes.push_back({fix_m - error.horizontal_m, fix_m, input.fixes.rows[error.fix].image});
-    if (input.truth) found[error.truth] = true;
+    if (input.truth) has_fix[error.truth] = true;
   }
-  for (std::size_t i = 0; i < found.size(); ++i) {
-    if (!found[i]) plot.missing_m.push_back(input.truth->rows[i].xy_m);
+  for (std::size_t i = 0; i < has_fix.size(); ++i) {
+    if (!has_fix[i]) plot.missing_m.push_back(input.truth->rows[i].xy_m);
   }
   return plot;
 }
 
 }  // namespace
 
-Drawing draw_floor_plan(const EvaluationInput& input, const LampMap& lamps) {
-  return drawing_of(make_floor_plan(input, errors_of(input, input.fixes).errors, lamps));
+Drawing make_floor_plan_drawing(const EvaluationInput& input, const LampMap& lamps) {
+  return make_drawing(make_floor_plan(input, compute_errors(input, input.fixes).errors, lamps));
 }
 
-std::vector<ReportPicture> evaluation_pictures(const EvaluationInput& input,
-                                               const Evaluation& evaluation, const LampMap& lamps) {
-  const std::vector<FixError> errors = errors_of(input, input.fixes).errors;
-  std::vector<ReportPicture> pictures;
+std::vector<ReportPlot> make_evaluation_plots(const EvaluationInput& input,
+                                              const Evaluation& evaluation, const LampMap& lamps) {
+  const std::vector<FixError> errors = compute_errors(input, input.fixes).errors;
+  std::vector<ReportPlot> pictures;
   if (!input.line_m) {
-    pictures.push_back(report_picture(drawing_of(make_floor_plan(input, errors, lamps))));
+    pictures.push_back(make_report_plot(make_drawing(make_floor_plan(input, errors, lamps))));
   } else if (evaluation.fit) {
-    pictures.push_back(drive_picture("Drive", input.fixes.rows, *input.line_m, *evaluation.fit));
+    pictures.push_back(make_drive_plot("Drive", input.fixes.rows, *input.line_m, *evaluation.fit));
   }
   CdfPlot::Curve curve{"fixes", {}, evaluation.horizontal_m.median, evaluation.horizontal_m.p90};
   curve.errors_m.reserve(errors.size());
   for (const FixError& error : errors) curve.errors_m.push_back(error.horizontal_m.norm());
-  pictures.push_back(report_picture(drawing_of(CdfPlot{"Horizontal errors", {curve}})));
-  pictures.back().alt += " Half of the fixes are no further off than " + in_mm(curve.p50_m) +
-                         ", nine tenths no further than " + in_mm(curve.p90_m) + ".";
+  pictures.push_back(make_report_plot(make_drawing(CdfPlot{"Horizontal errors", {curve}})));
+  pictures.back().alt += " Half of the fixes are no further off than " +
+                         format_mm_with_unit(curve.p50_m) + ", nine tenths no further than " +
+                         format_mm_with_unit(curve.p90_m) + ".";
   return pictures;
 }
 
-std::optional<ReportPicture> budget_picture(const std::vector<FixRow>& fixes, const LampMap& lamps,
-                                            const Calibration& calibration) {
+std::optional<ReportPlot> make_budget_plot(const std::vector<FixRow>& fixes, const LampMap& lamps,
+                                           const Calibration& calibration) {
   if (lamps.lamps.empty()) return std::nullopt;
   const UnitErrors unit(lamps, calibration);
   BudgetPlot plot{
@@ -69,45 +70,47 @@ std::optional<ReportPicture> budget_picture(const std::vector<FixRow>& fixes, co
   const auto horizontal = [](const Eigen::Vector4d& sd) { return sd.head<2>().squaredNorm(); };
   for (const FixRow& row : fixes) {
     if (!row.fix || !row.fix->sd || !row.fix->noise_sd || row.fix->inclination) continue;
-    auto seen = unit.lamps_seen_from(row.fix->pose);
-    std::erase_if(seen, [&](std::size_t lamp) {
-      const auto& left_out = row.rejected;
-      return std::find(left_out.begin(), left_out.end(), lamps.lamps[lamp].id) != left_out.end();
+    auto visible = unit.find_visible_lamps(row.fix->pose);
+    std::erase_if(visible, [&](std::size_t lamp) {
+      const auto& rejected = row.rejected;
+      return std::find(rejected.begin(), rejected.end(), lamps.lamps[lamp].id) != rejected.end();
     });
-    constexpr double any_px = 1;  // arbitrary: the proportions do not depend on it
-    const auto budget = unit.budget(row.fix->pose, seen, any_px);
+    constexpr double arbitrary_px = 1;  // arbitrary: the proportions do not depend on it
+    const auto budget = unit.budget(row.fix->pose, visible, arbitrary_px);
     if (!budget) continue;
-    const double common_m = spread_of(budget->common()).horizontal_m;
+    const double common_m = compute_fix_sds(budget->common()).horizontal_m;
     if (!(common_m > 0)) continue;
     const double noise_m2 = horizontal(*row.fix->noise_sd);
     const double stated_m2 = std::max(0.0, horizontal(*row.fix->sd) - noise_m2);
-    const auto of = [&](const Matrix4& part) {
-      const double share = spread_of(part).horizontal_m / common_m;
-      return share * share * stated_m2;
+    const auto part_variance_m2 = [&](const Matrix4& part) {
+      const double fraction = compute_fix_sds(part).horizontal_m / common_m;
+      return fraction * fraction * stated_m2;
     };
-    plot.variances_m2.push_back(
-        {noise_m2, of(budget->lens), of(budget->zenith), of(budget->offset), of(budget->lamp_map)});
+    plot.variances_m2.push_back({noise_m2, part_variance_m2(budget->lens),
+                                 part_variance_m2(budget->zenith), part_variance_m2(budget->offset),
+                                 part_variance_m2(budget->lamp_map)});
   }
   if (plot.variances_m2.empty()) return std::nullopt;
-  ReportPicture picture = report_picture(drawing_of(plot));
-  const std::vector<double> shares = plot.shares();
-  for (std::size_t i = 0; i < shares.size(); ++i) {
-    picture.alt += fmt::format("{} {} {:.0f} %", i == 0 ? "" : ",", plot.parts[i], 100 * shares[i]);
+  ReportPlot picture = make_report_plot(make_drawing(plot));
+  const std::vector<double> fractions = plot.fractions();
+  for (std::size_t i = 0; i < fractions.size(); ++i) {
+    picture.alt +=
+        fmt::format("{} {} {:.0f} %", i == 0 ? "" : ",", plot.parts[i], 100 * fractions[i]);
   }
   picture.alt += ".";
   return picture;
 }
 
-ReportPicture drive_picture(const std::string& title, const std::vector<FixRow>& fixes,
-                            const CommandedLine& commanded_m, const LineFit& fit) {
+ReportPlot make_drive_plot(const std::string& title, const std::vector<FixRow>& fixes,
+                           const CommandedLine& commanded_m, const LineFit& fit) {
   TrackPlot plot{title, commanded_m, {}, fit.line_m};
   for (const FixRow& row : fixes) {
-    if (row.fix) plot.fixes_m.push_back(place_m(row));
+    if (row.fix) plot.fixes_m.push_back(fix_position_m(row));
   }
-  ReportPicture picture = report_picture(drawing_of(plot));
+  ReportPlot picture = make_report_plot(make_drawing(plot));
   picture.caption = title + ". " + picture.caption;
   picture.alt = title + ". " + picture.alt + " The fitted line is off by " +
-                in_mm(fit.distances_m.mean) + " on average.";
+                format_mm_with_unit(fit.distances_m.mean) + " on average.";
   return picture;
 }
 

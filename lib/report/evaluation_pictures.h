@@ -16,14 +16,14 @@ namespace vlp {
 
 /// Plots the errors of the fixes on the floor plan.
 /// @throws InputError if image names do not match
-Drawing draw_floor_plan(const EvaluationInput& input, const LampMap& lamps);
+Drawing make_floor_plan_drawing(const EvaluationInput& input, const LampMap& lamps);
 
 /// Returns plots of the errors on the floor and of their distribution. With a commanded line, the
 /// drive along it takes the place of the floor.
 /// @pre there is at least one fix
-/// @throws InputError if image names do not match, and as svg_of()
-std::vector<ReportPicture> evaluation_pictures(const EvaluationInput& input,
-                                               const Evaluation& evaluation, const LampMap& lamps);
+/// @throws InputError if image names do not match, and as render_svg()
+std::vector<ReportPlot> make_evaluation_plots(const EvaluationInput& input,
+                                              const Evaluation& evaluation, const LampMap& lamps);
 
 /// Returns a plot of the contributions to the reported horizontal variance of each fix.
 ///
@@ -34,13 +34,13 @@ std::vector<ReportPicture> evaluation_pictures(const EvaluationInput& input,
 ///
 /// Returns std::nullopt if no fix reports such a common part.
 /// @pre the fixes are positions of the camera, not of a robot's center; this cannot be checked here
-/// @throws InputError as svg_of()
-std::optional<ReportPicture> budget_picture(const std::vector<FixRow>& fixes, const LampMap& lamps,
-                                            const Calibration& calibration);
+/// @throws InputError as render_svg()
+std::optional<ReportPlot> make_budget_plot(const std::vector<FixRow>& fixes, const LampMap& lamps,
+                                           const Calibration& calibration);
 
 /// Returns a plot of a drive along a commanded line.
 /// @pre `fit` is the line fit of `fixes`
-ReportPicture drive_picture(const std::string& title, const std::vector<FixRow>& fixes,
-                            const CommandedLine& commanded_m, const LineFit& fit);
+ReportPlot make_drive_plot(const std::string& title, const std::vector<FixRow>& fixes,
+                           const CommandedLine& commanded_m, const LineFit& fit);
 
 }  // namespace vlp

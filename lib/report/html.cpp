@@ -101,7 +101,7 @@ std::string html_table(const HtmlTable& table) {
   return html + "</tbody>\n</table>\n</div>\n";
 }
 
-std::string html_figure(const ReportPicture& picture) {
+std::string html_figure(const ReportPlot& picture) {
   const bool png = picture.image.rfind("\x89PNG", 0) == 0;
   HtmlTable table{"", {}, {}};
   if (!picture.table.empty()) {

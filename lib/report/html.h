@@ -35,6 +35,6 @@ struct HtmlTable {
 std::string html_table(const HtmlTable& table);
 
 /// Returns a figure with the embedded image, its caption, and its table below.
-std::string html_figure(const ReportPicture& picture);
+std::string html_figure(const ReportPlot& picture);
 
 }  // namespace vlp

@@ -23,14 +23,15 @@ std::string quantity(const std::optional<double>& value, const std::string& unit
   return value ? with_unit(significant(*value, 4), unit) : "none";
 }
 
-std::vector<std::string> row_of(const CheckedMetric& gate, bool may_be_out_of_reach) {
+std::vector<std::string> make_row(const CheckedMetric& gate, bool may_be_out_of_reach) {
   const bool out_of_reach = may_be_out_of_reach && !gate.value;
-  const std::string result = gate.met()     ? "met"
+  const std::string result = gate.passed()  ? "met"
                              : out_of_reach ? "not\u00a0reached"
                                             : "NOT\u00a0MET";
   const auto sure = gate.conformance_probability();
   return {gate.name, quantity(gate.value, gate.unit),
-          words_of(gate.asked) + kSpace + quantity(gate.limit, gate.unit) + words_of_guard(gate),
+          describe(gate.direction) + kSpace + quantity(gate.limit, gate.unit) +
+              describe_guard_band(gate),
           result + (sure ? ", conforms with p\u00a0=\u00a0" + significant(*sure, 3) : "")};
 }
 
@@ -38,8 +39,8 @@ std::string gates_table(const Report& report) {
   HtmlTable table{"", {"gate", "figure", "limit", "result"}, {}};
   for (const auto& gate : report.gates) {
     const bool given = report.verdict.has_value();
-    if (!gate.met() && (gate.value || !given)) table.marked.push_back(table.rows.size());
-    table.rows.push_back(row_of(gate, given));
+    if (!gate.passed() && (gate.value || !given)) table.marked.push_back(table.rows.size());
+    table.rows.push_back(make_row(gate, given));
   }
   return table.rows.empty() ? "" : html_table(table);
 }
@@ -49,19 +50,20 @@ std::string verdict_box(const char* look, const std::string& word, const std::st
          "</strong>" + content + "</div>\n";
 }
 
-std::string box_of(const ReportVerdict& verdict) {
+std::string format_verdict(const ReportVerdict& verdict) {
   constexpr std::array looks{"pass", "fail", "none"};
   std::string causes;
   for (const std::string& cause : verdict.causes) causes += html_element("p", cause);
   return verdict_box(looks.at(static_cast<std::size_t>(verdict.look)), verdict.word, causes);
 }
 
-std::string verdict_of_gates(const std::vector<CheckedMetric>& gates, const std::string& caution) {
+std::string format_gate_verdict(const std::vector<CheckedMetric>& gates,
+                                const std::string& caution) {
   if (gates.empty()) {
     return verdict_box("none", "NO VERDICT", "No gates were set.");
   }
   const auto missed =
-      std::count_if(gates.begin(), gates.end(), [](const auto& gate) { return !gate.met(); });
+      std::count_if(gates.begin(), gates.end(), [](const auto& gate) { return !gate.passed(); });
   const std::string count = std::to_string(gates.size());
   const std::string of_gates = gates.size() == 1 ? " gate" : " gates";
   const std::string reason = missed == 0
@@ -73,7 +75,8 @@ std::string verdict_of_gates(const std::vector<CheckedMetric>& gates, const std:
 }
 
 std::string verdict(const Report& report) {
-  return report.verdict ? box_of(*report.verdict) : verdict_of_gates(report.gates, report.caution);
+  return report.verdict ? format_verdict(*report.verdict)
+                        : format_gate_verdict(report.gates, report.caution);
 }
 
 std::string facts_table(const Report& report) {
@@ -82,21 +85,21 @@ std::string facts_table(const Report& report) {
   return table.rows.empty() ? "" : html_table(table);
 }
 
-std::string refused_of(const Report& report) {
+std::string format_rejected_images(const Report& report) {
   if (report.refused.empty()) return "";
   HtmlTable table{"", {"image", "why it was not used"}, {}};
   for (const auto& [image, reason] : report.refused) table.rows.push_back({image, reason});
   return html_table(table);
 }
 
-std::string figures_of(const Report& report) {
+std::string format_statistics(const Report& report) {
   std::string html;
-  if (!report.figures.empty()) {
-    const bool intervals = std::any_of(report.figures.begin(), report.figures.end(),
+  if (!report.metrics.empty()) {
+    const bool intervals = std::any_of(report.metrics.begin(), report.metrics.end(),
                                        [](const auto& figure) { return !figure.interval.empty(); });
     HtmlTable table{"", {"figure", "value"}, {}};
     if (intervals) table.header.emplace_back("95 % confidence interval");
-    for (const auto& [label, value, unit, interval] : report.figures) {
+    for (const auto& [label, value, unit, interval] : report.metrics) {
       table.rows.push_back({label, with_unit(value, unit)});
       if (intervals) table.rows.back().push_back(with_unit(interval, unit));
     }
@@ -106,7 +109,7 @@ std::string figures_of(const Report& report) {
   return html;
 }
 
-std::string pictures_of(const Report& report, ReportPart part) {
+std::string format_plots(const Report& report, ReportPart part) {
   std::string html;
   for (const auto& picture : report.pictures) {
     if (picture.part == part) html += html_figure(picture);
@@ -114,7 +117,7 @@ std::string pictures_of(const Report& report, ReportPart part) {
   return html;
 }
 
-std::string history_of(const Report& report) {
+std::string format_history(const Report& report) {
   std::vector<HistoryEntry> entries;
   if (report.calibration) entries = report.calibration->history;
   if (report.evaluation) entries.push_back(*report.evaluation);
@@ -132,20 +135,21 @@ std::string report_html(const Report& report) {
     if (calibration->dispersion)
       dispersion = dispersion_table(*calibration->dispersion, calibration->camera.focal_px());
   }
-  const auto pictures = [&](ReportPart part) { return pictures_of(report, part); };
+  const auto pictures = [&](ReportPart part) { return format_plots(report, part); };
   return html_page(
       report.title,
       verdict(report) + facts_table(report) +
           html_section("Fixes on the floor", pictures(ReportPart::floor)) +
-          html_section("Gates", gates_table(report)) + html_section("Figures", figures_of(report)) +
+          html_section("Gates", gates_table(report)) +
+          html_section("Figures", format_statistics(report)) +
           html_section("Camera", camera + pictures(ReportPart::camera)) +
           html_section("Rotation centre", rotation + pictures(ReportPart::rotation)) +
           html_section("Dispersion", dispersion + pictures(ReportPart::dispersion)) +
           html_section("Distribution of the errors", pictures(ReportPart::distribution)) +
           html_section("Moving tracks", pictures(ReportPart::tracks)) +
           html_section("More pictures", pictures(ReportPart::other)) +
-          html_section("Images that were not used", refused_of(report)) +
-          html_section("History", history_of(report)));
+          html_section("Images that were not used", format_rejected_images(report)) +
+          html_section("History", format_history(report)));
 }
 
 }  // namespace vlp

@@ -14,7 +14,7 @@
 namespace vlp {
 
 /// Row of the table of statistics, formatted.
-struct ReportFigure {
+struct ReportStatistic {
   /// Example: "mean horizontal error", "0.0137", "mm", "0.0131 to 0.0143".
   std::string label, value, unit;
   /// Confidence interval; empty if there is none.
@@ -31,7 +31,7 @@ struct ReportVerdict {
 };
 
 /// Rejected image and the reason.
-struct ReportRefusal {
+struct ReportRejection {
   std::string image, reason;
 };
 
@@ -40,12 +40,12 @@ struct Report {
   std::string title;
   /// Gates; without gates the report states that there is no verdict.
   std::vector<CheckedMetric> gates;
-  std::vector<ReportFigure> figures;
+  std::vector<ReportStatistic> metrics;
   /// Sentences below the statistics: methods and missing data.
   std::vector<std::string> notes;
   std::optional<Calibration> calibration;
   /// Plots in any order. Plots of the same part keep their order.
-  std::vector<ReportPicture> pictures;
+  std::vector<ReportPlot> pictures;
   /// Provenance of the statistics; its part is "evaluation".
   std::optional<HistoryEntry> evaluation;
   /// Caution inside the verdict box about an issue that the verdict does not cover, for example
@@ -54,7 +54,7 @@ struct Report {
   /// Verdict that replaces the verdict of the gates. A gate without a value then counts as not
   /// reached.
   std::optional<ReportVerdict> verdict = {};
-  std::vector<ReportRefusal> refused = {};
+  std::vector<ReportRejection> refused = {};
   /// Label and value of the data that identify the measurement, such as operator and time, shown
   /// below the verdict.
   std::vector<std::pair<std::string, std::string>> facts = {};

@@ -13,7 +13,7 @@
 namespace vlp {
 namespace {
 
-constexpr std::size_t kMostBytes = std::size_t{16} << 20;
+constexpr std::size_t kMaxBytes = std::size_t{16} << 20;
 
 struct Kind {
   std::string_view title;
@@ -86,7 +86,7 @@ bool is_whole_svg(const std::string& svg) {
   return document.load_buffer(svg.data(), svg.size()) && document.child("svg").first_child();
 }
 
-ReportPicture picture_of(std::string image, const std::string& name) {
+ReportPlot classify_image(std::string image, const std::string& name) {
   const std::string_view title = svg_title(image);
   const auto* kind = std::find_if(kKinds.begin(), kKinds.end(),
                                   [&](const Kind& other) { return other.title == title; });
@@ -96,8 +96,8 @@ ReportPicture picture_of(std::string image, const std::string& name) {
 
 }  // namespace
 
-ReportPicture read_report_picture(const std::filesystem::path& file) {
-  std::string image = read_file(file, kMostBytes);
+ReportPlot read_report_plot(const std::filesystem::path& file) {
+  std::string image = read_file(file, kMaxBytes);
   constexpr std::size_t head = 1024;
   const bool png = image.starts_with("\x89PNG");
   if (!png && image.substr(0, head).find("<svg") == std::string::npos) {
@@ -106,11 +106,11 @@ ReportPicture read_report_picture(const std::filesystem::path& file) {
   if (png ? !is_whole_png(image) : !is_whole_svg(image)) {
     throw InputError(file, "is cut short, or holds no picture");
   }
-  return picture_of(std::move(image), file.filename().string());
+  return classify_image(std::move(image), file.filename().string());
 }
 
-ReportPicture report_picture(const Drawing& drawing) {
-  ReportPicture picture = picture_of(svg_of(drawing), drawing.name);
+ReportPlot make_report_plot(const Drawing& drawing) {
+  ReportPlot picture = classify_image(render_svg(drawing), drawing.name);
   picture.table = drawing.table;
   return picture;
 }

@@ -14,7 +14,7 @@ namespace vlp {
 enum class ReportPart { camera, rotation, dispersion, floor, distribution, tracks, other };
 
 /// Plot or image with its texts.
-struct ReportPicture {
+struct ReportPlot {
   ReportPart part;
   /// Complete content of an SVG or PNG file.
   std::string image;
@@ -28,10 +28,10 @@ struct ReportPicture {
 /// Reads a plot of another program. An SVG is recognized by its title. Images without a known title
 /// (a PNG has none) belong to `other`, with the file name as caption.
 /// @throws InputError if the file cannot be read, is longer than 16 MiB, or is neither SVG nor PNG
-ReportPicture read_report_picture(const std::filesystem::path& file);
+ReportPlot read_report_plot(const std::filesystem::path& file);
 
 /// Renders a drawing as a report picture.
-/// @throws InputError as svg_of()
-ReportPicture report_picture(const Drawing& drawing);
+/// @throws InputError as render_svg()
+ReportPlot make_report_plot(const Drawing& drawing);
 
 }  // namespace vlp

@@ -24,10 +24,10 @@ constexpr std::array kCorners{"bottom-left", "bottom-right", "top-left", "top-ri
 // In the order of BoardKind.
 constexpr std::array kKinds{"apriltags", "chessboard", "charuco"};
 
-constexpr int kMostTags = 1000;
-constexpr int kLeastSquares = 4, kMostSquares = 100;
-constexpr int kLargestId = 1'000'000;  // families have fewer
-constexpr double kLeastTag_m = 1e-4, kLargestTag_m = 2;
+constexpr int kMaxTags = 1000;
+constexpr int kMinSquares = 4, kMaxSquares = 100;
+constexpr int kMaxId = 1'000'000;  // families have fewer
+constexpr double kMinTag_m = 1e-4, kMaxTag_m = 2;
 constexpr double kMaxPrintSd = 0.02;  // check_board() detects larger errors
 
 IdOrder read_id_order(const YamlValue& value) {
@@ -35,8 +35,8 @@ IdOrder read_id_order(const YamlValue& value) {
   for (const bool column_major : {false, true}) {
     for (std::size_t corner = 0; corner < kCorners.size(); ++corner) {
       const IdOrder order{column_major, static_cast<BoardCorner>(corner)};
-      if (value.text() == name_of(order)) return order;
-      names += (names.empty() ? "" : ", ") + name_of(order);
+      if (value.text() == to_string(order)) return order;
+      names += (names.empty() ? "" : ", ") + to_string(order);
     }
   }
   throw value.unknown("the orders are: " + names);
@@ -51,7 +51,7 @@ std::string read_family(const YamlValue& value) {
 }
 
 /// Returns a board of squares without tags.
-Board board_of_squares(BoardKind kind) {
+Board make_board_of_squares(BoardKind kind) {
   Board board{"", 0, 0, 0, 1, 1, false, 0, {false, BoardCorner::top_left}};
   board.kind = kind;
   return board;
@@ -67,14 +67,13 @@ BoardKind read_kind(const YamlValue& value) {
 }
 
 Board read_squares(YamlMap& map, BoardKind kind) {
-  Board board = board_of_squares(kind);
-  board.cols = map.required("cols").integer_within(kLeastSquares, kMostSquares);
-  board.rows = map.required("rows").integer_within(kLeastSquares, kMostSquares);
-  board.square_size_m =
-      map.required("square_size_m").number_within(kLeastTag_m, kLargestTag_m, "m");
+  Board board = make_board_of_squares(kind);
+  board.cols = map.required("cols").integer_within(kMinSquares, kMaxSquares);
+  board.rows = map.required("rows").integer_within(kMinSquares, kMaxSquares);
+  board.square_size_m = map.required("square_size_m").number_within(kMinTag_m, kMaxTag_m, "m");
   if (kind == BoardKind::chessboard) return board;
   const YamlValue marker = map.required("marker_size_m");
-  board.tag_size_m = marker.number_within(kLeastTag_m, kLargestTag_m, "m");
+  board.tag_size_m = marker.number_within(kMinTag_m, kMaxTag_m, "m");
   if (!(board.tag_size_m < board.square_size_m)) {
     throw marker.error("a marker is smaller than the square around it");
   }
@@ -84,7 +83,7 @@ Board read_squares(YamlMap& map, BoardKind kind) {
     throw dictionary.error("should be one of OpenCV's dictionaries, such as DICT_5X5_100");
   }
   if (const auto first = map.optional("first_id")) {
-    board.first_id = first->integer_within(0, kLargestId);
+    board.first_id = first->integer_within(0, kMaxId);
   }
   if (const auto top_left = map.optional("top_left")) {
     board.top_left_white = top_left->text() == "white";
@@ -97,15 +96,13 @@ Board read_squares(YamlMap& map, BoardKind kind) {
 
 /// Reads Kalibr's checkerboard, which counts corners.
 Board read_kalibr_checkerboard(YamlMap& map) {
-  Board board = board_of_squares(BoardKind::chessboard);
-  board.cols = map.required("targetCols").integer_within(kLeastSquares - 1, kMostSquares - 1) + 1;
-  board.rows = map.required("targetRows").integer_within(kLeastSquares - 1, kMostSquares - 1) + 1;
+  Board board = make_board_of_squares(BoardKind::chessboard);
+  board.cols = map.required("targetCols").integer_within(kMinSquares - 1, kMaxSquares - 1) + 1;
+  board.rows = map.required("targetRows").integer_within(kMinSquares - 1, kMaxSquares - 1) + 1;
   const YamlValue height = map.required("rowSpacingMeters");
-  board.square_size_m =
-      map.required("colSpacingMeters").number_within(kLeastTag_m, kLargestTag_m, "m");
+  board.square_size_m = map.required("colSpacingMeters").number_within(kMinTag_m, kMaxTag_m, "m");
   constexpr double rounding = 1e-9;
-  if (std::abs(height.number_within(kLeastTag_m, kLargestTag_m, "m") - board.square_size_m) >
-      rounding) {
+  if (std::abs(height.number_within(kMinTag_m, kMaxTag_m, "m") - board.square_size_m) > rounding) {
     throw height.error("is not colSpacingMeters: the lens is found from squares");
   }
   return board;
@@ -121,12 +118,12 @@ Board read_kalibr_target(YamlMap& map) {
     throw kind.error("should be aprilgrid or checkerboard; from others no lens is found");
   }
   Board board{"tag36h11", 0, 0, 0, 0, 2, true, 0, {false, BoardCorner::bottom_left}};
-  board.cols = map.required("tagCols").integer_within(1, kMostTags);
-  board.rows = map.required("tagRows").integer_within(1, kMostTags);
-  board.tag_size_m = map.required("tagSize").number_within(kLeastTag_m, kLargestTag_m, "m");
+  board.cols = map.required("tagCols").integer_within(1, kMaxTags);
+  board.rows = map.required("tagRows").integer_within(1, kMaxTags);
+  board.tag_size_m = map.required("tagSize").number_within(kMinTag_m, kMaxTag_m, "m");
   board.tag_spacing = map.required("tagSpacing").number_within(0.01, 10, "(gap / tag)");
   if (const auto first = map.optional("codeOffset")) {
-    board.first_id = first->integer_within(0, kLargestId);
+    board.first_id = first->integer_within(0, kMaxId);
   }
   return board;
 }
@@ -137,7 +134,7 @@ void emit_print(YAML::Emitter& out, const Board& board) {
 
 }  // namespace
 
-std::string name_of(const IdOrder& order) {
+std::string to_string(const IdOrder& order) {
   return std::string(order.column_major ? "column" : "row") + "-major-from-" +
          kCorners[static_cast<std::size_t>(order.from)];
 }
@@ -148,13 +145,13 @@ Board read_board(YamlMap& map) {
   if (kind != BoardKind::apriltags) return read_squares(map, kind);
   Board board;
   board.family = read_family(map.required("family"));
-  board.cols = map.required("cols").integer_within(1, kMostTags);
-  board.rows = map.required("rows").integer_within(1, kMostTags);
-  board.tag_size_m = map.required("tag_size_m").number_within(kLeastTag_m, kLargestTag_m, "m");
+  board.cols = map.required("cols").integer_within(1, kMaxTags);
+  board.rows = map.required("rows").integer_within(1, kMaxTags);
+  board.tag_size_m = map.required("tag_size_m").number_within(kMinTag_m, kMaxTag_m, "m");
   board.tag_spacing = map.required("tag_spacing").number_within(0.01, 10, "(gap / tag)");
   board.border_bits = map.required("border_bits").integer_within(1, 2);
   board.corner_squares = map.required("corner_squares").boolean();
-  board.first_id = map.required("first_id").integer_within(0, kLargestId);
+  board.first_id = map.required("first_id").integer_within(0, kMaxId);
   board.id_order = read_id_order(map.required("id_order"));
   return board;
 }
@@ -198,7 +195,7 @@ void write_board(const std::filesystem::path& file, const Board& board) {
   emit_integer(out, "border_bits", board.border_bits);
   emit_word(out, "corner_squares", board.corner_squares ? "true" : "false");
   emit_integer(out, "first_id", board.first_id);
-  emit_word(out, "id_order", name_of(board.id_order));
+  emit_word(out, "id_order", to_string(board.id_order));
   emit_print(out, board);
   out << YAML::EndMap << YAML::Newline;
   write_file(file, out.c_str());

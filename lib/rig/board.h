@@ -18,7 +18,7 @@ struct IdOrder {
 };
 
 /// Returns the name of an order in YAML.
-std::string name_of(const IdOrder& order);
+std::string to_string(const IdOrder& order);
 
 /// Pattern of a board: AprilTags in rows; black and white squares; squares with an ArUco marker in
 /// each white square, as OpenCV's CharucoBoard. In YAML: "apriltags", "chessboard", "charuco".

@@ -15,7 +15,7 @@ int id_at(const Board& board, int col, int row) {
                                         : along_rows * board.cols + along_cols);
 }
 
-std::vector<BoardTag> markers_of(const Board& board) {
+std::vector<BoardTag> make_markers(const Board& board) {
   const double margin_m = (board.square_size_m - board.tag_size_m) / 2;
   std::vector<BoardTag> markers;
   for (int row = 0; row < board.rows; ++row) {
@@ -33,7 +33,7 @@ std::vector<BoardTag> markers_of(const Board& board) {
 
 }  // namespace
 
-double tag_pitch_m(const Board& board) {
+double compute_tag_pitch_m(const Board& board) {
   return board.has_squares() ? board.square_size_m : board.tag_size_m * (1 + board.tag_spacing);
 }
 
@@ -45,7 +45,7 @@ Eigen::Vector2d tag_field_m(const Board& board) {
   if (board.has_squares()) {
     return Eigen::Vector2d(board.cols - 2, board.rows - 2) * board.square_size_m;
   }
-  return Eigen::Vector2d(board.cols - 1, board.rows - 1) * tag_pitch_m(board) +
+  return Eigen::Vector2d(board.cols - 1, board.rows - 1) * compute_tag_pitch_m(board) +
          Eigen::Vector2d::Constant(board.tag_size_m);
 }
 
@@ -59,14 +59,14 @@ std::vector<Eigen::Vector2d> square_corners_m(const Board& board) {
   return corners_m;
 }
 
-std::vector<BoardTag> board_layout(const Board& board) {
-  if (board.kind == BoardKind::charuco) return markers_of(board);
+std::vector<BoardTag> compute_board_layout(const Board& board) {
+  if (board.kind == BoardKind::charuco) return make_markers(board);
   if (board.kind == BoardKind::chessboard) return {};
   std::vector<BoardTag> tags;
   for (int row = 0; row < board.rows; ++row) {
     for (int col = 0; col < board.cols; ++col) {
-      const double left = col * tag_pitch_m(board), right = left + board.tag_size_m;
-      const double top = row * tag_pitch_m(board), bottom = top + board.tag_size_m;
+      const double left = col * compute_tag_pitch_m(board), right = left + board.tag_size_m;
+      const double top = row * compute_tag_pitch_m(board), bottom = top + board.tag_size_m;
       tags.push_back(
           {id_at(board, col, row), {{{left, bottom}, {right, bottom}, {right, top}, {left, top}}}});
     }

@@ -21,7 +21,7 @@ struct BoardTag {
 };
 
 /// Returns the distance from the left (top) edge of a tag, or square, to that of the next one.
-double tag_pitch_m(const Board& board);
+double compute_tag_pitch_m(const Board& board);
 
 /// Returns the distance from the first tag's left (top) edge to the last tag's right (bottom) edge.
 /// Boards of squares: from the first inner corner to the last.
@@ -34,6 +34,6 @@ bool is_black(const Board& board, int col, int row);
 std::vector<Eigen::Vector2d> square_corners_m(const Board& board);
 
 /// Returns the tags or markers of a board, row by row from the top left; none for a chessboard.
-std::vector<BoardTag> board_layout(const Board& board);
+std::vector<BoardTag> compute_board_layout(const Board& board);
 
 }  // namespace vlp

@@ -268,7 +268,7 @@ Calibration read_calibration(const std::filesystem::path& file) {
   YamlMap camera_map = camera.map();
   calibration.camera = read_camera(camera_map);
   camera_map.finish();
-  const auto intrinsics = static_cast<std::size_t>(stated_intrinsics(calibration.camera));
+  const auto intrinsics = static_cast<std::size_t>(count_reported_intrinsics(calibration.camera));
   if (report) calibration.intrinsics_report = read_intrinsics_report(report->map(), intrinsics);
   if (rotation_center) {
     calibration.rotation_center = read_rotation_center(rotation_center->map(), intrinsics);

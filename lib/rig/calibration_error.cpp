@@ -20,7 +20,7 @@ void recenter(Calibration& calibration) {
 
 }  // namespace
 
-Eigen::Index stated_intrinsics(const Camera& camera) {
+Eigen::Index count_reported_intrinsics(const Camera& camera) {
   constexpr Eigen::Index core = 4;
   return is_splined(camera.lens_model) ? core : std::ssize(camera.intrinsics);
 }

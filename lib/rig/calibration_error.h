@@ -14,13 +14,14 @@ namespace vlp {
 /// Returns the number of intrinsics with reported errors, which later steps propagate: all
 /// intrinsics. Splined lenses: 4, for fx, fy, cx, cy, since few corners determine each control
 /// point. Errors of the control points are only included in IntrinsicsReport::uncertainty_px.
-Eigen::Index stated_intrinsics(const Camera& camera);
+Eigen::Index count_reported_intrinsics(const Camera& camera);
 
 /// Returns the normalized point of the zenith.
 Eigen::Vector2d zenith_point(const RotationCenter& center);
 
-/// Adds an error to the stated_intrinsics(). The zenith does not change; center_px is updated. The
-/// lever arm changes by its derivative by the intrinsics, without the part through the zenith.
+/// Adds an error to the count_reported_intrinsics(). The zenith does not change; center_px is
+/// updated. The lever arm changes by its derivative by the intrinsics, without the part through the
+/// zenith.
 Calibration with_lens_error(Calibration calibration, const Eigen::VectorXd& error);
 
 /// Adds an error to the zenith's normalized point. center_px and the correlated lever arm are

@@ -24,7 +24,7 @@ void emit_camera(YAML::Emitter& out, const Camera& camera) {
     emit_word(out, "readout", *camera.readout == Readout::rows ? "rows" : "columns");
   }
   emit_integers(out, "imager_px", camera.imager_px);
-  emit_word(out, "lens_model", name_of(camera.lens_model));
+  emit_word(out, "lens_model", to_string(camera.lens_model));
   emit_numbers(out, "intrinsics", camera.intrinsics);
   out << YAML::EndMap;
 }

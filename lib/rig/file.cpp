@@ -30,8 +30,8 @@ namespace fs = std::filesystem;
 fs::path without_links(fs::path path, const std::optional<fs::path>& descriptors) {
   std::error_code error;
   const fs::path wanted = path;
-  for (int most_links = 40; fs::is_symlink(fs::symlink_status(path, error)); --most_links) {
-    if (most_links == 0) throw InputError(wanted, "is a link that leads to itself");
+  for (int max_links = 40; fs::is_symlink(fs::symlink_status(path, error)); --max_links) {
+    if (max_links == 0) throw InputError(wanted, "is a link that leads to itself");
     if (descriptors && fs::canonical(path.parent_path(), error) == *descriptors) break;
     path = path.parent_path() / fs::read_symlink(path, error);
   }
@@ -103,8 +103,8 @@ std::size_t check_kind(const fs::path& path, int descriptor, std::size_t max_byt
 
 /// Creates a file in the folder of `target` with a name that is unique among processes and threads.
 int create_beside(const fs::path& target, mode_t mode, fs::path& temporary) {
-  constexpr std::size_t most_bytes = 200;  // of the 255 of a file name
-  const std::string name = "." + target.filename().string().substr(0, most_bytes) + ".tmp-" +
+  constexpr std::size_t max_bytes = 200;  // of the 255 of a file name
+  const std::string name = "." + target.filename().string().substr(0, max_bytes) + ".tmp-" +
                            std::to_string(::getpid()) + "-";
   for (int number = 0;; ++number) {
     temporary = target.parent_path() / (name + std::to_string(number));
@@ -221,7 +221,7 @@ std::string read_text_file(const fs::path& path, std::size_t max_bytes) {
   return content;
 }
 
-WholeFile::WholeFile(const fs::path& path) : path_(path) {
+AtomicFileWriter::AtomicFileWriter(const fs::path& path) : path_(path) {
   const Target target = find_target(path);
   if (target.descriptor) {
     descriptor_ = ::fcntl(*target.descriptor, F_DUPFD_CLOEXEC, 0);
@@ -237,7 +237,7 @@ WholeFile::WholeFile(const fs::path& path) : path_(path) {
   }
 }
 
-void WholeFile::write(std::string_view content) {
+void AtomicFileWriter::write(std::string_view content) {
   while (!content.empty()) {
     const ssize_t written = ::write(descriptor_, content.data(), content.size());
     if (written < 0 && errno == EINTR) continue;
@@ -246,26 +246,26 @@ void WholeFile::write(std::string_view content) {
   }
 }
 
-void WholeFile::save() {
+void AtomicFileWriter::save() {
   if (temporary_.empty()) return;
   if (::fsync(descriptor_) != 0) fail(path_);
   save_unsynced();
   sync_folder(target_.has_parent_path() ? target_.parent_path() : ".");
 }
 
-void WholeFile::save_unsynced() {
+void AtomicFileWriter::save_unsynced() {
   if (temporary_.empty()) return;
   if (::rename(temporary_.c_str(), target_.c_str()) != 0) fail(path_);
   temporary_.clear();
 }
 
-WholeFile::~WholeFile() {
+AtomicFileWriter::~AtomicFileWriter() {
   ::close(descriptor_);
   if (!temporary_.empty()) ::unlink(temporary_.c_str());
 }
 
 void write_file(const fs::path& path, std::string_view content) {
-  WholeFile file(path);
+  AtomicFileWriter file(path);
   file.write(content);
   file.save();
 }

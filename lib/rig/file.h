@@ -48,11 +48,11 @@ class InputFile {
 /// them. Symbolic links are followed. A pipe, a device or a stream of this process (/dev/stdout,
 /// /dev/fd/N) is written directly. A killed process may leave its temporary file,
 /// ".NAME.tmp-PID-N", which no program reads.
-class WholeFile {
+class AtomicFileWriter {
  public:
   /// Creates the temporary file. This and the next functions throw InputError if the file cannot be
   /// written.
-  [[gnu::visibility("hidden")]] explicit WholeFile(const std::filesystem::path& path);
+  [[gnu::visibility("hidden")]] explicit AtomicFileWriter(const std::filesystem::path& path);
   [[gnu::visibility("hidden")]] void write(std::string_view content);
   /// Flushes the content to disk and renames the file to `path`.
   [[gnu::visibility("hidden")]] void save();
@@ -61,16 +61,16 @@ class WholeFile {
   [[gnu::visibility("hidden")]] void save_unsynced();
 
   /// Without save(), `path` is unchanged.
-  [[gnu::visibility("hidden")]] ~WholeFile();
-  WholeFile(const WholeFile&) = delete;
-  WholeFile& operator=(const WholeFile&) = delete;
+  [[gnu::visibility("hidden")]] ~AtomicFileWriter();
+  AtomicFileWriter(const AtomicFileWriter&) = delete;
+  AtomicFileWriter& operator=(const AtomicFileWriter&) = delete;
 
  private:
   std::filesystem::path path_, target_, temporary_;
   int descriptor_ = -1;
 };
 
-/// Replaces `path` by `content` atomically (WholeFile). Throws InputError.
+/// Replaces `path` by `content` atomically (AtomicFileWriter). Throws InputError.
 [[gnu::visibility("hidden")]] void write_file(const std::filesystem::path& path,
                                               std::string_view content);
 

@@ -16,9 +16,9 @@ namespace vlp {
 namespace {
 
 constexpr const char* kLampsFormat = "vlp-lamps/1";
-constexpr double kTooHigh_m = 200;  // higher ceilings indicate millimeters
+constexpr double kMaxHeight_m = 200;  // higher ceilings indicate millimeters
 constexpr double kCoincident_m = 1e-3;
-constexpr double kWorstSurvey_m = 1;  // larger values indicate millimeters
+constexpr double kMaxSurveySd_m = 1;  // larger values indicate millimeters
 
 std::optional<double> optional_within(YamlMap& map, const std::string& key, double min, double max,
                                       std::string_view unit) {
@@ -33,15 +33,15 @@ Lamp read_lamp(YamlMap& map) {
   lamp.id = map.required("id").integer_within(0, std::numeric_limits<int>::max());
   const auto position = map.required("position_m");
   lamp.position_m = Eigen::Vector3d(position.numbers(3).data());
-  position.list()[2].number_within(-kTooHigh_m, kTooHigh_m, "m");
+  position.list()[2].number_within(-kMaxHeight_m, kMaxHeight_m, "m");
   lamp.shape = read_shape(map);
   lamp.frequency_hz = optional_within(map, "frequency_hz", 50, 1e6, "Hz");
   lamp.duty = optional_within(map, "duty", 0.01, 0.99, "(a share of the period)");
-  lamp.sd_m = optional_within(map, "sd_m", 0, kWorstSurvey_m, "m");
+  lamp.sd_m = optional_within(map, "sd_m", 0, kMaxSurveySd_m, "m");
   return lamp;
 }
 
-void EarlierLamps::check(const Lamp& lamp, const YamlValue& item) const {
+void UniqueLamps::check(const Lamp& lamp, const YamlValue& item) const {
   if (ids_.contains(lamp.id)) throw item.error("id " + std::to_string(lamp.id) + " stands twice");
   const double x_m = lamp.position_m.x();
   const auto end = lamps_.upper_bound(x_m + kCoincident_m);
@@ -54,7 +54,7 @@ void EarlierLamps::check(const Lamp& lamp, const YamlValue& item) const {
   }
 }
 
-void EarlierLamps::add(const Lamp& lamp) {
+void UniqueLamps::add(const Lamp& lamp) {
   ids_.insert(lamp.id);
   lamps_.emplace(lamp.position_m.x(), lamp);
 }
@@ -73,11 +73,11 @@ LampMap read_lamps_of_room(const std::filesystem::path& file, const std::string&
 
 LampMapFile read_lamps_with_rooms(const std::filesystem::path& file, const std::string& room) {
   YamlMap document = read_yaml(file, kLampsFormat);
-  const auto sd_m = optional_within(document, "sd_m", 0, kWorstSurvey_m, "m");
+  const auto sd_m = optional_within(document, "sd_m", 0, kMaxSurveySd_m, "m");
   const YamlValue list = document.required("lamps");
   document.finish();
   LampMapFile result{file, {}, {}};
-  EarlierLamps in_room;
+  UniqueLamps in_room;
   std::unordered_set<int> ids_of_other_rooms;
   const auto items = list.list();
   std::vector<Lamp>& lamps = result.map.lamps;

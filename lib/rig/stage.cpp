@@ -7,12 +7,12 @@
 namespace vlp {
 namespace {
 
-void forget(Calibration& calibration, const std::string& part) {
+void remove_history(Calibration& calibration, const std::string& part) {
   std::erase_if(calibration.history, [&](const HistoryEntry& entry) { return entry.part == part; });
 }
 
-void remember(Calibration& calibration, const std::string& part, HistoryEntry entry) {
-  forget(calibration, part);
+void add_history(Calibration& calibration, const std::string& part, HistoryEntry entry) {
+  remove_history(calibration, part);
   entry.part = part;
   calibration.history.push_back(std::move(entry));
 }
@@ -23,36 +23,36 @@ Calibration with_camera(Camera camera, std::optional<IntrinsicsReport> report, H
   Calibration calibration;
   calibration.camera = std::move(camera);
   calibration.intrinsics_report = std::move(report);
-  remember(calibration, "camera", std::move(entry));
+  add_history(calibration, "camera", std::move(entry));
   return calibration;
 }
 
 Calibration with_rotation_center(Calibration calibration, const RotationCenter& rotation_center,
                                  HistoryEntry entry) {
   calibration.dispersion.reset();
-  forget(calibration, "dispersion");
+  remove_history(calibration, "dispersion");
   calibration.adjustment.reset();
-  forget(calibration, "adjustment");
+  remove_history(calibration, "adjustment");
   calibration.rotation_center = rotation_center;
-  remember(calibration, "rotation_center", std::move(entry));
+  add_history(calibration, "rotation_center", std::move(entry));
   return calibration;
 }
 
 Calibration with_adjustment(Calibration calibration, const RotationCenter& rotation_center,
                             Adjustment adjustment, HistoryEntry entry) {
   calibration.dispersion.reset();
-  forget(calibration, "dispersion");
-  forget(calibration, "rotation_center");
+  remove_history(calibration, "dispersion");
+  remove_history(calibration, "rotation_center");
   calibration.rotation_center = rotation_center;
   calibration.adjustment = std::move(adjustment);
-  remember(calibration, "adjustment", std::move(entry));
+  add_history(calibration, "adjustment", std::move(entry));
   return calibration;
 }
 
 Calibration with_dispersion(Calibration calibration, const Dispersion& dispersion,
                             HistoryEntry entry) {
   calibration.dispersion = dispersion;
-  remember(calibration, "dispersion", std::move(entry));
+  add_history(calibration, "dispersion", std::move(entry));
   return calibration;
 }
 

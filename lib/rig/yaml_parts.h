@@ -27,7 +27,7 @@ Camera read_camera(YamlMap& map);
 void emit_shape(YAML::Emitter& out, const LampShape& shape);
 
 /// Lamps that were already read, by id and position.
-class EarlierLamps {
+class UniqueLamps {
  public:
   /// Throws InputError at `item` if an earlier lamp has the same id or position.
   void check(const Lamp& lamp, const YamlValue& item) const;

@@ -159,7 +159,7 @@ YamlValue YamlMap::required(const std::string& key) {
   if (auto value = optional(key)) return *value;
   std::string names;
   for (const Entry& entry : entries_) names += (names.empty() ? "" : ", ") + entry.key;
-  throw error(line_, "key '" + key + "' is missing; there are: " + shortened(names, 150));
+  throw error(line_, "key '" + key + "' is missing; there are: " + truncate_text(names, 150));
 }
 
 void YamlMap::finish() const {

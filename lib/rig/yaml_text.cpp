@@ -21,9 +21,9 @@ std::size_t character_length(std::string_view text) {
     if ((byte & 0xc0) != 0x80) return 0;
     code = (code << 6) | (byte & 0x3fU);
   }
-  constexpr std::uint32_t least[] = {0, 0, 0x80, 0x800, 0x10000};
+  constexpr std::uint32_t min_code[] = {0, 0, 0x80, 0x800, 0x10000};
   const bool surrogate = code >= 0xd800 && code < 0xe000;
-  return code < least[length] || code > 0x10ffff || surrogate ? 0 : length;
+  return code < min_code[length] || code > 0x10ffff || surrogate ? 0 : length;
 }
 
 }  // namespace
@@ -38,12 +38,12 @@ std::string shortest(double value) {
   return fixed.ec == std::errc() ? std::string(text, fixed.ptr) : digits;
 }
 
-std::string shortened(std::string_view text, std::size_t enough) {
-  if (text.size() <= enough) return std::string(text);
-  return std::string(text.substr(0, utf8_length(text.substr(0, enough)))) + "...";
+std::string truncate_text(std::string_view text, std::size_t max_bytes) {
+  if (text.size() <= max_bytes) return std::string(text);
+  return std::string(text.substr(0, utf8_length(text.substr(0, max_bytes)))) + "...";
 }
 
-std::string in_quotes(std::string_view text) { return "'" + shortened(text, 40) + "'"; }
+std::string in_quotes(std::string_view text) { return "'" + truncate_text(text, 40) + "'"; }
 
 std::size_t line_of(const YAML::Mark& mark) {
   return mark.is_null() ? 0 : static_cast<std::size_t>(mark.line) + 1;

@@ -17,7 +17,7 @@ namespace vlp {
 std::string shortest(double value);
 
 /// Returns a text for a message, truncated to `enough` bytes.
-std::string shortened(std::string_view text, std::size_t enough);
+std::string truncate_text(std::string_view text, std::size_t max_bytes);
 /// Returns a text in quotes for a message, truncated to 40 bytes.
 std::string in_quotes(std::string_view text);
 

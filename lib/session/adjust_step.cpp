@@ -24,23 +24,24 @@ namespace vlp {
 namespace {
 
 /// Returns the spot of each image of a rotation in place: one spot per height.
-std::map<std::string, std::string> spots_of(const AdjustSet& set, const AdjustStepInput& input,
-                                            AdjustStepResult& result) {
-  const SpotCaptures turn = spot_captures(set.frames, input.lamps, input.calibration.camera);
+std::map<std::string, std::string> find_spots(const AdjustSet& set, const AdjustStepInput& input,
+                                              AdjustStepResult& result) {
+  const RotationCaptures turn =
+      find_rotation_captures(set.frames, input.lamps, input.calibration.camera);
   std::map<std::string, std::string> spots;
-  if (turn.status != SpotStatus::ok) {
-    result.warnings.push_back(fmt::format("{} is taken for no turn on the spot: {}", set.name,
-                                          explanation_of(turn.status)));
+  if (turn.status != RotationStatus::ok) {
+    result.warnings.push_back(
+        fmt::format("{} is taken for no turn on the spot: {}", set.name, describe(turn.status)));
     return spots;
   }
-  for (const SpotCapture& capture : turn.captures) {
+  for (const RotationCapture& capture : turn.captures) {
     spots[capture.image] = fmt::format("height {}", capture.height + 1);
   }
   return spots;
 }
 
-std::optional<KnownPlace> place_of(const Capture& capture, const AdjustSet& set,
-                                   const AdjustStepInput& input, int& without_sd) {
+std::optional<KnownPlace> make_known_place(const Capture& capture, const AdjustSet& set,
+                                           const AdjustStepInput& input, int& without_sd) {
   if (!capture.x_m || !capture.y_m) return std::nullopt;
   const auto sd_m = capture.place_sd_m ? capture.place_sd_m : input.place_sd_m;
   if (!sd_m) {
@@ -53,7 +54,7 @@ std::optional<KnownPlace> place_of(const Capture& capture, const AdjustSet& set,
   return KnownPlace{capture.place, {*capture.x_m, *capture.y_m}, capture.z_m, *sd_m};
 }
 
-AdjustmentInput adjustment_of(const AdjustStepInput& input, AdjustStepResult& result) {
+AdjustmentInput make_adjustment_input(const AdjustStepInput& input, AdjustStepResult& result) {
   if (input.calibration.adjustment) {
     throw InputError(input.calibration_file,
                      "is adjusted already, and its captures would count twice: give the "
@@ -68,7 +69,7 @@ AdjustmentInput adjustment_of(const AdjustStepInput& input, AdjustStepResult& re
                        "states none");
     }
     if (!report) report.emplace();
-    report->covariance = stated_lens_covariance(all.calibration.camera, *input.lens_sd_px);
+    report->covariance = make_lens_covariance(all.calibration.camera, *input.lens_sd_px);
   }
   for (Lamp& lamp : all.lamps.lamps) {
     if (!lamp.sd_m) lamp.sd_m = input.map_sd_m;
@@ -81,20 +82,21 @@ AdjustmentInput adjustment_of(const AdjustStepInput& input, AdjustStepResult& re
   }
   for (const AdjustSet& set : input.sets) {
     const auto turned =
-        set.turn ? spots_of(set, input, result) : std::map<std::string, std::string>();
+        set.turn ? find_spots(set, input, result) : std::map<std::string, std::string>();
     int without_sd = 0;
     for (const Frame& frame : set.frames) {
       const auto entry = set.captures.find(frame.image);
-      const Capture known = entry == set.captures.end() ? Capture{} : entry->second;
-      AdjustmentCapture capture{set.name + "/" + frame.image, frame.detections, known.inclination};
-      if (!known.spot.empty()) {
-        capture.spot = set.name + "/" + known.spot;
+      const Capture capture_entry = entry == set.captures.end() ? Capture{} : entry->second;
+      AdjustmentCapture capture{set.name + "/" + frame.image, frame.detections,
+                                capture_entry.inclination};
+      if (!capture_entry.spot.empty()) {
+        capture.spot = set.name + "/" + capture_entry.spot;
       } else if (const auto spot = turned.find(frame.image); spot != turned.end()) {
         capture.spot = set.name + "/" + spot->second;
       }
-      capture.place = place_of(known, set, input, without_sd);
-      capture.motion =
-          motion_of(known, input.motion, input.yaw_rate_sd_rad_per_s).value_or(KnownMotion());
+      capture.place = make_known_place(capture_entry, set, input, without_sd);
+      capture.motion = find_motion(capture_entry, input.motion, input.yaw_rate_sd_rad_per_s)
+                           .value_or(KnownMotion());
       if (moves(capture.motion)) check_row_time(input.calibration.camera);
       all.captures.push_back(std::move(capture));
     }
@@ -124,7 +126,7 @@ void add_warnings(AdjustStepResult& result, const MapErrors& map_errors) {
     result.warnings.push_back(
         fmt::format("{}: the place is {:.1f} mm from where the captures were taken, and is left "
                     "out{}",
-                    place.name, 1e3 * place.misfit_m.norm(),
+                    place.name, 1e3 * place.residual_m.norm(),
                     place.of == PlaceOf::camera
                         ? ": is it the camera's, and not that of the axis it turns about (place: "
                           "axis)?"
@@ -146,7 +148,7 @@ void add_warnings(AdjustStepResult& result, const MapErrors& map_errors) {
 
 }  // namespace
 
-void name_apart(std::vector<AdjustSet>& sets, const std::vector<std::string>& paths) {
+void make_set_names_unique(std::vector<AdjustSet>& sets, const std::vector<std::string>& paths) {
   std::vector<std::string> names;
   names.reserve(sets.size());
   for (const AdjustSet& set : sets) names.push_back(set.name);
@@ -160,8 +162,8 @@ void name_apart(std::vector<AdjustSet>& sets, const std::vector<std::string>& pa
 
 AdjustStepResult solve_adjustment(const AdjustStepInput& input, HistoryEntry entry) {
   AdjustStepResult result;
-  const Calibration alone = camera_alone(input.calibration);
-  const AdjustmentInput all = adjustment_of(input, result);
+  const Calibration alone = extract_camera(input.calibration);
+  const AdjustmentInput all = make_adjustment_input(input, result);
   // The check of the map assumes level captures: it skips inclined ones.
   LampCaptures captures{{}, all.lamps, input.lamps_file, input.calibration};
   for (const AdjustmentCapture& capture : all.captures) {
@@ -175,11 +177,11 @@ AdjustStepResult solve_adjustment(const AdjustStepInput& input, HistoryEntry ent
   const AdjustmentResult& found = result.found;
   if (!found.ok()) {
     result.fail(StepFailure::undetermined, found.undetermined);
-    blame_map(captures, alone, result);
+    explain_failure_by_map(captures, alone, result);
     return result;
   }
   add_warnings(result, map_errors);
-  result.metrics = {{"tilt_deg", deg_from_rad(tilt_of(found.center).angle_rad)}};
+  result.metrics = {{"tilt_deg", deg_from_rad(compute_tilt(found.center).angle_rad)}};
   if (const auto& arm_m = found.center.lever_arm_m) {
     result.metrics.push_back({"lever_arm_mm", 1e3 * arm_m->norm()});
   }
@@ -196,7 +198,7 @@ AdjustStepResult solve_adjustment(const AdjustStepInput& input, HistoryEntry ent
   Calibration calibration = input.calibration;
   calibration.camera = found.camera;
   if (calibration.intrinsics_report && calibration.intrinsics_report->covariance) {
-    const Eigen::Index n = stated_intrinsics(found.camera);
+    const Eigen::Index n = count_reported_intrinsics(found.camera);
     calibration.intrinsics_report->covariance = adjustment.covariance.topLeftCorner(n, n);
   }
   result.calibration = with_adjustment(std::move(calibration), found.center, std::move(adjustment),

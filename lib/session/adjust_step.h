@@ -19,14 +19,14 @@ struct AdjustSet {
   std::string name;
   std::vector<Frame> frames;
   CapturesTable captures;
-  /// Captures without a `spot` are a rotation in place, grouped by height as in SpotCaptures.
+  /// Captures without a `spot` are a rotation in place, grouped by height as in RotationCaptures.
   bool turn = false;
 };
 
 /// Replaces the names of sets that share one name by their paths, because a spot is identified by
 /// the name of its set. `paths` are in the order of `sets`. Throws std::invalid_argument if a path
 /// occurs twice.
-void name_apart(std::vector<AdjustSet>& sets, const std::vector<std::string>& paths);
+void make_set_names_unique(std::vector<AdjustSet>& sets, const std::vector<std::string>& paths);
 
 /// Input of solve_adjustment().
 struct AdjustStepInput {
@@ -37,11 +37,11 @@ struct AdjustStepInput {
   std::filesystem::path calibration_file;
   /// Standard deviations, per axis, of lamps and of places without one of their own.
   std::optional<double> map_sd_m, place_sd_m;
-  /// Standard deviation of a lens without a covariance (stated_lens_covariance()). std::nullopt:
+  /// Standard deviation of a lens without a covariance (make_lens_covariance()). std::nullopt:
   /// such a lens is exact.
   std::optional<double> lens_sd_px = {};
   /// Motion of captures without velocity and yaw rate in captures.csv, and the standard deviation
-  /// of the yaw rates in captures.csv (motion_of()).
+  /// of the yaw rates in captures.csv (find_motion()).
   std::optional<KnownMotion> motion = {};
   double yaw_rate_sd_rad_per_s = 0;
   /// Keeps the covariance and the lamps of the refined map; otherwise those of the surveyed map.

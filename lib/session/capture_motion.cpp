@@ -8,9 +8,9 @@
 
 namespace vlp {
 
-std::optional<KnownMotion> motion_of(const Capture& capture,
-                                     const std::optional<KnownMotion>& otherwise,
-                                     double yaw_rate_sd_rad_per_s) {
+std::optional<KnownMotion> find_motion(const Capture& capture,
+                                       const std::optional<KnownMotion>& otherwise,
+                                       double yaw_rate_sd_rad_per_s) {
   if (!capture.velocity_m_per_s && !capture.yaw_rate_rad_per_s) return otherwise;
   KnownMotion motion = otherwise.value_or(KnownMotion());
   if (capture.velocity_m_per_s) {
@@ -24,9 +24,9 @@ std::optional<KnownMotion> motion_of(const Capture& capture,
   return motion;
 }
 
-std::vector<KnownMotion> motions_of(std::span<const Frame> frames, const CapturesTable& captures,
-                                    const std::optional<KnownMotion>& otherwise,
-                                    double yaw_rate_sd_rad_per_s) {
+std::vector<KnownMotion> find_motions(std::span<const Frame> frames, const CapturesTable& captures,
+                                      const std::optional<KnownMotion>& otherwise,
+                                      double yaw_rate_sd_rad_per_s) {
   std::vector<KnownMotion> motions;
   motions.reserve(frames.size());
   bool any = false;
@@ -34,7 +34,7 @@ std::vector<KnownMotion> motions_of(std::span<const Frame> frames, const Capture
     const auto entry = captures.find(frame.image);
     const auto known = entry == captures.end()
                            ? otherwise
-                           : motion_of(entry->second, otherwise, yaw_rate_sd_rad_per_s);
+                           : find_motion(entry->second, otherwise, yaw_rate_sd_rad_per_s);
     motions.push_back(known.value_or(KnownMotion()));
     any = any || moves(motions.back());
   }

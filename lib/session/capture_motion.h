@@ -19,14 +19,14 @@ namespace vlp {
 /// @param otherwise              motion without a table; std::nullopt: the camera stands
 /// @param yaw_rate_sd_rad_per_s  standard deviation of the table's yaw rate; the standard deviation
 ///                               of its velocity is in the table
-std::optional<KnownMotion> motion_of(const Capture& capture,
-                                     const std::optional<KnownMotion>& otherwise,
-                                     double yaw_rate_sd_rad_per_s);
+std::optional<KnownMotion> find_motion(const Capture& capture,
+                                       const std::optional<KnownMotion>& otherwise,
+                                       double yaw_rate_sd_rad_per_s);
 
-/// Returns motion_of() for each frame; an empty vector if the camera stands in all of them.
-std::vector<KnownMotion> motions_of(std::span<const Frame> frames, const CapturesTable& captures,
-                                    const std::optional<KnownMotion>& otherwise,
-                                    double yaw_rate_sd_rad_per_s);
+/// Returns find_motion() for each frame; an empty vector if the camera stands in all of them.
+std::vector<KnownMotion> find_motions(std::span<const Frame> frames, const CapturesTable& captures,
+                                      const std::optional<KnownMotion>& otherwise,
+                                      double yaw_rate_sd_rad_per_s);
 
 /// Throws std::invalid_argument if the camera lacks row_time_s or readout, which motion
 /// compensation requires.

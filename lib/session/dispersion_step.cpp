@@ -18,17 +18,18 @@
 
 namespace vlp {
 
-KnownPlaces at_known_places(std::span<const Frame> frames, const CapturesTable& table,
-                            const std::optional<Eigen::Vector2d>& place_m, PlaceOf place_of) {
+KnownPlaces collect_known_places(std::span<const Frame> frames, const CapturesTable& table,
+                                 const std::optional<Eigen::Vector2d>& place_m, PlaceOf place_of) {
   KnownPlaces places;
   for (const Frame& frame : frames) {
     const auto entry = table.find(frame.image);
-    const Capture known = entry == table.end() ? Capture{} : entry->second;
-    if (known.x_m && known.y_m) {
-      places.captures.push_back({frame.detections, {*known.x_m, *known.y_m}, known.inclination});
-      places.of.push_back(known.place);
+    const Capture capture_entry = entry == table.end() ? Capture{} : entry->second;
+    if (capture_entry.x_m && capture_entry.y_m) {
+      places.captures.push_back(
+          {frame.detections, {*capture_entry.x_m, *capture_entry.y_m}, capture_entry.inclination});
+      places.of.push_back(capture_entry.place);
     } else if (place_m) {
-      places.captures.push_back({frame.detections, *place_m, known.inclination});
+      places.captures.push_back({frame.detections, *place_m, capture_entry.inclination});
       places.of.push_back(place_of);
     } else {
       ++places.without;
@@ -39,7 +40,7 @@ KnownPlaces at_known_places(std::span<const Frame> frames, const CapturesTable& 
 
 namespace {
 
-Fix fix_of(const Positioner& positioner, const StationCapture& capture) {
+Fix locate_capture(const Positioner& positioner, const ReferencePointCapture& capture) {
   Sensors sensors;
   sensors.inclination = capture.inclination;
   return positioner.locate(capture.detections, sensors);
@@ -47,28 +48,30 @@ Fix fix_of(const Positioner& positioner, const StationCapture& capture) {
 
 /// Returns the captures with places of the camera. Captures without a fix have no yaw and keep
 /// their places.
-std::vector<StationCapture> at_cameras(const KnownPlaces& places, const LampMap& lamps,
-                                       const Calibration& levelled) {
-  std::vector<StationCapture> captures = places.captures;
+std::vector<ReferencePointCapture> move_places_to_camera(const KnownPlaces& places,
+                                                         const LampMap& lamps,
+                                                         const Calibration& levelled) {
+  std::vector<ReferencePointCapture> captures = places.captures;
   const Positioner positioner(lamps, levelled);
   const Eigen::Vector2d& arm_m = *levelled.rotation_center->lever_arm_m;
   for (std::size_t i = 0; i < captures.size(); ++i) {
     if (places.of[i] != PlaceOf::axis) continue;
-    const Fix fix = fix_of(positioner, captures[i]);
+    const Fix fix = locate_capture(positioner, captures[i]);
     if (!fix.ok()) continue;
-    captures[i].station_m +=
+    captures[i].reference_point_m +=
         rotation_about_z(fix.estimate.pose.yaw_rad).topLeftCorner<2, 2>() * arm_m;
   }
   return captures;
 }
 
 /// Returns the mean height of the first lamp of the map above the cameras, m; 0 without a fix.
-double mean_height_m(const KnownPlaces& places, const LampMap& lamps, const Calibration& levelled) {
+double compute_mean_height_m(const KnownPlaces& places, const LampMap& lamps,
+                             const Calibration& levelled) {
   const Positioner positioner(lamps, levelled);
   double height_m = 0;
   int fixes = 0;
-  for (const StationCapture& capture : places.captures) {
-    const Fix fix = fix_of(positioner, capture);
+  for (const ReferencePointCapture& capture : places.captures) {
+    const Fix fix = locate_capture(positioner, capture);
     if (!fix.ok()) continue;
     height_m += lamps.lamps.front().position_m.z() - fix.estimate.pose.position_m.z();
     ++fixes;
@@ -82,56 +85,62 @@ void warn_of_lever_arm(DispersionResult& result, const KnownPlaces& places, cons
   const auto& center = levelled.rotation_center;
   if (!center || !center->lever_arm_m) return;
   const Eigen::Vector2d& arm_m = *center->lever_arm_m;
-  const double height_m = mean_height_m(places, lamps, levelled);
+  const double height_m = compute_mean_height_m(places, lamps, levelled);
   if (!(height_m > 0)) return;
   const Eigen::Vector2d focal_px = levelled.camera.focal_px();
-  const Eigen::Vector2d beside_m =
+  const Eigen::Vector2d displacement_m =
       height_m * result.fit.dispersion.offset_px.cwiseQuotient(focal_px);
-  constexpr double alike = 0.2, least_m = 1e-3;
-  if (arm_m.norm() < least_m || (beside_m + arm_m).norm() > alike * arm_m.norm()) return;
+  constexpr double max_relative_difference = 0.2, min_m = 1e-3;
+  if (arm_m.norm() < min_m ||
+      (displacement_m + arm_m).norm() > max_relative_difference * arm_m.norm())
+    return;
   result.warnings.push_back(fmt::format(
       "the offset is that of the lever arm, {:.1f} mm: the places are those of the axis, and fixes "
       "would be {:.1f} mm wrong; say so: place: axis in captures.csv, or --of axis",
-      1e3 * arm_m.norm(), 1e3 * beside_m.norm()));
+      1e3 * arm_m.norm(), 1e3 * displacement_m.norm()));
 }
 
 /// Function that returns the captures with their places; places of an axis depend on the
 /// calibration.
-using CapturesWith = std::function<std::vector<StationCapture>(const Calibration& calibration)>;
+using CapturesFor =
+    std::function<std::vector<ReferencePointCapture>(const Calibration& calibration)>;
 
 /// Propagates the errors of lens and zenith into the offset, if their covariances are known.
-void pass_on(DispersionResult& result, const CapturesWith& captures_with, const LampCaptures& input,
-             DispersionMethod method, DispersionCircle circle) {
+void propagate_uncertainty(DispersionResult& result, const CapturesFor& captures_for,
+                           const LampCaptures& input, DispersionMethod method,
+                           DispersionCircle circle) {
   Dispersion& dispersion = result.fit.dispersion;
-  const auto offset_with = [&](const Calibration& moved) -> std::optional<Eigen::VectorXd> {
+  const auto offset_for = [&](const Calibration& perturbed) -> std::optional<Eigen::VectorXd> {
     const DispersionFit fit =
-        fit_dispersion(captures_with(moved), input.lamps, moved, method, circle);
+        fit_dispersion(captures_for(perturbed), input.lamps, perturbed, method, circle);
     if (fit.status != DispersionStatus::ok) return {};
-    return Eigen::VectorXd(fit.dispersion.offset_px.cwiseQuotient(moved.camera.focal_px()));
+    return Eigen::VectorXd(fit.dispersion.offset_px.cwiseQuotient(perturbed.camera.focal_px()));
   };
-  const Eigen::Vector2d exact =
+  const Eigen::Vector2d nominal =
       dispersion.offset_px.cwiseQuotient(input.calibration.camera.focal_px());
-  bool told = true;
+  bool is_propagated = true;
   if (const auto& report = input.calibration.intrinsics_report; report && report->covariance) {
-    const auto by_lens = [&](const Eigen::VectorXd& error) {
-      return offset_with(with_lens_error(input.calibration, error));
+    const auto offset_for_lens_error = [&](const Eigen::VectorXd& error) {
+      return offset_for(with_lens_error(input.calibration, error));
     };
-    dispersion.by_intrinsics = jacobian_of(by_lens, exact, *report->covariance);
-    told = dispersion.by_intrinsics.has_value();
+    dispersion.by_intrinsics =
+        estimate_jacobian(offset_for_lens_error, nominal, *report->covariance);
+    is_propagated = dispersion.by_intrinsics.has_value();
   }
   if (const auto& center = input.calibration.rotation_center; center && center->covariance) {
-    constexpr double least = 1e-5;  // smallest step: second-order error 1e-10
+    constexpr double min_step = 1e-5;  // smallest step: second-order error 1e-10
     const double sd =
         std::sqrt(center->covariance->trace()) / input.calibration.camera.focal_px().x();
-    const double step = std::max(least, sd);
-    const auto by_error = [&](const Eigen::VectorXd& error) {
-      return offset_with(with_zenith_error(input.calibration, error));
+    const double step = std::max(min_step, sd);
+    const auto offset_for_zenith_error = [&](const Eigen::VectorXd& error) {
+      return offset_for(with_zenith_error(input.calibration, error));
     };
-    const auto by_zenith = jacobian_of(by_error, exact, step * step * Eigen::Matrix2d::Identity());
+    const auto by_zenith = estimate_jacobian(offset_for_zenith_error, nominal,
+                                             step * step * Eigen::Matrix2d::Identity());
     if (by_zenith) dispersion.by_zenith = *by_zenith;
-    told = told && by_zenith;
+    is_propagated = is_propagated && by_zenith;
   }
-  if (told) return;
+  if (is_propagated) return;
   result.warnings.emplace_back(
       "how the errors of lens and zenith move the offset cannot be told, and sd of fixes will lack "
       "part of them: vlp-adjust states them");
@@ -139,7 +148,7 @@ void pass_on(DispersionResult& result, const CapturesWith& captures_with, const 
 
 /// Adds the covariance of the lever arm, without its part that depends on the zenith, to that of
 /// the offset. Places of the axis have the uncertainty of the lever arm.
-void add_lever_arm(Dispersion& dispersion, const LampCaptures& input, double height_m) {
+void add_lever_arm_covariance(Dispersion& dispersion, const LampCaptures& input, double height_m) {
   const RotationCenter& center = *input.calibration.rotation_center;
   if (!center.lever_arm_covariance || !dispersion.covariance || !(height_m > 0)) return;
   const Eigen::Vector2d focal_px = input.calibration.camera.focal_px();
@@ -183,18 +192,18 @@ DispersionResult solve_dispersion(const LampCaptures& input, const KnownPlaces& 
                 "camera: vlp-rotation finds it from captures at two heights");
     return result;
   }
-  const CapturesWith captures_with = [&](const Calibration& calibration) {
+  const CapturesFor captures_for = [&](const Calibration& calibration) {
     if (!of_axis) return places.captures;
     Calibration without = calibration;
     without.dispersion.reset();
-    return at_cameras(places, input.lamps, without);
+    return move_places_to_camera(places, input.lamps, without);
   };
-  const std::vector<StationCapture> captures = captures_with(levelled);
+  const std::vector<ReferencePointCapture> captures = captures_for(levelled);
   result.fit = fit_dispersion(captures, input.lamps, input.calibration, method, circle);
   const DispersionFit& fit = result.fit;
-  std::string why(explanation_of(fit.status));
+  std::string why(describe(fit.status));
   if (fit.status == DispersionStatus::no_fix) {
-    why += fmt::format("; the first: {}", explanation_of(fit.no_fix_status));
+    why += fmt::format("; the first: {}", describe(fit.no_fix_status));
   }
   if (fit.status != DispersionStatus::ok) {
     const bool is_far = fit.status == DispersionStatus::station_far;
@@ -202,7 +211,7 @@ DispersionResult solve_dispersion(const LampCaptures& input, const KnownPlaces& 
     const bool is_of_captures = fit.status == DispersionStatus::too_few_captures ||
                                 fit.status == DispersionStatus::one_yaw ||
                                 fit.status == DispersionStatus::many_yaws;
-    if (!is_far && !is_of_captures) blame_map(input, levelled, result);
+    if (!is_far && !is_of_captures) explain_failure_by_map(input, levelled, result);
     return result;
   }
   if (!input.calibration.rotation_center) {
@@ -217,11 +226,12 @@ DispersionResult solve_dispersion(const LampCaptures& input, const KnownPlaces& 
     result.metrics.push_back({"world_mm", millimetres * world_m->norm()});
   }
   if (of_axis) {
-    add_lever_arm(result.fit.dispersion, input, mean_height_m(places, input.lamps, levelled));
+    add_lever_arm_covariance(result.fit.dispersion, input,
+                             compute_mean_height_m(places, input.lamps, levelled));
   }
-  pass_on(result, captures_with, input, method, circle);
+  propagate_uncertainty(result, captures_for, input, method, circle);
   result.calibration = with_dispersion(input.calibration, fit.dispersion, std::move(entry));
-  result.drawing = [fit] { return drawing_of(plot_of("Fixes at a known station", fit)); };
+  result.drawing = [fit] { return make_drawing(make_plot("Fixes at a known station", fit)); };
   return result;
 }
 

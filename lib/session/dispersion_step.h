@@ -15,7 +15,7 @@ namespace vlp {
 
 /// Captures at known places.
 struct KnownPlaces {
-  std::vector<StationCapture> captures;
+  std::vector<ReferencePointCapture> captures;
   /// Point to which each place refers, in the order of `captures`: camera or axis.
   std::vector<PlaceOf> of = {};
   /// Number of captures without a place.
@@ -24,9 +24,9 @@ struct KnownPlaces {
 
 /// Collects the captures at known places, with the inclinations of the table. A place is that of
 /// the table, or `place_m` of the point `place_of` for captures without one in the table.
-KnownPlaces at_known_places(std::span<const Frame> frames, const CapturesTable& table,
-                            const std::optional<Eigen::Vector2d>& place_m = {},
-                            PlaceOf place_of = PlaceOf::camera);
+KnownPlaces collect_known_places(std::span<const Frame> frames, const CapturesTable& table,
+                                 const std::optional<Eigen::Vector2d>& place_m = {},
+                                 PlaceOf place_of = PlaceOf::camera);
 
 /// Result of solve_dispersion().
 struct DispersionResult : StepResult {

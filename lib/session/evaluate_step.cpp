@@ -22,9 +22,9 @@ void add_drive(Report& report, const Drive& drive) {
     throw InputError(fixes.file, "no line can be fitted to its fixes: they have no direction");
   }
   const std::string name = fixes.file.filename().string();
-  const auto figures = report_figures(name, *fit);
-  report.figures.insert(report.figures.end(), figures.begin(), figures.end());
-  report.pictures.push_back(drive_picture(name, fixes.rows, commanded_m, *fit));
+  const auto metrics = make_report_statistics(name, *fit);
+  report.metrics.insert(report.metrics.end(), metrics.begin(), metrics.end());
+  report.pictures.push_back(make_drive_plot(name, fixes.rows, commanded_m, *fit));
 }
 
 void add_warnings(EvaluateResult& result, const EvaluationInput& input) {
@@ -36,18 +36,18 @@ void add_warnings(EvaluateResult& result, const EvaluationInput& input) {
   if (input.line_m && !evaluation.fit) {
     result.warnings.emplace_back("no line is fitted: the fixes are spread in no direction");
   }
-  if (std::string warning = warning_of_limit(evaluation); !warning.empty()) {
+  if (std::string warning = make_limit_warning(evaluation); !warning.empty()) {
     result.warnings.push_back(std::move(warning));
   }
   if (!result.caution.empty()) result.warnings.push_back(result.caution);
-  for (std::string& warning : sample_size_warnings(evaluation)) {
+  for (std::string& warning : make_sample_size_warnings(evaluation)) {
     result.notes.push_back(std::move(warning));
   }
 }
 
 }  // namespace
 
-double place_radius_m(const Calibration& calibration) {
+double compute_place_radius_m(const Calibration& calibration) {
   constexpr double repeated_m = 1e-3;
   const auto& center = calibration.rotation_center;
   return repeated_m + (center && center->lever_arm_m ? 2 * center->lever_arm_m->norm() : 0);
@@ -67,29 +67,30 @@ EvaluateResult evaluate_fixes(const EvaluationInput& input, const std::vector<Ga
                 input.fixes.file);
     return result;
   }
-  result.metrics = metrics_of(evaluation);
+  result.metrics = collect_metrics(evaluation);
   result.gates = check_gates(gates, result.metrics);
-  result.caution = unasked_missing(evaluation, result.gates);
+  result.caution = make_missing_fixes_warning(evaluation, result.gates);
   add_warnings(result, input);
   return result;
 }
 
-std::string report_page(EvaluationReport subject) {
-  Report& report = subject.page;
-  report.caution = subject.result.caution;
-  report.figures = report_figures(subject.result.evaluation);
-  report.notes = report_notes(subject.result.evaluation);
-  report.title = "Accuracy report: " + subject.input.fixes.file.filename().string();
+std::string render_report_page(EvaluationReport report_content) {
+  Report& report = report_content.page;
+  report.caution = report_content.result.caution;
+  report.metrics = make_report_statistics(report_content.result.evaluation);
+  report.notes = make_report_notes(report_content.result.evaluation);
+  report.title = "Accuracy report: " + report_content.input.fixes.file.filename().string();
   if (report.calibration && !report.calibration->camera.id.empty()) {
     report.title = "Accuracy report: " + report.calibration->camera.id;
   }
-  for (const Drive& drive : subject.drives) add_drive(report, drive);
-  for (auto& picture :
-       evaluation_pictures(subject.input, subject.result.evaluation, subject.lamps)) {
+  for (const Drive& drive : report_content.drives) add_drive(report, drive);
+  for (auto& picture : make_evaluation_plots(report_content.input, report_content.result.evaluation,
+                                             report_content.lamps)) {
     report.pictures.push_back(std::move(picture));
   }
   if (report.calibration) {
-    auto budget = budget_picture(subject.input.fixes.rows, subject.lamps, *report.calibration);
+    auto budget = make_budget_plot(report_content.input.fixes.rows, report_content.lamps,
+                                   *report.calibration);
     if (budget) report.pictures.push_back(std::move(*budget));
   }
   if (report.evaluation) report.evaluation->part = "evaluation";

@@ -22,7 +22,7 @@ struct EvaluateResult : StepResult {
 
 /// Returns the distance within which captures are at the same place, in m: 1 mm plus twice the
 /// length of the calibration's lever arm.
-double place_radius_m(const Calibration& calibration);
+double compute_place_radius_m(const Calibration& calibration);
 
 /// Evaluates fixes against ground truth. Metrics: all that gates can limit (metrics_of()). Failure:
 /// undetermined, if no capture has a fix. Throws InputError if the image names do not match.
@@ -41,12 +41,12 @@ struct EvaluationReport {
   LampMap lamps;
   std::vector<Drive> drives;
   /// Other content: the gates of all steps, the calibration, its plots, and the history entry of
-  /// the evaluation. report_page() adds title, metrics, notes and plots of the fixes.
+  /// the evaluation. render_report_page() adds title, metrics, notes and plots of the fixes.
   Report page;
 };
 
 /// Renders the report as HTML (report_html()). Throws InputError if no line can be fitted to a
 /// drive.
-std::string report_page(EvaluationReport report);
+std::string render_report_page(EvaluationReport report);
 
 }  // namespace vlp

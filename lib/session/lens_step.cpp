@@ -26,7 +26,7 @@ IntrinsicsReport make_report(const LensEstimate& lens) {
   std::optional<std::array<double, 2>> board_warp_m;
   if (solution.solved_for.warp) {
     const Eigen::Vector2d warp_m =
-        solution.problem.warp_m.cwiseProduct(lens.lattice->warp_of_board());
+        solution.problem.warp_m.cwiseProduct(lens.lattice->board_warp_ratio());
     board_warp_m = {warp_m.x(), warp_m.y()};
   }
   return {static_cast<int>(solution.views.size()),
@@ -36,7 +36,7 @@ IntrinsicsReport make_report(const LensEstimate& lens) {
           board_warp_m,
           lens.report.uncertainty_worst_px,
           lens.intrinsics_covariance,
-          lens.report.region_share > kWholeImage ? ImageRegion() : lens.report.region};
+          lens.report.region_fraction > kWholeImage ? ImageRegion() : lens.report.region};
 }
 
 Camera make_camera(Camera camera, const BoardProblem& problem) {
@@ -63,7 +63,7 @@ LensResult solve_lens(LensInput input, HistoryEntry entry) {
   LensResult result;
   add_remarks(input.seen, result);
   if (!result.ok()) return result;
-  LensViews views{kept_views(input.seen.images),
+  LensViews views{collect_kept_views(input.seen.images),
                   input.board,
                   input.camera.lens_model,
                   input.held_out,
@@ -91,19 +91,19 @@ LensResult solve_lens(LensInput input, HistoryEntry entry) {
   }
   const Camera camera = make_camera(input.camera, lens.solution.problem);
   result.calibration = with_camera(camera, make_report(lens), std::move(entry));
-  result.metrics = lens_metrics(lens);
-  const std::string title = fmt::format("{}, {}", camera.id, name_of(camera.lens_model));
+  result.metrics = collect_lens_metrics(lens);
+  const std::string title = fmt::format("{}, {}", camera.id, to_string(camera.lens_model));
   result.drawing = [title, solution = lens.solution, lattice = *lens.lattice,
                     sharpness = lens.sharpness] {
-    return drawing_of(plot_of(title, solution, lattice, sharpness));
+    return make_drawing(make_plot(title, solution, lattice, sharpness));
   };
   return result;
 }
 
-std::vector<Metric> lens_metrics(const LensEstimate& lens) {
+std::vector<Metric> collect_lens_metrics(const LensEstimate& lens) {
   std::vector<Metric> metrics{{"rms_px", lens.solution.rms_px},
                               {"uncertainty_px", lens.report.uncertainty_worst_px},
-                              {"coverage", lens.coverage.share},
+                              {"coverage", lens.coverage.covered_fraction},
                               {"views", static_cast<double>(lens.solution.views.size())},
                               {"board_tilt_deg", deg_from_rad(lens.coverage.tilt_rad)}};
   if (lens.report.halves) metrics.push_back({"halves_px", lens.report.halves->rms_px});
@@ -119,7 +119,7 @@ std::vector<Metric> lens_metrics(const LensEstimate& lens) {
   return metrics;
 }
 
-std::vector<Gate> lens_gates() {
+std::vector<Gate> default_lens_gates() {
   return {{"rms_px", 1},     {"uncertainty_px", 2}, {"halves_px", 1},
           {"coverage", 0.4}, {"views", 6},          {"board_tilt_deg", 20}};
 }

@@ -33,7 +33,7 @@ struct LensResult : StepResult {
 };
 
 /// Estimates the lens from images of a board, with its uncertainty (estimate_lens()).
-/// Warnings and skipped images include those of the intake. Metrics: lens_metrics().
+/// Warnings and skipped images include those of the intake. Metrics: collect_lens_metrics().
 /// Failures: wrong_board, undetermined. Throws std::invalid_argument as BoardLattice does.
 LensResult solve_lens(LensInput input, HistoryEntry entry);
 
@@ -43,10 +43,10 @@ LensResult solve_lens(LensInput input, HistoryEntry entry);
 ///   board_print_px                      for a board with print_sd
 ///   mtf50, mtf50_worst_ratio, mtf50_asymmetry, black_ratio, local_loss, local_shadow
 ///                                       from the edges of AprilTags
-std::vector<Metric> lens_metrics(const LensEstimate& lens);
+std::vector<Metric> collect_lens_metrics(const LensEstimate& lens);
 
-/// Returns the default limits of lens_metrics(), chosen from rendered and real boards of 800 to
-/// 4000 px.
+/// Returns the default limits of collect_lens_metrics(), chosen from rendered and real boards of
+/// 800 to 4000 px.
 ///
 ///   rms_px <= 1            larger: blurred images or the wrong lens model
 ///   uncertainty_px <= 2    larger: too few views, or too similar ones
@@ -55,6 +55,6 @@ std::vector<Metric> lens_metrics(const LensEstimate& lens);
 ///
 /// The last three require a tilted board in several places over most of the image, which the
 /// metrics of the fit do not check.
-std::vector<Gate> lens_gates();
+std::vector<Gate> default_lens_gates();
 
 }  // namespace vlp

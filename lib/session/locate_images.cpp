@@ -35,7 +35,7 @@ class TiltedCaptures {
         base_from_camera_(level_from_camera(input.calibration, input.how.correction)) {
     for (std::size_t i = 0; i < input.frames.size(); ++i) {
       const Frame& frame = input.frames[i];
-      if (sensors_of(frame.image, input).inclination_sigma_rad > 0) {
+      if (make_sensors(frame.image, input).inclination_sigma_rad > 0) {
         captures_.push_back({i, frame.detections});
       }
     }
@@ -80,7 +80,7 @@ class TiltedCaptures {
     const std::vector<Fix> first = fixes_;
     LevelRotations levels;
     for (TiltedCapture& capture : captures_) {
-      const double sd_rad = sensors_of(image_name(capture), input_).inclination_sigma_rad;
+      const double sd_rad = make_sensors(image_name(capture), input_).inclination_sigma_rad;
       if (sd_rad <= max_small_tilt_rad && fixes_[capture.frame].ok()) continue;
       capture.level.emplace();
       levels.emplace(image_name(capture), std::nullopt);
@@ -106,7 +106,8 @@ class TiltedCaptures {
       capture.has_converged = capture.has_converged || !fix.ok() || !fix.body;
       if (capture.has_converged) continue;
       const double yaw_in_robot_rad = input_.how.mount ? input_.how.mount->yaw_in_robot_rad : 0;
-      capture.level = level_rotation(fix.body->inclination, yaw_in_robot_rad, base_from_camera_);
+      capture.level =
+          compute_level_rotation(fix.body->inclination, yaw_in_robot_rad, base_from_camera_);
       levels.emplace(image_name(capture), *capture.level);
     }
     const std::vector<Fix> before = fixes_;
@@ -123,7 +124,7 @@ class TiltedCaptures {
     if (!after.ok()) return true;
     Eigen::Vector4d change;
     change << after.estimate.pose.position_m - before.estimate.pose.position_m,
-        wrapped_rad(after.estimate.pose.yaw_rad - before.estimate.pose.yaw_rad);
+        wrap_rad(after.estimate.pose.yaw_rad - before.estimate.pose.yaw_rad);
     const Eigen::Vector4d sd = after.noise_covariance.diagonal().cwiseSqrt();
     return (change.cwiseAbs().array() <= tolerance_sd * sd.array()).all();
   }
@@ -179,7 +180,7 @@ LocatedImages locate_images(const LampImages& images, ImageUse use, LocateInput 
   seen.notes.insert(seen.notes.end(), first.notes.begin(), first.notes.end());
   seen.warnings.insert(seen.warnings.end(), first.warnings.begin(), first.warnings.end());
   check_lamps_seen(images, seen);
-  input.frames = kept_frames(seen.images);
+  input.frames = collect_kept_frames(seen.images);
   const LampIntake without_pictures = intake.with_annotate({});
   std::map<std::string, Observation> latest;
   const LevelRotations levels = redetect_tilted(input, [&](const LevelRotations& tilted) {
@@ -187,7 +188,7 @@ LocatedImages locate_images(const LampImages& images, ImageUse use, LocateInput 
     for (const Observation& image : repeated.images) {
       if (image.is_kept()) latest.insert_or_assign(image.name(), image);
     }
-    return kept_frames(repeated.images);
+    return collect_kept_frames(repeated.images);
   });
   for (Observation& image : seen.images) {
     const auto repeated = latest.find(image.name());

@@ -21,14 +21,14 @@
 
 namespace vlp {
 
-Sensors sensors_of(const std::string& image, const LocateInput& input) {
+Sensors make_sensors(const std::string& image, const LocateInput& input) {
   Sensors sensors;
   sensors.motion = input.motion;
-  sensors.inclination_sigma_rad = input.lean_sd_rad;
+  sensors.inclination_sigma_rad = input.roll_pitch_sd_rad;
   const auto entry = input.captures.find(image);
   if (entry == input.captures.end()) return sensors;
   const Capture& capture = entry->second;
-  sensors.motion = motion_of(capture, input.motion, input.yaw_rate_sd_rad_per_s);
+  sensors.motion = find_motion(capture, input.motion, input.yaw_rate_sd_rad_per_s);
   sensors.time_s = capture.time_s;
   if (capture.inclination) {
     sensors.inclination = capture.inclination;
@@ -49,12 +49,12 @@ Sensors sensors_of(const std::string& image, const LocateInput& input) {
 namespace {
 
 /// Longest time between the frames of a joint fix.
-constexpr double kLongestTogether_s = 0.2;
+constexpr double kMaxJointInterval_s = 0.2;
 
 class EarlierFrames {
  public:
   explicit EarlierFrames(const LocateInput& input) : input_(input) {
-    if (input.frames_together < 2) return;
+    if (input.window_size < 2) return;
     for (std::size_t i = 0; i < input.frames.size(); ++i) {
       const auto entry = input.captures.find(input.frames[i].image);
       if (entry == input.captures.end() || !entry->second.time_s) continue;
@@ -66,11 +66,11 @@ class EarlierFrames {
     if (!time_s) return earlier;
     auto at = by_time_.lower_bound(*time_s);
     while (at != by_time_.begin() &&
-           earlier.size() + 1 < static_cast<std::size_t>(input_.frames_together)) {
+           earlier.size() + 1 < static_cast<std::size_t>(input_.window_size)) {
       --at;
       const double before_s = *time_s - at->first;
-      constexpr double rounding_s = 1e-6;
-      if (before_s > kLongestTogether_s + rounding_s) break;
+      constexpr double tolerance_s = 1e-6;
+      if (before_s > kMaxJointInterval_s + tolerance_s) break;
       earlier.push_back({input_.frames[at->second].detections, before_s});
     }
     return earlier;
@@ -83,23 +83,23 @@ class EarlierFrames {
 
 /// Estimates a joint fix with the earlier frames. If that fails, as after a change of velocity,
 /// estimates the fix of the frame alone.
-Fix fix_of(const Frame& frame, const Positioner& positioner, const EarlierFrames& frames,
-           const Sensors& sensors) {
+Fix locate_frame(const Frame& frame, const Positioner& positioner, const EarlierFrames& frames,
+                 const Sensors& sensors) {
   const auto earlier = frames.before(sensors.time_s);
   if (!earlier.empty() && sensors.motion) {
-    const Fix together = positioner.locate(frame.detections, sensors, earlier);
-    if (together.ok()) return together;
+    const Fix joint_fix = positioner.locate(frame.detections, sensors, earlier);
+    if (joint_fix.ok()) return joint_fix;
   }
   return positioner.locate(frame.detections, sensors);
 }
 
-std::vector<Fix> locate_all(const LocateInput& input, const PositionerOptions& how) {
+std::vector<Fix> locate_all_frames(const LocateInput& input, const PositionerOptions& how) {
   const Positioner positioner(input.lamps, input.calibration, how);
   const EarlierFrames frames(input);
   std::vector<Fix> fixes;
   fixes.reserve(input.frames.size());
   for (const Frame& frame : input.frames) {
-    fixes.push_back(fix_of(frame, positioner, frames, sensors_of(frame.image, input)));
+    fixes.push_back(locate_frame(frame, positioner, frames, make_sensors(frame.image, input)));
   }
   return fixes;
 }
@@ -108,14 +108,14 @@ void check_motion(const LocateInput& input) {
   const bool motion =
       input.motion ||
       std::any_of(input.frames.begin(), input.frames.end(), [&](const Frame& frame) {
-        const auto known = sensors_of(frame.image, input).motion;
+        const auto known = make_sensors(frame.image, input).motion;
         return known && moves(*known);
       });
   if (motion) check_row_time(input.calibration.camera);
 }
 
 /// Returns the input with LocateInput::sigma_px in all detections.
-LocateInput with_sigma(LocateInput input) {
+LocateInput apply_given_sigma(LocateInput input) {
   for (Frame& frame : input.frames) {
     for (Detection& detection : frame.detections) detection.sigma_px = input.sigma_px;
   }
@@ -123,13 +123,14 @@ LocateInput with_sigma(LocateInput input) {
   return input;
 }
 
-bool states_sigma(const Frame& frame) {
+bool has_sigma(const Frame& frame) {
   return std::all_of(frame.detections.begin(), frame.detections.end(),
                      [](const Detection& detection) { return detection.sigma_px.has_value(); });
 }
 
-FixRow row_of(const Frame& frame, const CapturesTable& captures, const Fix& fix, bool noise_known) {
-  FixRow row{frame.image, std::string(name_of(fix.status)), {}, fix.lamps};
+FixRow make_fix_row(const Frame& frame, const CapturesTable& captures, const Fix& fix,
+                    bool noise_known) {
+  FixRow row{frame.image, std::string(to_string(fix.status)), {}, fix.lamps};
   if (const auto entry = captures.find(frame.image); entry != captures.end()) {
     row.time_s = entry->second.time_s;
   }
@@ -162,24 +163,24 @@ bool warn_of_noise(LocateResult& result, const std::vector<Frame>& frames, doubl
       stated_px = std::max(stated_px, detection.sigma_px.value_or(0));
     }
   }
-  constexpr double too_noisy = 3;
-  const auto shown_px = estimate_noise_px(sum_residuals(result.fixes));
-  if (shown_px && stated_px > 0) {
-    result.metrics.push_back({"residual_ratio", *shown_px / stated_px});
+  constexpr double max_noise_ratio = 3;
+  const auto estimated_px = estimate_noise_px(sum_residuals(result.fixes));
+  if (estimated_px && stated_px > 0) {
+    result.metrics.push_back({"residual_ratio", *estimated_px / stated_px});
   }
-  if (!shown_px || *shown_px <= too_noisy * stated_px) return false;
+  if (!estimated_px || *estimated_px <= max_noise_ratio * stated_px) return false;
   result.warnings.push_back(fmt::format(
       "the residuals show {:.2g} px of noise, {:.2g} px are stated: {}; are calibration and lamp "
       "map "
       "right and complete?",
-      *shown_px, stated_px, factor > 1 ? "sd follows the residuals" : "sd is too small"));
+      *estimated_px, stated_px, factor > 1 ? "sd follows the residuals" : "sd is too small"));
   return true;
 }
 
 /// Returns true if no motion of the camera is given.
-bool is_taken_to_stand(const LocateInput& input) {
+bool is_assumed_standing(const LocateInput& input) {
   return std::none_of(input.frames.begin(), input.frames.end(), [&](const Frame& frame) {
-    return sensors_of(frame.image, input).motion.has_value();
+    return make_sensors(frame.image, input).motion.has_value();
   });
 }
 
@@ -213,14 +214,14 @@ std::optional<double> find_speed_m_per_s(const std::vector<Fix>& fixes) {
 /// Criterion: half as many failures, or half the residual.
 void warn_of_motion(LocateResult& result, const LocateInput& input, bool is_noisy) {
   const std::size_t failed = input.frames.size() - count_fixes(result.fixes);
-  if (!row_clock_of(input.calibration.camera) || !is_taken_to_stand(input) ||
+  if (!make_row_clock(input.calibration.camera) || !is_assumed_standing(input) ||
       (!is_noisy && 2 * failed < input.frames.size())) {
     return;
   }
   constexpr double max_speed_m_per_s = 3, max_yaw_rate_rad_per_s = 2;
   LocateInput moving = input;
   moving.motion = KnownMotion::up_to(max_speed_m_per_s, max_yaw_rate_rad_per_s);
-  const std::vector<Fix> fixes = locate_all(moving, input.how);
+  const std::vector<Fix> fixes = locate_all_frames(moving, input.how);
   const auto standing_px = estimate_noise_px(sum_residuals(result.fixes));
   const auto moving_px = estimate_noise_px(sum_residuals(fixes));
   const std::size_t still_failed = input.frames.size() - count_fixes(fixes);
@@ -244,7 +245,7 @@ void warn_of_motion(LocateResult& result, const LocateInput& input, bool is_nois
 std::vector<Fix> locate_with_expected_residuals(const LocateInput& input) {
   PositionerOptions how = input.how;
   how.computes_common_chi_squared = true;
-  return locate_all(input, how);
+  return locate_all_frames(input, how);
 }
 
 /// Scales the given noise of all detections and removes the detections that `fixes` reject.
@@ -255,8 +256,8 @@ LocateInput scale_stated_noise(LocateInput input, const std::vector<Fix>& fixes,
         fix.rejected_ids.begin() +
         std::min(static_cast<std::ptrdiff_t>(fix.rejected_lamps), std::ssize(fix.rejected_ids));
     std::vector<Detection>& detections = input.frames[i].detections;
-    std::erase_if(detections, [&](const Detection& one) {
-      return std::find(fix.rejected_ids.begin(), rejected_end, one.lamp) != rejected_end;
+    std::erase_if(detections, [&](const Detection& detection) {
+      return std::find(fix.rejected_ids.begin(), rejected_end, detection.lamp) != rejected_end;
     });
     for (Detection& detection : detections) {
       if (!detection.sigma_px) continue;
@@ -269,13 +270,13 @@ LocateInput scale_stated_noise(LocateInput input, const std::vector<Fix>& fixes,
 /// Locates frames again, with scaled noise, from the lamps that their fixes use.
 void locate_again(const LocateInput& input, const PositionerOptions& how, double factor,
                   std::vector<Fix>& fixes) {
-  std::vector<Fix> again = locate_all(scale_stated_noise(input, fixes, factor), how);
+  std::vector<Fix> rescaled = locate_all_frames(scale_stated_noise(input, fixes, factor), how);
   for (std::size_t i = 0; i < fixes.size(); ++i) {
-    if (!fixes[i].ok() || !again[i].ok()) continue;
-    again[i].rejected_lamps = fixes[i].rejected_lamps;
-    again[i].rejected_ids = fixes[i].rejected_ids;
-    again[i].unknown_lamps = fixes[i].unknown_lamps;
-    fixes[i] = again[i];
+    if (!fixes[i].ok() || !rescaled[i].ok()) continue;
+    rescaled[i].rejected_lamps = fixes[i].rejected_lamps;
+    rescaled[i].rejected_ids = fixes[i].rejected_ids;
+    rescaled[i].unknown_lamps = fixes[i].unknown_lamps;
+    fixes[i] = rescaled[i];
   }
 }
 
@@ -285,7 +286,7 @@ bool locate_with_noise(const LocateInput& input, LocateResult& result) {
   result.fixes = locate_with_expected_residuals(input);
   std::vector<Fix> stated, unstated;
   for (std::size_t i = 0; i < input.frames.size(); ++i) {
-    (states_sigma(input.frames[i]) ? stated : unstated).push_back(result.fixes[i]);
+    (has_sigma(input.frames[i]) ? stated : unstated).push_back(result.fixes[i]);
   }
   const ResidualSums residuals = sum_residuals(stated);
   const double factor = estimate_birge_ratio(residuals);
@@ -346,17 +347,18 @@ void mark_outside_region(LocateResult& result, const LocateInput& input) {
     ++fixes;
     const auto& detections = input.frames[i].detections;
     const auto& rejected = result.rows[i].rejected;
-    auto& marked = result.rows[i].outside_region;
-    for (const Detection& one : detections) {
-      if (polygon_contains(report->region_px, one.pixel)) continue;
-      if (find_lamp(input.lamps.lamps, one.lamp) == nullptr) continue;
-      if (std::find(rejected.begin(), rejected.end(), one.lamp) != rejected.end()) continue;
-      marked.push_back(one.lamp);
+    auto& lamps_outside = result.rows[i].outside_region;
+    for (const Detection& detection : detections) {
+      if (polygon_contains(report->region_px, detection.pixel)) continue;
+      if (find_lamp(input.lamps.lamps, detection.lamp) == nullptr) continue;
+      if (std::find(rejected.begin(), rejected.end(), detection.lamp) != rejected.end()) continue;
+      lamps_outside.push_back(detection.lamp);
     }
-    if (marked.empty()) continue;
+    if (lamps_outside.empty()) continue;
     ++outside;
     result.details.push_back(fmt::format("{}: {} of {} lamps are where the lens is not known",
-                                         input.frames[i].image, marked.size(), detections.size()));
+                                         input.frames[i].image, lamps_outside.size(),
+                                         detections.size()));
   }
   if (outside == 0) return;
   result.warnings.push_back(fmt::format(
@@ -383,7 +385,7 @@ MapErrors find_errors_while_standing(const LocateInput& input, const std::vector
   std::vector<Frame> frames;
   MapErrorOptions options;
   for (std::size_t i = 0; i < input.frames.size(); ++i) {
-    const Sensors sensors = sensors_of(input.frames[i].image, input);
+    const Sensors sensors = make_sensors(input.frames[i].image, input);
     if (sensors.motion && moves(*sensors.motion)) continue;
     const auto& body = fixes[i].body;
     frames.push_back(input.frames[i]);
@@ -432,13 +434,14 @@ void warn_of_rejected_lamps(LocateResult& result, const LocateInput& input,
 }  // namespace
 
 LocateResult locate_frames(const LocateInput& input) {
-  if (input.sigma_px) return locate_frames(with_sigma(input));
+  if (input.sigma_px) return locate_frames(apply_given_sigma(input));
   check_motion(input);
   LocateResult result;
   const bool noise_known = locate_with_noise(input, result);
   result.rows.reserve(result.fixes.size());
   for (std::size_t i = 0; i < result.fixes.size(); ++i) {
-    result.rows.push_back(row_of(input.frames[i], input.captures, result.fixes[i], noise_known));
+    result.rows.push_back(
+        make_fix_row(input.frames[i], input.captures, result.fixes[i], noise_known));
   }
   warn_of_image(result, input);
   mark_outside_region(result, input);
@@ -461,9 +464,8 @@ LocateResult locate_frames(const LocateInput& input) {
   }
   result.summary = summarize(result.rows);
   if (result.summary.fixes == 0) {
-    result.fail(StepFailure::undetermined,
-                fmt::format("no frame has a fix; the first: {}",
-                            explanation_of(result.fixes.front().status)));
+    result.fail(StepFailure::undetermined, fmt::format("no frame has a fix; the first: {}",
+                                                       describe(result.fixes.front().status)));
   }
   return result;
 }

@@ -39,18 +39,18 @@ struct LocateInput {
   double yaw_rate_sd_rad_per_s = 0;
   /// Standard deviation of roll and pitch of captures without an inclination in `captures`, about
   /// level; 0: level.
-  double lean_sd_rad = 0;
+  double roll_pitch_sd_rad = 0;
   /// Standard deviation of z_m of `captures`. std::nullopt: z_m is not used as a measurement.
   std::optional<double> height_sd_m = {};
   /// Computes the offsets of all lamps (StepResult::lamp_offsets).
   bool lamp_offsets = false;
   /// Number of captures in a joint fix with a common velocity: the capture and those up to 0.2 s
   /// before it.
-  int frames_together = 1;
+  int window_size = 1;
 };
 
 /// Returns the sensor data of a capture: motion, time, inclination, height and yaw.
-Sensors sensors_of(const std::string& image, const LocateInput& input);
+Sensors make_sensors(const std::string& image, const LocateInput& input);
 
 /// Result of locate_frames().
 struct LocateResult : StepResult {

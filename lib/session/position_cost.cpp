@@ -17,7 +17,7 @@ namespace {
 /// A pose needs three lamps. Where lights are left out, three others may agree by chance.
 constexpr std::size_t kMinLights = 3, kMinMajority = 4;
 /// Standard deviation of roll and pitch of a camera that is mounted, or held, to look up.
-/// fix_body_frame() rejects more than five times this value.
+/// estimate_body_robust() rejects more than five times this value.
 constexpr double kLeanSd_rad = 0.15;
 constexpr double kMaxSquare = kMaxResidualSds * kMaxResidualSds;
 
@@ -74,8 +74,8 @@ std::vector<AssignedLight> assigned_lights(const GroupedLights& image,
 }
 
 /// Makes the frame of the assigned lights, and removes those without a ray from `assigned`.
-BodyFrame make_frame(const GroupedLights& image, std::vector<AssignedLight>& assigned,
-                     const LampMap& lamps, const Lens& lens, double sd_fraction) {
+BodyObservations make_frame(const GroupedLights& image, std::vector<AssignedLight>& assigned,
+                            const LampMap& lamps, const Lens& lens, double sd_fraction) {
   std::vector<Eigen::Vector2d> pixels;
   std::vector<Eigen::Vector3d> positions_m;
   pixels.reserve(image.lights.size());
@@ -83,7 +83,7 @@ BodyFrame make_frame(const GroupedLights& image, std::vector<AssignedLight>& ass
   for (const GroupedLight& light : image.lights) pixels.push_back(light.pixel);
   for (const AssignedLight& light : assigned) positions_m.push_back(light.lamp->position_m);
   const double spread_px = rms_spread(pixels), spread_m = rms_spread(positions_m);
-  BodyFrame frame;
+  BodyObservations frame;
   std::vector<AssignedLight> kept;
   for (const AssignedLight& light : assigned) {
     const auto& [group, pixel, sigma_px] = image.lights[light.index];
@@ -101,7 +101,7 @@ BodyFrame make_frame(const GroupedLights& image, std::vector<AssignedLight>& ass
     kept.push_back(light);
   }
   assigned = std::move(kept);
-  frame.now = frame.size;
+  frame.num_current = frame.size;
   frame.noise_is_stated = false;
   return frame;
 }
@@ -118,20 +118,20 @@ std::vector<double> squared_residuals(const GroupedLights& image, const RowTimeC
   std::vector<double> squares(image.lights.size(), kMaxSquare);
   std::vector<AssignedLight> assigned = assigned_lights(image, candidate, lamps);
   if (assigned.size() < kMinLights || assigned.size() > kMaxSightings) return squares;
-  const BodyFrame frame = make_frame(image, assigned, lamps, lens, tolerance.sd_fraction);
+  const BodyObservations frame = make_frame(image, assigned, lamps, lens, tolerance.sd_fraction);
   if (frame.size < kMinLights) return squares;
   BodyPrior prior;
   prior.inclination_sd_rad = kLeanSd_rad;
-  BodyFrame agreeing = frame;
-  const auto [status, fix] =
-      fix_body_frame(agreeing, Eigen::Vector3d::Zero(), prior, tolerance.max_residual_fraction);
+  BodyObservations agreeing = frame;
+  const auto [status, fix] = estimate_body_robust(agreeing, Eigen::Vector3d::Zero(), prior,
+                                                  tolerance.max_residual_fraction);
   if (!has_pose(status) || agreeing.size < std::min(frame.size, kMinMajority)) return squares;
   const auto& [roll_rad, pitch_rad] = fix.state.motion.inclination;
   const double lean_square = (roll_rad * roll_rad + pitch_rad * pitch_rad) /
                              (kLeanSd_rad * kLeanSd_rad) / static_cast<double>(agreeing.size);
-  const PosedBody body(fix.state);
+  const EvaluatedState body(fix.state);
   for (std::size_t i = 0; i < frame.size; ++i) {
-    const BodySighting& seen = frame.sightings[i];
+    const BodyObservation& seen = frame.sightings[i];
     const Eigen::Vector3d lamp_in_body = body.lamp_in_body(seen.lamp_m, 0);
     const double depth_m = seen.ray.dot(lamp_in_body);
     if (!(depth_m > 0)) continue;

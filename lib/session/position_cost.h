@@ -39,8 +39,8 @@ struct GroupedLights {
 ///                has three lights
 ///
 /// In each image the pose of a camera below the lamps is fitted to the lights with a lamp; its roll
-/// and pitch have a prior of 0.15 rad (sd). fix_body_frame() rejects a minority of wrong lights if
-/// four agree, and rejects a mirrored map. The squared residual of a light is
+/// and pitch have a prior of 0.15 rad (sd). estimate_body_robust() rejects a minority of wrong
+/// lights if four agree, and rejects a mirrored map. The squared residual of a light is
 ///
 ///     r^2 = |pixel - predicted pixel|^2 / sd^2 + (lean / 0.15 rad)^2 / lights,
 ///     sd^2 = sigma_px^2 + (spread_px max(e, sd_m / spread_m))^2

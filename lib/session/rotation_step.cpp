@@ -22,7 +22,7 @@
 namespace vlp {
 namespace {
 
-std::string name_of(RotationMethod method) {
+std::string to_string(RotationMethod method) {
   switch (method) {
     case RotationMethod::axis:
       return "axis";
@@ -34,10 +34,11 @@ std::string name_of(RotationMethod method) {
   return "";
 }
 
-RotationFit fit_of(const SpotCaptures& spot, const Camera& camera, RotationMethod method) {
+RotationFit fit_rotation(const RotationCaptures& spot, const Camera& camera,
+                         RotationMethod method) {
   switch (method) {
     case RotationMethod::axis:
-      return fit_turning_axis(spot, camera);
+      return fit_rotation_axis(spot, camera);
     case RotationMethod::joint:
       return fit_joint_center(spot, camera);
     case RotationMethod::circle:
@@ -47,7 +48,7 @@ RotationFit fit_of(const SpotCaptures& spot, const Camera& camera, RotationMetho
 }
 
 /// Returns the zenith point and, if known, the lever arm.
-Eigen::VectorXd solved_of(const RotationCenter& center) {
+Eigen::VectorXd make_solution_vector(const RotationCenter& center) {
   Eigen::VectorXd solved(center.lever_arm_m ? 4 : 2);
   solved.head<2>() = zenith_point(center);
   if (center.lever_arm_m) solved.tail<2>() = *center.lever_arm_m;
@@ -55,19 +56,20 @@ Eigen::VectorXd solved_of(const RotationCenter& center) {
 }
 
 /// Propagates the errors of the lens into zenith and lever arm, if the covariance of the lens is
-/// known. `center_with` estimates the center with another lens; std::nullopt if that fails.
-void pass_on_lens(
+/// known. `center_for` estimates the center with another lens; std::nullopt if that fails.
+void propagate_lens_errors(
     RotationCenter& center, const LampCaptures& input,
-    const std::function<std::optional<RotationCenter>(const Camera& camera)>& center_with,
+    const std::function<std::optional<RotationCenter>(const Camera& camera)>& center_for,
     StepResult& result) {
   const auto& report = input.calibration.intrinsics_report;
   if (!report || !report->covariance) return;
   const auto with_error = [&](const Eigen::VectorXd& error) -> std::optional<Eigen::VectorXd> {
-    const auto moved = center_with(with_lens_error(camera_alone(input.calibration), error).camera);
+    const auto moved = center_for(with_lens_error(extract_camera(input.calibration), error).camera);
     if (!moved || moved->lever_arm_m.has_value() != center.lever_arm_m.has_value()) return {};
-    return solved_of(*moved);
+    return make_solution_vector(*moved);
   };
-  if (const auto jacobian = jacobian_of(with_error, solved_of(center), *report->covariance)) {
+  if (const auto jacobian =
+          estimate_jacobian(with_error, make_solution_vector(center), *report->covariance)) {
     center.by_intrinsics = jacobian->topRows(2);
     if (center.lever_arm_m) center.lever_arm_by_intrinsics = jacobian->bottomRows(2);
     return;
@@ -78,31 +80,32 @@ void pass_on_lens(
 }
 
 /// Returns true if two sets of captures have the same sightings in the same order.
-bool has_same_sightings(const SpotCaptures& a, const SpotCaptures& b) {
+bool has_same_sightings(const RotationCaptures& a, const RotationCaptures& b) {
   return a.heights.size() == b.heights.size() &&
          std::equal(a.captures.begin(), a.captures.end(), b.captures.begin(), b.captures.end(),
                     [](const auto& one, const auto& other) { return one.image == other.image; }) &&
-         std::equal(a.sightings.begin(), a.sightings.end(), b.sightings.begin(), b.sightings.end(),
-                    [](const auto& one, const auto& other) {
+         std::equal(a.observations.begin(), a.observations.end(), b.observations.begin(),
+                    b.observations.end(), [](const auto& one, const auto& other) {
                       return one.capture == other.capture && one.lamp == other.lamp;
                     });
 }
 
 /// Propagates the errors of the lens through a fit of the same sightings. A fit that rejects other
 /// sightings changes by more than the lens causes.
-void pass_on_lens(RotationResult& result, const LampCaptures& input, RotationMethod method) {
-  const auto center_with = [&](const Camera& camera) -> std::optional<RotationCenter> {
-    const SpotCaptures spot = spot_captures(input.frames, input.lamps, camera);
-    if (spot.status != SpotStatus::ok || !has_same_sightings(spot, result.spot)) return {};
-    const RotationFit fit = fit_of(spot, camera, method);
-    if (!fit.converged || fit.used_sightings != result.fit.used_sightings) return {};
+void propagate_lens_errors(RotationResult& result, const LampCaptures& input,
+                           RotationMethod method) {
+  const auto center_for = [&](const Camera& camera) -> std::optional<RotationCenter> {
+    const RotationCaptures spot = find_rotation_captures(input.frames, input.lamps, camera);
+    if (spot.status != RotationStatus::ok || !has_same_sightings(spot, result.spot)) return {};
+    const RotationFit fit = fit_rotation(spot, camera, method);
+    if (!fit.converged || fit.used_observations != result.fit.used_observations) return {};
     return fit.center;
   };
-  pass_on_lens(result.fit.center, input, center_with, result);
+  propagate_lens_errors(result.fit.center, input, center_for, result);
 }
 
 /// Formats a height in meters, without a sign if it rounds to zero.
-std::string metres(double z_m) {
+std::string format_height_m(double z_m) {
   const std::string text = fmt::format("{:.3f}", z_m);
   return text == "-0.000" ? "0.000" : text;
 }
@@ -114,7 +117,7 @@ void add_warnings(RotationResult& result) {
         "at one height, under lamps that hang much alike, a lever arm cannot be told from a tilt; "
         "it is taken as zero, and fixes at z = {} m will be of the axis of rotation: add captures "
         "at a second height",
-        metres(heights.front().z_m)));
+        format_height_m(heights.front().z_m)));
   } else if (!result.fit.center.lever_arm_m) {
     result.warnings.push_back(fmt::format(
         "this method takes the lever arm as zero, and the centre is a mean over {} heights: axis "
@@ -126,20 +129,20 @@ void add_warnings(RotationResult& result) {
         "three captures of a height leave no residuals, and the "
         "centre has no standard deviation: add captures, four or more at each height");
   }
-  constexpr double too_noisy = 3;
-  const auto& stated_px = result.spot.stated_px;
-  if (stated_px && result.fit.residual_px > too_noisy * *stated_px) {
+  constexpr double max_noise_ratio = 3;
+  const auto& median_sigma_px = result.spot.median_sigma_px;
+  if (median_sigma_px && result.fit.residual_px > max_noise_ratio * *median_sigma_px) {
     result.warnings.push_back(fmt::format(
         "the residuals show {:.2g} px of noise, {:.2g} px are stated: is the lens calibrated, the "
         "camera beside its axis, the method exact?",
-        result.fit.residual_px, *stated_px));
+        result.fit.residual_px, *median_sigma_px));
   }
 }
 
 void add_metrics(RotationResult& result) {
   const RotationCenter& center = result.fit.center;
   result.metrics = {{"rotation_px", result.fit.residual_px},
-                    {"tilt_deg", deg_from_rad(tilt_of(center).angle_rad)}};
+                    {"tilt_deg", deg_from_rad(compute_tilt(center).angle_rad)}};
   if (!result.circles.circles.empty()) {
     result.metrics.push_back({"rotation_spread_px", result.circles.spread_px});
   }
@@ -176,7 +179,7 @@ constexpr double kMinBlame_px = 2.5;
 
 }  // namespace
 
-Calibration camera_alone(const Calibration& calibration) {
+Calibration extract_camera(const Calibration& calibration) {
   Calibration alone;
   alone.camera = calibration.camera;
   return alone;
@@ -194,7 +197,8 @@ MapErrors check_map(const LampCaptures& input, const Calibration& calibration, S
   return found;
 }
 
-void blame_map(const LampCaptures& input, const Calibration& calibration, StepResult& result) {
+void explain_failure_by_map(const LampCaptures& input, const Calibration& calibration,
+                            StepResult& result) {
   const MapErrors found = find_errors(input, calibration, kMinBlame_px);
   const bool has_lamps = std::any_of(found.errors.begin(), found.errors.end(),
                                      [](const MapError& error) { return !error.lamps.empty(); });
@@ -207,32 +211,32 @@ void blame_map(const LampCaptures& input, const Calibration& calibration, StepRe
 RotationResult solve_rotation(const LampCaptures& input, RotationMethod method,
                               HistoryEntry entry) {
   RotationResult result;
-  check_map(input, camera_alone(input.calibration), result);
+  check_map(input, extract_camera(input.calibration), result);
   if (!result.ok()) return result;
   const Camera& camera = input.calibration.camera;
-  result.spot = spot_captures(input.frames, input.lamps, camera);
-  for (const auto& [image, reason] : result.spot.left_out) {
+  result.spot = find_rotation_captures(input.frames, input.lamps, camera);
+  for (const auto& [image, reason] : result.spot.rejected) {
     result.warnings.push_back(fmt::format("{}: left out: {}", image, reason));
   }
-  if (result.spot.status != SpotStatus::ok) {
-    const bool map = result.spot.status == SpotStatus::other_map;
+  if (result.spot.status != RotationStatus::ok) {
+    const bool map = result.spot.status == RotationStatus::other_map;
     result.fail(map ? StepFailure::wrong_map : StepFailure::undetermined,
-                std::string(explanation_of(result.spot.status)),
+                std::string(describe(result.spot.status)),
                 map ? input.lamps_file : std::filesystem::path());
-    if (map || result.spot.status == SpotStatus::moved) {
-      blame_map(input, camera_alone(input.calibration), result);
+    if (map || result.spot.status == RotationStatus::moved) {
+      explain_failure_by_map(input, extract_camera(input.calibration), result);
     }
     return result;
   }
   result.circles = fit_circle_centers(result.spot, camera);
-  result.fit = fit_of(result.spot, camera, method);
+  result.fit = fit_rotation(result.spot, camera, method);
   if (method == RotationMethod::circle && !result.fit.converged &&
       result.circles.undetermined > 0) {
     result.fail(
         StepFailure::undetermined,
         "the noise of the captures determines most circles, as captures at two yaws do: add "
         "captures at other yaws, twelve over a full turn are good, or take --method joint");
-    blame_map(input, camera_alone(input.calibration), result);
+    explain_failure_by_map(input, extract_camera(input.calibration), result);
     return result;
   }
   if (!result.fit.converged) {
@@ -240,39 +244,39 @@ RotationResult solve_rotation(const LampCaptures& input, RotationMethod method,
                 "no rotation centre fits the captures: take them on one spot at each height, over "
                 "more of the turn, with more of the lamps in view, and see that lens and lamp map "
                 "are right");
-    blame_map(input, camera_alone(input.calibration), result);
+    explain_failure_by_map(input, extract_camera(input.calibration), result);
     return result;
   }
-  pass_on_lens(result, input, method);
+  propagate_lens_errors(result, input, method);
   add_metrics(result);
   add_warnings(result);
   result.calibration = with_rotation_center(input.calibration, result.fit.center, std::move(entry));
-  const std::string title = fmt::format("{}, method {}", camera.id, name_of(method));
+  const std::string title = fmt::format("{}, method {}", camera.id, to_string(method));
   result.drawing = [title, spot = result.spot, circles = result.circles, fit = result.fit, camera] {
-    return drawing_of(plot_of(title, spot, circles, fit, camera));
+    return make_drawing(make_plot(title, spot, circles, fit, camera));
   };
   return result;
 }
 
 LevellingResult solve_levelling(const LampCaptures& input, bool refine_map, HistoryEntry entry) {
   LevellingResult result;
-  const Calibration alone = camera_alone(input.calibration);
+  const Calibration alone = extract_camera(input.calibration);
   check_map(input, alone, result);
   if (!result.ok()) return result;
-  LevellingOptions options;
+  TiltCalibrationOptions options;
   options.refine_map = refine_map;
   options.motions = input.motions;
   if (std::any_of(input.motions.begin(), input.motions.end(), moves)) {
     check_row_time(input.calibration.camera);
   }
   const auto levelled = [&](const Camera& camera) {
-    return level_by_lamps(input.frames, input.lamps, camera, options);
+    return estimate_tilt_from_lamps(input.frames, input.lamps, camera, options);
   };
-  Levelling& levelling = result.levelling;
+  TiltCalibration& levelling = result.levelling;
   levelling = levelled(input.calibration.camera);
   if (!levelling.undetermined.empty()) {
     result.fail(StepFailure::undetermined, levelling.undetermined);
-    blame_map(input, alone, result);
+    explain_failure_by_map(input, alone, result);
     return result;
   }
   if (levelling.captures_rejected > levelling.captures) {
@@ -280,18 +284,18 @@ LevellingResult solve_levelling(const LampCaptures& input, bool refine_map, Hist
                 input.lamps_file);
     return result;
   }
-  const auto center_with = [&](const Camera& camera) {
-    const Levelling other = levelled(camera);
+  const auto center_for = [&](const Camera& camera) {
+    const TiltCalibration other = levelled(camera);
     return other.undetermined.empty() ? std::optional(other.center) : std::nullopt;
   };
-  pass_on_lens(levelling.center, input, center_with, result);
-  result.metrics = {{"tilt_deg", deg_from_rad(tilt_of(levelling.center).angle_rad)}};
-  constexpr double much = 3;
-  if (levelling.excess > much) {
+  propagate_lens_errors(levelling.center, input, center_for, result);
+  result.metrics = {{"tilt_deg", deg_from_rad(compute_tilt(levelling.center).angle_rad)}};
+  constexpr double max_noise_scale = 3;
+  if (levelling.noise_scale > max_noise_scale) {
     result.warnings.push_back(fmt::format(
         "the residuals are {:.1f} times what sigma_px lets expect: lamp map or lens are a little "
         "wrong, and the tilt, too, may be wrong by more than its sd{}",
-        levelling.excess, refine_map ? "" : "; --refine-map may help"));
+        levelling.noise_scale, refine_map ? "" : "; --refine-map may help"));
   }
   result.calibration = with_rotation_center(input.calibration, levelling.center, std::move(entry));
   return result;

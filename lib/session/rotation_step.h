@@ -11,7 +11,7 @@
 namespace vlp {
 
 /// Returns the camera part of a calibration, without rotation center and dispersion.
-Calibration camera_alone(const Calibration& calibration);
+Calibration extract_camera(const Calibration& calibration);
 
 /// Checks the lamp map with the captures in which the camera stands (calibration/map/map_errors.h).
 /// Adds warnings of lamps that hang elsewhere to `result`. Fails with wrong_map if the map is
@@ -20,18 +20,19 @@ MapErrors check_map(const LampCaptures& input, const Calibration& calibration, S
 
 /// Replaces the failure of a step by wrong_map if the lamp map has errors, and its message by a
 /// description of them.
-void blame_map(const LampCaptures& input, const Calibration& calibration, StepResult& result);
+void explain_failure_by_map(const LampCaptures& input, const Calibration& calibration,
+                            StepResult& result);
 
 /// Estimator of the rotation center.
 enum class RotationMethod {
-  axis,   // fit_turning_axis()
+  axis,   // fit_rotation_axis()
   joint,  // fit_joint_center()
   circle  // fit_circle_centers()
 };
 
 /// Result of solve_rotation().
 struct RotationResult : StepResult {
-  SpotCaptures spot;
+  RotationCaptures spot;
   RotationFit fit;
   CircleCenters circles;
 };
@@ -43,7 +44,7 @@ RotationResult solve_rotation(const LampCaptures& input, RotationMethod method, 
 
 /// Result of solve_levelling().
 struct LevellingResult : StepResult {
-  Levelling levelling;
+  TiltCalibration levelling;
 };
 
 /// Estimates the tilt from captures taken anywhere (calibration/levelling), and the lamp map if

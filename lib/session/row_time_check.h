@@ -15,7 +15,7 @@
 namespace vlp {
 
 /// Row time given by a file or an option.
-struct StatedRowTime {
+struct GivenRowTime {
   double row_time_s;
   /// Name of the file or of the option.
   std::string source;
@@ -33,7 +33,7 @@ struct RowTimeCheck {
 ///
 /// @return  the contradiction in one line; empty if there is none or fewer than three lamps were
 ///          measured
-std::string compare_row_times(const RowTime& measured, const StatedRowTime& stated);
+std::string compare_row_times(const RowTime& measured, const GivenRowTime& given);
 
 /// Estimates the row time from the identified lamps of the kept images (estimate_row_time()) and
 /// compares it with the given one. They contradict each other if
@@ -44,16 +44,16 @@ std::string compare_row_times(const RowTime& measured, const StatedRowTime& stat
 /// then deviates by at most kLampDrift, whether their deviations are independent or common. The
 /// second term covers the measurement, and lamps that deviate by more.
 RowTimeCheck check_row_time(const std::vector<Observation>& images, const LampMap& lamps,
-                            const StatedRowTime& stated);
+                            const GivenRowTime& given);
 
 /// Finds another row time that makes the lights of the images lamps of the map, by their periods
-/// and positions, independently of their identification (choose_row_time()): a wrong row time leaves
-/// lights unknown or exchanges lamps.
+/// and positions, independently of their identification (choose_row_time()): a wrong row time
+/// leaves lights unknown or exchanges lamps.
 ///
 /// @return  the contradiction in one line; empty unless at least three lamps contradict the given
 ///          row time as in check_row_time()
 std::string find_row_time_error(const std::vector<Observation>& images, const LampMap& lamps,
-                                const std::optional<Lens>& lens, const StatedRowTime& stated);
+                                const std::optional<Lens>& lens, const GivenRowTime& given);
 
 /// Returns the error of check_row_time() for the row time of `camera`, if the images gave a result.
 /// Otherwise, and if identified lamps agree because each was taken for its neighbor, returns the

@@ -29,7 +29,7 @@ struct PeriodsOfImages {
   PeriodsOfImages(const std::vector<const std::vector<Observation>*>& folders,
                   const std::vector<std::vector<Frame>>& labels) {
     for (std::size_t i = 0; i < folders.size(); ++i) {
-      for (LightPeriod light : measured_periods(*folders[i], labels[i])) {
+      for (LightPeriod light : collect_periods(*folders[i], labels[i])) {
         light.image += sizes_px.size();
         lights.push_back(std::move(light));
       }
@@ -39,7 +39,7 @@ struct PeriodsOfImages {
 
   /// Returns the lights of each image with their groups. Omits a group in an image with several of
   /// its lights, because at most one of them is the lamp.
-  std::vector<GroupedLights> by_group(const std::vector<PeriodGroup>& groups) const {
+  std::vector<GroupedLights> group_lights(const std::vector<PeriodGroup>& groups) const {
     std::vector<GroupedLights> images;
     for (const std::array<int, 2>& size_px : sizes_px) images.push_back({size_px, {}});
     for (std::size_t group = 0; group < groups.size(); ++group) {
@@ -56,7 +56,7 @@ struct PeriodsOfImages {
 };
 
 /// Collects the images of all folders, without their lights.
-std::vector<Observation> collect_images(const SeenLights& seen) {
+std::vector<Observation> collect_images(const DetectedLights& seen) {
   std::vector<Observation> images;
   for (const Observations& folder : seen.folders) {
     for (const Observation& image : folder.images) {
@@ -76,18 +76,18 @@ RowTimeResult choose_row_time_by_places(const std::vector<const std::vector<Obse
   const RowTimeCandidates found = estimate_row_time(
       std::vector<MeasuredPeriod>(periods.lights.begin(), periods.lights.end()), lamps);
   if (found.candidates.size() < 2) return choose_row_time(found);
-  const auto images = periods.by_group(found.groups);
+  const auto images = periods.group_lights(found.groups);
   return choose_row_time(found, compute_position_costs(found, images, lamps, lens));
 }
 
-SeenLights see_lights(const std::vector<fs::path>& folders, const LampMap& lamps,
-                      const std::optional<Calibration>& calibration, bool with_row_time,
-                      const FrontendOptions& options, const IntakeProgress& progress) {
-  SeenLights seen;
+DetectedLights detect_lights(const std::vector<fs::path>& folders, const LampMap& lamps,
+                             const std::optional<Calibration>& calibration, bool with_row_time,
+                             const FrontendOptions& options, const IntakeProgress& progress) {
+  DetectedLights seen;
   std::optional<std::array<int, 2>> imager_px;
   std::optional<Readout> readout = options.readout;
   if (calibration) {
-    seen.camera = detector_camera(*calibration);
+    seen.camera = make_detector_camera(*calibration);
     imager_px = calibration->camera.imager_px;
     if (!readout) readout = calibration->camera.readout;
   }
@@ -116,7 +116,7 @@ SeenLights see_lights(const std::vector<fs::path>& folders, const LampMap& lamps
   return seen;
 }
 
-void add_remarks(const SeenLights& seen, StepResult& result) {
+void add_remarks(const DetectedLights& seen, StepResult& result) {
   Observations all;
   all.images = collect_images(seen);
   for (const Observations& folder : seen.folders) {
@@ -126,7 +126,7 @@ void add_remarks(const SeenLights& seen, StepResult& result) {
   add_remarks(all, result);
 }
 
-RowTimeStepResult find_row_time(const SeenLights& seen,
+RowTimeStepResult find_row_time(const DetectedLights& seen,
                                 const std::vector<std::vector<Frame>>& labels, const LampMap& lamps,
                                 const fs::path& lamps_file,
                                 const std::optional<Calibration>& calibration, HistoryEntry entry) {

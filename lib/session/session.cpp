@@ -37,7 +37,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Returns a text that identifies the build of the program: results may differ between builds.
-std::string build_of(const ProgramVersion& program) {
+std::string describe_build(const ProgramVersion& program) {
   std::error_code unknown;
   const fs::path file = fs::read_symlink("/proc/self/exe", unknown);
   const auto changed = fs::last_write_time(file, unknown).time_since_epoch().count();
@@ -47,7 +47,7 @@ std::string build_of(const ProgramVersion& program) {
 
 /// Removes the path of a folder from the beginnings of file names in a text: results must not
 /// depend on it.
-std::string without_folder(std::string text, const fs::path& named) {
+std::string remove_folder(std::string text, const fs::path& named) {
   const std::string folder = (named / "").string();
   for (auto at = text.find(folder); at != std::string::npos; at = text.find(folder, at)) {
     const bool begins = at == 0 || text[at - 1] == ' ' || text[at - 1] == '\'';
@@ -60,7 +60,7 @@ std::string without_folder(std::string text, const fs::path& named) {
   return text;
 }
 
-const char* step_of(MetricSource source) {
+const char* find_step_name(MetricSource source) {
   switch (source) {
     case MetricSource::lens:
       return "lens";
@@ -80,7 +80,7 @@ const char* step_of(MetricSource source) {
 /// Returns the gates of the session: those of the lens, if it is estimated, and those of its file.
 std::vector<Gate> gates_for(const SessionFolder& session, const SessionOptions& options) {
   std::vector<Gate> gates;
-  if (!session.camera()) gates = lens_gates();
+  if (!session.camera()) gates = default_lens_gates();
   const fs::path file = session.gates().value_or(options.gates_file);
   if (file.empty()) return gates;
   return with_changes(std::move(gates), read_gates(file, session_metrics()));
@@ -95,8 +95,8 @@ struct Work {
 /// Writes the summaries, session.json last: without it the results are those of a killed run.
 void write_summaries(const SessionResults& results, const SessionResult& result,
                      const SessionOptions& options) {
-  write_file(results.file("junit.xml"), session_junit(result));
-  write_file(results.file("session.json"), session_json(result, options));
+  write_file(results.file("junit.xml"), format_session_junit(result));
+  write_file(results.file("session.json"), format_session_json(result, options));
 }
 
 class SessionRun {
@@ -107,14 +107,14 @@ class SessionRun {
         results_(results),
         options_(options),
         observer_(observer),
-        build_(build_of(options.program)),
+        build_(describe_build(options.program)),
         gates_(std::move(gates)) {}
 
   SessionResult run() {
     check_redo();
     results_.plan(outputs());
     if (calibrate() && locate()) {
-      add_gates_of_no_step();
+      add_gates_of_missing_steps();
       evaluate();
     }
     conclude();
@@ -127,14 +127,14 @@ class SessionRun {
     std::string names;
     for (const auto& [step, files] : steps) names.append(names.empty() ? "" : ", ").append(step);
     for (const std::string& name : options_.redo) {
-      const auto known = [&](const StepOutputs& step) { return step.step == name; };
-      if (std::any_of(steps.begin(), steps.end(), known)) continue;
+      const auto is_known_step = [&](const StepOutputs& step) { return step.step == name; };
+      if (std::any_of(steps.begin(), steps.end(), is_known_step)) continue;
       std::string reason = "there is no step " + name + " here; the steps are: ";
       throw std::invalid_argument(reason.append(names));
     }
   }
 
-  bool asked_again(const std::string& step) const {
+  bool is_redo_requested(const std::string& step) const {
     return std::find(options_.redo.begin(), options_.redo.end(), step) != options_.redo.end();
   }
 
@@ -142,9 +142,9 @@ class SessionRun {
   fs::path lamps_file() const { return session_.lamps(); }
   LampMap read_lamps() const { return read_lamps_of_room(lamps_file(), options_.frontend.room); }
 
-  std::string without_folder(std::string text) const {
-    return vlp::without_folder(vlp::without_folder(std::move(text), session_.path()),
-                               results_.path());
+  std::string remove_folder(std::string text) const {
+    return vlp::remove_folder(vlp::remove_folder(std::move(text), session_.path()),
+                              results_.path());
   }
 
   std::vector<fs::path> lines() const {
@@ -178,13 +178,13 @@ class SessionRun {
     return steps;
   }
 
-  std::string key_of(const std::vector<fs::path>& inputs, const std::string& options) {
+  std::string compute_step_key(const std::vector<fs::path>& inputs, const std::string& options) {
     std::string text = build_ + "\n" + options + "\n" + options_.frontend.room + "\n";
     for (const fs::path& input : inputs) {
       if (input.empty()) continue;
       text += input.filename().string() + " ";
       try {
-        text += fs::is_directory(input) ? digests_.of_all(input) : sha256_of_file(input);
+        text += fs::is_directory(input) ? digests_.digest_folder(input) : sha256_of_file(input);
       } catch (const InputError&) {
         text += "cannot be read";
       }
@@ -198,17 +198,19 @@ class SessionRun {
   bool step(const std::string& name, const std::vector<fs::path>& inputs,
             const std::string& options, const std::function<Work()>& work) {
     if (observer_.begins) observer_.begins(name);
-    const std::string key = key_of(inputs, options);
+    const std::string key = compute_step_key(inputs, options);
     SessionStep done{name, false, {}};
-    if (auto kept = results_.kept(name, key); kept && !asked_again(name)) {
-      done.as_before = true;
-      done.result = std::move(*kept);
+    if (auto cached_result = results_.cached_result(name, key);
+        cached_result && !is_redo_requested(name)) {
+      done.is_up_to_date = true;
+      done.result = std::move(*cached_result);
     } else {
-      results_.forget(name);
-      done.result = attempt(work);
-      results_.keep(name, key, done.result);
+      results_.remove_step(name);
+      done.result = run_work(work);
+      results_.store_result(name, key, done.result);
     }
-    if (done.result.ok()) done.result.gates = check_gates(gates_of(name), done.result.metrics);
+    if (done.result.ok())
+      done.result.gates = check_gates(find_step_gates(name), done.result.metrics);
     result_.gates.insert(result_.gates.end(), done.result.gates.begin(), done.result.gates.end());
     result_.steps.push_back(std::move(done));
     if (observer_.ends) observer_.ends(result_.steps.back());
@@ -217,28 +219,28 @@ class SessionRun {
 
   /// Adds the gates of steps that the session lacks: they fail, because their metrics have no
   /// value.
-  void add_gates_of_no_step() {
+  void add_gates_of_missing_steps() {
     for (const char* name : {"lens", "rotation", "dispersion"}) {
-      const bool there = std::any_of(result_.steps.begin(), result_.steps.end(),
-                                     [&](const SessionStep& step) { return step.name == name; });
-      if (there) continue;
-      const auto gates = check_gates(gates_of(name), {});
+      const bool exists = std::any_of(result_.steps.begin(), result_.steps.end(),
+                                      [&](const SessionStep& step) { return step.name == name; });
+      if (exists) continue;
+      const auto gates = check_gates(find_step_gates(name), {});
       result_.gates.insert(result_.gates.end(), gates.begin(), gates.end());
     }
   }
 
   /// Returns the gates of the metrics of a step.
-  std::vector<Gate> gates_of(const std::string& step) const {
+  std::vector<Gate> find_step_gates(const std::string& step) const {
     std::vector<Gate> gates;
     for (const Gate& gate : gates_) {
-      if (step_of(metric_kind(gate.metric)->source) == step) gates.push_back(gate);
+      if (find_step_name(metric_kind(gate.metric)->source) == step) gates.push_back(gate);
     }
     return gates;
   }
 
   /// Runs the work of a step and writes its outputs. A bad input becomes the failure bad_input;
   /// errors of writing are thrown.
-  StepResult attempt(const std::function<Work()>& work) const {
+  StepResult run_work(const std::function<Work()>& work) const {
     Work done;
     try {
       done = work();
@@ -248,15 +250,15 @@ class SessionRun {
       done.result.fail(StepFailure::bad_input, error.what());
     }
     StepResult& result = done.result;
-    result.fail(result.failure, without_folder(message_of(result)));
-    for (std::string& warning : result.warnings) warning = without_folder(std::move(warning));
-    for (auto& [image, reason] : result.skipped) reason = without_folder(std::move(reason));
+    result.fail(result.failure, remove_folder(message_of(result)));
+    for (std::string& warning : result.warnings) warning = remove_folder(std::move(warning));
+    for (auto& [image, reason] : result.skipped) reason = remove_folder(std::move(reason));
     if (result.ok()) done.write();
     return std::move(result);
   }
 
   HistoryEntry history(const std::string& options, const std::vector<fs::path>& inputs) {
-    return vlp::history_of(options_.program, options, inputs, digests_);
+    return vlp::make_history_entry(options_.program, options, inputs, digests_);
   }
 
   void write_picture(const StepResult& result, const std::string& name) const {
@@ -280,7 +282,7 @@ class SessionRun {
       text += fmt::format(" --max-white-fraction {}", limits.max_white_fraction);
     }
     text += " --lens ";
-    return text.append(options_.choose_lens_model ? "auto" : name_of(options_.lens_model));
+    return text.append(options_.choose_lens_model ? "auto" : to_string(options_.lens_model));
   }
 
   bool find_lens() {
@@ -300,7 +302,7 @@ class SessionRun {
       input.choose_lens_model = options_.choose_lens_model;
       LensResult lens = solve_lens(
           std::move(input), history(camera_options(), {session_.board(), session_.boards()}));
-      if (lens.lens.choice) lens.notes.push_back("lens model: " + words_of(*lens.lens.choice));
+      if (lens.lens.choice) lens.notes.push_back("lens model: " + describe(*lens.lens.choice));
       return Work{lens, [this, lens] {
                     if (has_mrcal(lens.calibration.camera.lens_model)) {
                       write_cameramodel(out("lens.cameramodel"), lens.lens.solution);
@@ -317,8 +319,8 @@ class SessionRun {
       const Calibration camera = read_calibration(camera_file);
       FrontendOptions options = options_.frontend;
       options.readout.reset();
-      const SeenLights seen =
-          see_lights({session_.rotation()}, lamps, camera, false, options, observer_.progress);
+      const DetectedLights seen =
+          detect_lights({session_.rotation()}, lamps, camera, false, options, observer_.progress);
       RowTimeStepResult found =
           vlp::find_row_time(seen, {{}}, lamps, lamps_file(), camera,
                              history("--row-time", {session_.rotation(), lamps_file()}));
@@ -344,11 +346,11 @@ class SessionRun {
                       calibration_file};
     images.captures = table;
     seen = observe_lamps(images, use, lamp_options(), observer_.progress);
-    captures.frames = kept_frames(seen.images);
+    captures.frames = collect_kept_frames(seen.images);
     add_remarks(seen, result);
     const Camera& camera = captures.calibration.camera;
     explain_by_row_time(captures, seen.images, result);
-    if (use == ImageUse::turn && is_row_time_stated() && camera.row_time_s) {
+    if (use == ImageUse::turn && is_row_time_given() && camera.row_time_s) {
       result.metrics = row_time_metrics(
           check_row_time(seen.images, captures.lamps, {*camera.row_time_s, row_time_source()}));
     }
@@ -371,7 +373,7 @@ class SessionRun {
   }
 
   /// Returns false if the row time was estimated by the step row-time, or is not used.
-  bool is_row_time_stated() const {
+  bool is_row_time_given() const {
     return !session_.classifier() && (session_.camera() || options_.frontend.row_time_s);
   }
 
@@ -427,7 +429,8 @@ class SessionRun {
       Observations seen;
       if (!observe(folder, ImageUse::places, captures, rotated, seen, remarks))
         return Work{remarks};
-      const KnownPlaces places = at_known_places(captures.frames, captures_in(folder));
+      const KnownPlaces places =
+          collect_known_places(captures.frames, read_captures_with_truth(folder));
       if (places.captures.empty()) {
         throw InputError(folder,
                          "nothing tells where its captures were taken: captures.csv should, with "
@@ -459,16 +462,16 @@ class SessionRun {
 
   bool calibrate() {
     fs::path camera = out("lens.yaml");
-    if (const auto known = session_.camera()) {
-      camera = *known;
-      if (!readable(camera)) return false;
+    if (const auto is_known_step = session_.camera()) {
+      camera = *is_known_step;
+      if (!read_given_camera(camera)) return false;
     } else if (!find_lens()) {
       return false;
     }
     result_.calibration = read_calibration(camera);
     if (result_.calibration->camera.row_time_s || session_.classifier()) {
-      results_.forget("row-time");
-      if (asked_again("row-time")) {
+      results_.remove_step("row-time");
+      if (is_redo_requested("row-time")) {
         throw std::invalid_argument(
             "there is no step row-time here: the row time is known, or there is a classifier");
       }
@@ -480,7 +483,7 @@ class SessionRun {
     if (!find_rotation(camera)) return false;
     result_.calibration = read_calibration(out("rotated.yaml"));
     if (!session_.dispersion()) {
-      results_.forget("dispersion");
+      results_.remove_step("dispersion");
       write_calibration(out("calibration.yaml"), *result_.calibration);
       return true;
     }
@@ -490,8 +493,8 @@ class SessionRun {
   }
 
   /// Runs the step lens for a given camera.yaml, which fails if the file cannot be read.
-  bool readable(const fs::path& camera) {
-    const std::string unused = stated_of_the_camera();
+  bool read_given_camera(const fs::path& camera) {
+    const std::string unused = list_changed_camera_options();
     return step("lens", {camera}, unused, [&] {
       const auto report = read_calibration(camera).intrinsics_report;
       Work work;
@@ -505,7 +508,7 @@ class SessionRun {
   }
 
   /// Returns the changed options of the camera, such as "name, row time"; empty if none is changed.
-  std::string stated_of_the_camera() const {
+  std::string list_changed_camera_options() const {
     const SessionOptions unstated;
     std::string stated;
     const auto add = [&](bool is_stated, const char* what) {
@@ -534,7 +537,8 @@ class SessionRun {
     const std::string name = folder.filename().string();
     const fs::path calibration = out("calibration.yaml");
     return step(name, lamp_inputs(folder, calibration), "", [&] {
-      LocateInput input{{}, read_lamps(), read_calibration(calibration), captures_table(folder)};
+      LocateInput input{
+          {}, read_lamps(), read_calibration(calibration), read_captures_of_folder(folder)};
       input.lamp_offsets = session_.check() == folder;
       const LampImages images{folder, input.lamps, lamps_file(), input.calibration, calibration};
       LocateResult found =
@@ -559,18 +563,18 @@ class SessionRun {
       inputs.push_back(out(line.filename().string() + "-fixes.csv"));
       for (const fs::path& table : with_tables({}, line)) inputs.push_back(table);
     }
-    const std::vector<Gate> gates = gates_of("evaluate");
+    const std::vector<Gate> gates = find_step_gates("evaluate");
     std::string limits;
     for (const Gate& gate : gates_) limits += fmt::format("{} {}\n", gate.metric, gate.limit);
     step("evaluate", inputs, picture_setting() + limits, [&] {
       const auto check = session_.check();
-      if (check) truth = truth_file(*check);
+      if (check) truth = find_truth_file(*check);
       if (truth) return evaluate_check(*truth, inputs, gates);
-      Work nothing;
-      nothing.result.notes.emplace_back(
+      Work skipped_work;
+      skipped_work.result.notes.emplace_back(
           check ? "no errors and no report: check has no truth.csv, and no places in captures.csv"
                 : "no errors and no report: there is no check");
-      return nothing;
+      return skipped_work;
     });
   }
 
@@ -578,21 +582,22 @@ class SessionRun {
                       const std::vector<Gate>& gates) {
     auto input = std::make_shared<EvaluationInput>();
     input->fixes = {out("check-fixes.csv"), read_fixes(out("check-fixes.csv"))};
-    input->truth = {truth, truth_in(truth.parent_path())};
-    input->station_m = place_radius_m(*result_.calibration);
+    input->truth = {truth, read_truth_places(truth.parent_path())};
+    input->station_m = compute_place_radius_m(*result_.calibration);
     input->threads = options_.frontend.threads;
     EvaluateResult found = evaluate_fixes(*input, gates);
     std::vector<Drive> drives;
     for (const fs::path& line : lines()) {
-      const fs::path places = *truth_file(line),
+      const fs::path places = *find_truth_file(line),
                      fixes = out(line.filename().string() + "-fixes.csv");
-      drives.push_back({{fixes, read_fixes(fixes)}, ends_of(places, truth_in(line))});
+      drives.push_back(
+          {{fixes, read_fixes(fixes)}, find_drive_ends(places, read_truth_places(line))});
       if (fit_line(drives.back().fixes.rows, drives.back().commanded_m)) continue;
       throw InputError(fixes, "no line can be fitted to its fixes: they have no direction");
     }
     if (!found.ok()) return {found};
     std::vector<CheckError> errors;
-    for (const FixError& error : errors_of(*input, input->fixes).errors) {
+    for (const FixError& error : compute_errors(*input, input->fixes).errors) {
       const FixRow& row = input->fixes.rows[error.fix];
       constexpr int min_lamps =
           3;  // fixes of two lamps may have large errors at the edge of a room
@@ -602,24 +607,24 @@ class SessionRun {
     if (std::string outliers = describe_check_outliers(errors); !outliers.empty()) {
       found.warnings.push_back(std::move(outliers));
     }
-    return {
-        found, [=, this] {
-          write_file(out("evaluation.json"), json_of(found.evaluation, found.gates));
-          if (!options_.report) return;
-          Report page;
-          page.gates = result_.gates;
-          page.gates.insert(page.gates.end(), found.gates.begin(), found.gates.end());
-          page.calibration = result_.calibration;
-          page.pictures = pictures();
-          page.evaluation = history("", inputs);
-          write_file(out("report.html"), report_page({*input, found, read_lamps(), drives, page}));
-        }};
+    return {found, [=, this] {
+              write_file(out("evaluation.json"), to_json(found.evaluation, found.gates));
+              if (!options_.report) return;
+              Report page;
+              page.gates = result_.gates;
+              page.gates.insert(page.gates.end(), found.gates.begin(), found.gates.end());
+              page.calibration = result_.calibration;
+              page.pictures = pictures();
+              page.evaluation = history("", inputs);
+              write_file(out("report.html"),
+                         render_report_page({*input, found, read_lamps(), drives, page}));
+            }};
   }
 
-  std::vector<ReportPicture> pictures() const {
-    std::vector<ReportPicture> pictures;
+  std::vector<ReportPlot> pictures() const {
+    std::vector<ReportPlot> pictures;
     for (const char* name : {"lens.svg", "rotation.svg", "dispersion.svg"}) {
-      if (fs::exists(out(name))) pictures.push_back(read_report_picture(out(name)));
+      if (fs::exists(out(name))) pictures.push_back(read_report_plot(out(name)));
     }
     return pictures;
   }
@@ -631,9 +636,9 @@ class SessionRun {
       result_.verdict = SessionVerdict::no_result;
       result_.failure = last.result.failure;
       result_.reason = last.name + ": " + last.result.why;
-      results_.forget_behind(last.name);
+      results_.remove_later_steps(last.name);
     }
-    const std::string missed = words_of_missed(result_.gates);
+    const std::string missed = describe_failed_gates(result_.gates);
     if (!missed.empty() && last.result.ok()) {
       result_.verdict = SessionVerdict::gate;
       result_.reason = missed;
@@ -653,7 +658,7 @@ class SessionRun {
 
 }  // namespace
 
-std::string name_of(SessionVerdict verdict) {
+std::string to_string(SessionVerdict verdict) {
   switch (verdict) {
     case SessionVerdict::pass:
       return "pass";
@@ -674,10 +679,10 @@ SessionResult run_session(const fs::path& session, const fs::path& results,
                           const SessionOptions& options, const SessionObserver& observer) {
   if (!options.gates_file.empty()) read_gates(options.gates_file, session_metrics());
   if (!fs::is_directory(session)) throw InputError(session, "is not a folder of captures");
-  if (holds_captures(session, results)) {
+  if (is_captures_folder(session, results)) {
     throw InputError(results, "holds captures: results go to a folder of their own");
   }
-  SessionResults taken(results, session);
+  SessionResults session_results(results, session);
   std::optional<SessionFolder> folder;
   std::vector<Gate> gates;
   try {
@@ -687,16 +692,16 @@ SessionResult run_session(const fs::path& session, const fs::path& results,
     SessionResult result;
     result.verdict = SessionVerdict::no_result;
     result.failure = StepFailure::bad_input;
-    result.reason = without_folder(error.what(), session);
+    result.reason = remove_folder(error.what(), session);
     if (folder) {
-      taken.forget_evaluation();  // other results remain valid
+      session_results.remove_evaluation();  // other results remain valid
     } else {
-      taken.forget_all();
+      session_results.remove_all_steps();
     }
-    write_summaries(taken, result, options);
+    write_summaries(session_results, result, options);
     return result;
   }
-  return SessionRun(*folder, std::move(gates), taken, options, observer).run();
+  return SessionRun(*folder, std::move(gates), session_results, options, observer).run();
 }
 
 }  // namespace vlp

@@ -38,8 +38,8 @@ struct SessionOptions {
   /// Threads, limits for images, row time and readout direction of the camera.
   FrontendOptions frontend = {};
   /// File in format vlp-gates/1 with gates of session_metrics(), for a session without its own
-  /// gates.yaml; may be empty. Its gates are added to lens_gates(), or replace the gates of the
-  /// same metric.
+  /// gates.yaml; may be empty. Its gates are added to default_lens_gates(), or replace the gates of
+  /// the same metric.
   std::filesystem::path gates_file = {};
   /// Makes plots, drives along lines and report.html, which take longer than all other results.
   bool report = true;
@@ -51,7 +51,7 @@ struct SessionOptions {
 struct SessionStep {
   std::string name;
   /// True if the step was not run because its inputs, options, program and outputs are unchanged.
-  bool as_before = false;
+  bool is_up_to_date = false;
   StepResult result;
 };
 
@@ -63,7 +63,7 @@ enum class SessionVerdict {
 };
 
 /// Returns the word in session.json: "pass", "gate" or "no result".
-std::string name_of(SessionVerdict verdict);
+std::string to_string(SessionVerdict verdict);
 
 /// Result of run_session().
 struct SessionResult {

@@ -21,14 +21,14 @@ using Json = nlohmann::ordered_json;
 
 constexpr double kDegrees = 180 / std::numbers::pi;
 
-Json sd_of(const std::optional<Matrix2>& covariance, double factor) {
+Json make_sd_json(const std::optional<Matrix2>& covariance, double factor) {
   if (!covariance) return nullptr;
   return {factor * std::sqrt((*covariance)(0, 0)), factor * std::sqrt((*covariance)(1, 1))};
 }
 
-Json calibration_of(const Calibration& calibration) {
+Json make_calibration_json(const Calibration& calibration) {
   const auto& in = calibration.camera.intrinsics;
-  Json json{{"lens_model", name_of(calibration.camera.lens_model)},
+  Json json{{"lens_model", to_string(calibration.camera.lens_model)},
             {"focal_px", {in[0], in[1]}},
             {"center_px", {in[2], in[3]}}};
   const auto& lens = calibration.intrinsics_report;
@@ -39,28 +39,28 @@ Json calibration_of(const Calibration& calibration) {
   }
   if (const auto& row_time_s = calibration.camera.row_time_s) json["row_time_s"] = *row_time_s;
   if (const auto& center = calibration.rotation_center) {
-    const auto [angle_rad, azimuth_rad] = tilt_of(*center);
+    const auto [angle_rad, azimuth_rad] = compute_tilt(*center);
     json["rotation_center_px"] = {center->center_px.x(), center->center_px.y()};
-    json["rotation_center_sd_px"] = sd_of(center->covariance, 1);
+    json["rotation_center_sd_px"] = make_sd_json(center->covariance, 1);
     json["tilt_deg"] = deg_from_rad(angle_rad);
     json["tilt_azimuth_deg"] = deg_from_rad(azimuth_rad);
     const Eigen::Vector2d zenith = zenith_point(*center);
     json["zenith_deg"] = {kDegrees * zenith.x(), kDegrees * zenith.y()};
-    json["zenith_sd_deg"] = sd_of(whole_zenith_covariance(calibration), kDegrees);
+    json["zenith_sd_deg"] = make_sd_json(compute_zenith_covariance(calibration), kDegrees);
     if (const auto& arm_m = center->lever_arm_m) {
-      json["lever_arm_mm"] = {kMillimetres * arm_m->x(), kMillimetres * arm_m->y()};
-      json["lever_arm_sd_mm"] = sd_of(center->lever_arm_covariance, kMillimetres);
+      json["lever_arm_mm"] = {kMillimetersPerMeter * arm_m->x(), kMillimetersPerMeter * arm_m->y()};
+      json["lever_arm_sd_mm"] = make_sd_json(center->lever_arm_covariance, kMillimetersPerMeter);
     }
   }
   if (const auto& dispersion = calibration.dispersion) {
     json["dispersion_offset_px"] = {dispersion->offset_px.x(), dispersion->offset_px.y()};
-    json["dispersion_offset_sd_px"] = sd_of(whole_offset_covariance(calibration), 1);
-    json["dispersion_radius_mm"] = kMillimetres * dispersion->radius_m;
+    json["dispersion_offset_sd_px"] = make_sd_json(compute_offset_covariance(calibration), 1);
+    json["dispersion_radius_mm"] = kMillimetersPerMeter * dispersion->radius_m;
   }
   return json;
 }
 
-Json history_of(const Calibration& calibration) {
+Json make_history_json(const Calibration& calibration) {
   Json history = Json::array();
   for (const HistoryEntry& entry : calibration.history) {
     Json inputs = Json::array();
@@ -77,10 +77,10 @@ Json history_of(const Calibration& calibration) {
 }
 
 /// Returns the metrics of all steps, each with its gate if it has one.
-Json metrics_of(const SessionResult& result) {
+Json make_metrics_json(const SessionResult& result) {
   Json metrics = Json::array();
   for (const SessionStep& step : result.steps) {
-    const Json of_step = json_of(step.result);
+    const Json of_step = to_json(step.result);
     for (Json metric : of_step.at("metrics")) {
       const auto name = metric.at("name").get<std::string>();
       metric["step"] = step.name;
@@ -89,7 +89,7 @@ Json metrics_of(const SessionResult& result) {
       }
       for (const CheckedMetric& gate : step.result.gates) {
         if (gate.name != name) continue;
-        const Json of_gate = json_of(gate);
+        const Json of_gate = to_json(gate);
         for (const char* key : {"limit", "asked", "met"}) metric[key] = of_gate.at(key);
       }
       metrics.push_back(std::move(metric));
@@ -100,20 +100,20 @@ Json metrics_of(const SessionResult& result) {
 
 }  // namespace
 
-std::string session_json(const SessionResult& result, const SessionOptions& options) {
+std::string format_session_json(const SessionResult& result, const SessionOptions& options) {
   const bool known = result.calibration.has_value();
   Json json{{"format", "vlp-session/1"},
-            {"verdict", name_of(result.verdict)},
+            {"verdict", to_string(result.verdict)},
             {"reason", result.reason},
-            {"failure", name_of(result.failure)},
+            {"failure", to_string(result.failure)},
             {"camera", known ? result.calibration->camera.id : options.camera_id},
             {"version", options.program.version},
-            {"metrics", metrics_of(result)},
+            {"metrics", make_metrics_json(result)},
             {"gates", Json::array()},
             {"steps", Json::array()}};
-  for (const CheckedMetric& gate : result.gates) json["gates"].push_back(json_of(gate));
+  for (const CheckedMetric& gate : result.gates) json["gates"].push_back(to_json(gate));
   for (const SessionStep& step : result.steps) {
-    const Json of_step = json_of(step.result);
+    const Json of_step = to_json(step.result);
     Json entry{{"name", step.name}, {"failure", of_step.at("failure")}};
     for (const char* key :
          {"why", "warnings", "notes", "skipped", "lamps_left_out", "lamp_offsets"}) {
@@ -122,13 +122,13 @@ std::string session_json(const SessionResult& result, const SessionOptions& opti
     json["steps"].push_back(std::move(entry));
   }
   if (known) {
-    json["calibration"] = calibration_of(*result.calibration);
-    json["history"] = history_of(*result.calibration);
+    json["calibration"] = make_calibration_json(*result.calibration);
+    json["history"] = make_history_json(*result.calibration);
   }
   return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
-std::string session_junit(const SessionResult& result) {
+std::string format_session_junit(const SessionResult& result) {
   std::vector<JUnitTest> tests;
   tests.reserve(result.steps.size() + result.gates.size() + 1);
   for (const SessionStep& step : result.steps) {
@@ -137,13 +137,13 @@ std::string session_junit(const SessionResult& result) {
     if (!step.result.ok()) {
       test.result = JUnitTest::Result::error;
       test.message = step.result.why;
-      test.error_type = name_of(step.result.failure);
+      test.error_type = to_string(step.result.failure);
     }
     tests.push_back(std::move(test));
   }
   if (result.steps.empty()) {
-    tests.push_back(
-        {"session", JUnitTest::Result::error, result.reason, std::string(name_of(result.failure))});
+    tests.push_back({"session", JUnitTest::Result::error, result.reason,
+                     std::string(to_string(result.failure))});
   }
   const auto gates = make_junit_tests(result.gates);
   tests.insert(tests.end(), gates.begin(), gates.end());

@@ -25,11 +25,11 @@ namespace vlp {
 /// Standard deviations (_sd_) cover the captures of the step alone; that of the zenith includes the
 /// contribution of the lens. The file is written last: without it the results are those of a run
 /// that was killed. The same run gives the same bytes.
-std::string session_json(const SessionResult& result, const SessionOptions& options);
+std::string format_session_json(const SessionResult& result, const SessionOptions& options);
 
 /// Returns the content of `junit.xml` for CI systems: a test for each step with its warnings, then
 /// a test for each gate. A step without a result is an error of type SessionResult::failure, with
 /// its message. A session that cannot be read is an error of a test named "session".
-std::string session_junit(const SessionResult& result);
+std::string format_session_junit(const SessionResult& result);
 
 }  // namespace vlp

@@ -11,8 +11,8 @@ namespace vlp {
 
 namespace fs = std::filesystem;
 
-CapturesTable captures_in(const fs::path& folder) {
-  CapturesTable captures = captures_table(folder);
+CapturesTable read_captures_with_truth(const fs::path& folder) {
+  CapturesTable captures = read_captures_of_folder(folder);
   if (!fs::exists(folder / "truth.csv")) return captures;
   for (const TruthRow& row : read_truth(folder / "truth.csv")) {
     Capture& capture = captures[row.image];
@@ -26,7 +26,7 @@ CapturesTable captures_in(const fs::path& folder) {
   return captures;
 }
 
-std::optional<fs::path> truth_file(const fs::path& folder) {
+std::optional<fs::path> find_truth_file(const fs::path& folder) {
   if (fs::exists(folder / "truth.csv")) return folder / "truth.csv";
   if (!fs::exists(folder / "captures.csv")) return std::nullopt;
   const CapturesTable captures = read_captures(folder / "captures.csv");
@@ -36,10 +36,10 @@ std::optional<fs::path> truth_file(const fs::path& folder) {
   return places ? std::optional(folder / "captures.csv") : std::nullopt;
 }
 
-std::vector<TruthRow> truth_in(const fs::path& folder) {
+std::vector<TruthRow> read_truth_places(const fs::path& folder) {
   if (fs::exists(folder / "truth.csv")) return read_truth(folder / "truth.csv");
   std::vector<TruthRow> rows;
-  for (const auto& [image, capture] : captures_table(folder)) {
+  for (const auto& [image, capture] : read_captures_of_folder(folder)) {
     if (!capture.x_m || !capture.y_m || capture.place == PlaceOf::axis) continue;
     rows.push_back({image, {*capture.x_m, *capture.y_m}, capture.z_m, capture.yaw_rad});
   }
@@ -51,7 +51,7 @@ namespace {
 bool is_drive(const fs::path& folder) {
   if (!folder.filename().string().starts_with("line-") || !fs::is_directory(folder)) return false;
   try {
-    return truth_file(folder).has_value();
+    return find_truth_file(folder).has_value();
   } catch (const InputError&) {
     return true;
   }
@@ -81,11 +81,11 @@ SessionFolder::SessionFolder(const fs::path& folder) : folder_(folder) {
   std::sort(lines_.begin(), lines_.end());
 }
 
-std::optional<fs::path> SessionFolder::if_there(const char* name) const {
+std::optional<fs::path> SessionFolder::find_existing(const char* name) const {
   return fs::exists(folder_ / name) ? std::optional(folder_ / name) : std::nullopt;
 }
 
-bool holds_captures(const fs::path& session, const fs::path& results) {
+bool is_captures_folder(const fs::path& session, const fs::path& results) {
   std::error_code missing;
   if (fs::equivalent(results, session, missing)) return true;
   for (const auto& entry : fs::directory_iterator(session)) {
@@ -97,7 +97,8 @@ bool holds_captures(const fs::path& session, const fs::path& results) {
   return false;
 }
 
-std::array<Eigen::Vector2d, 2> ends_of(const fs::path& truth, const std::vector<TruthRow>& places) {
+std::array<Eigen::Vector2d, 2> find_drive_ends(const fs::path& truth,
+                                               const std::vector<TruthRow>& places) {
   const std::array<Eigen::Vector2d, 2> ends_m{places.front().xy_m, places.back().xy_m};
   if (ends_m[0] == ends_m[1]) throw InputError(truth, "the drive ends where it begins");
   return ends_m;

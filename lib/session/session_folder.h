@@ -22,14 +22,14 @@ namespace vlp {
 /// All functions throw InputError if a table cannot be read.
 
 /// Returns captures.csv with the places of truth.csv; an empty table without both files.
-CapturesTable captures_in(const std::filesystem::path& folder);
+CapturesTable read_captures_with_truth(const std::filesystem::path& folder);
 /// Returns the table with the ground truth of the folder: truth.csv, or captures.csv if it has
 /// places of the camera. Returns std::nullopt if neither exists.
-std::optional<std::filesystem::path> truth_file(const std::filesystem::path& folder);
-/// Returns the places in truth_file(): in the order of truth.csv, or in the order of the image
+std::optional<std::filesystem::path> find_truth_file(const std::filesystem::path& folder);
+/// Returns the places in find_truth_file(): in the order of truth.csv, or in the order of the image
 /// names for captures.csv, which need not have a place for every image.
-/// @pre truth_file() returns a file
-std::vector<TruthRow> truth_in(const std::filesystem::path& folder);
+/// @pre find_truth_file() returns a file
+std::vector<TruthRow> read_truth_places(const std::filesystem::path& folder);
 
 // clang-format off
 /// Folder with the captures of a camera, which is only read:
@@ -56,17 +56,19 @@ class SessionFolder {
   std::filesystem::path board() const { return folder_ / "board.yaml"; }
   std::filesystem::path boards() const { return folder_ / "boards"; }
   std::filesystem::path rotation() const { return folder_ / "rotation"; }
-  std::optional<std::filesystem::path> camera() const { return if_there("camera.yaml"); }
-  std::optional<std::filesystem::path> dispersion() const { return if_there("dispersion"); }
-  std::optional<std::filesystem::path> check() const { return if_there("check"); }
-  std::optional<std::filesystem::path> classifier() const { return if_there("classifier.yaml"); }
-  std::optional<std::filesystem::path> gates() const { return if_there("gates.yaml"); }
+  std::optional<std::filesystem::path> camera() const { return find_existing("camera.yaml"); }
+  std::optional<std::filesystem::path> dispersion() const { return find_existing("dispersion"); }
+  std::optional<std::filesystem::path> check() const { return find_existing("check"); }
+  std::optional<std::filesystem::path> classifier() const {
+    return find_existing("classifier.yaml");
+  }
+  std::optional<std::filesystem::path> gates() const { return find_existing("gates.yaml"); }
   /// Folders of the drives along a line with known places, sorted by name. Includes drives whose
   /// table cannot be read: their steps report the error.
   const std::vector<std::filesystem::path>& lines() const { return lines_; }
 
  private:
-  std::optional<std::filesystem::path> if_there(const char* name) const;
+  std::optional<std::filesystem::path> find_existing(const char* name) const;
 
   std::filesystem::path folder_;
   std::vector<std::filesystem::path> lines_;
@@ -74,10 +76,10 @@ class SessionFolder {
 
 /// Returns true if `results` is the folder of the session or a folder of captures in it, where
 /// results must not be written.
-bool holds_captures(const std::filesystem::path& session, const std::filesystem::path& results);
+bool is_captures_folder(const std::filesystem::path& session, const std::filesystem::path& results);
 
 /// Returns the first and the last place of a drive, in m. Throws InputError if they are equal.
-std::array<Eigen::Vector2d, 2> ends_of(const std::filesystem::path& truth,
-                                       const std::vector<TruthRow>& places);
+std::array<Eigen::Vector2d, 2> find_drive_ends(const std::filesystem::path& truth,
+                                               const std::vector<TruthRow>& places);
 
 }  // namespace vlp

@@ -40,7 +40,7 @@ bool contains(std::span<const char* const> names, std::string_view name) {
 }
 
 /// Returns the file with the path of the session of these results.
-fs::path mark_of(const fs::path& results) { return results / "steps/session"; }
+fs::path mark_file(const fs::path& results) { return results / "steps/session"; }
 
 std::string mark_text(const fs::path& session) {
   return fs::weakly_canonical(session / "").string() + "\n";
@@ -48,20 +48,20 @@ std::string mark_text(const fs::path& session) {
 
 /// Throws InputError if the folder holds results of another session or files of other origin.
 void check_owner(const fs::path& results, const fs::path& session) {
-  const fs::path mark = mark_of(results);
-  constexpr std::size_t most_bytes = 1 << 16;
+  const fs::path mark = mark_file(results);
+  constexpr std::size_t max_bytes = 1 << 16;
   if (fs::exists(mark)) {
-    if (read_text_file(mark, most_bytes) == mark_text(session)) return;
+    if (read_text_file(mark, max_bytes) == mark_text(session)) return;
     throw InputError(results,
                      "holds the results of another session; give this one a folder of its own");
   }
-  std::vector<const char*> others(kResults.begin(), kResults.end());
-  others.insert(others.end(), {"lamps.yaml", "board.yaml", "boards", "rotation"});
-  for (const char* other : others) {
-    if (!fs::exists(results / other)) continue;
+  std::vector<const char*> foreign_names(kResults.begin(), kResults.end());
+  foreign_names.insert(foreign_names.end(), {"lamps.yaml", "board.yaml", "boards", "rotation"});
+  for (const char* foreign_name : foreign_names) {
+    if (!fs::exists(results / foreign_name)) continue;
     throw InputError(results, fmt::format("holds {}, which is not of vlp-calibrate; give the "
                                           "results a folder of their own",
-                                          other));
+                                          foreign_name));
   }
 }
 
@@ -76,11 +76,11 @@ std::string record_name(const std::string& step) {
 /// Returns true for the names of drives, which are folders of a session and steps.
 bool is_drive_name(std::string_view step) { return step.starts_with("line-") && Id::accepts(step); }
 
-SharedFolder steps_in(const fs::path& results) {
+SharedFolder make_steps_folder(const fs::path& results) {
   return SharedFolder(results).make_folder({"steps", results, "step"});
 }
 
-int lock_of(const SharedFolder& steps, const fs::path& results) {
+int lock_folder(const SharedFolder& steps, const fs::path& results) {
   const int lock = steps.open("lock", O_RDWR | O_CREAT);
   if (lock < 0) throw InputError(results, "cannot be written to");
   if (::flock(lock, LOCK_EX | LOCK_NB) == 0) return lock;
@@ -88,7 +88,7 @@ int lock_of(const SharedFolder& steps, const fs::path& results) {
   throw InputError(results, "another run is at work there");
 }
 
-bool is_there(const fs::path& file) {
+bool is_existing(const fs::path& file) {
   std::error_code missing;
   return fs::symlink_status(file, missing).type() != fs::file_type::not_found;
 }
@@ -96,8 +96,8 @@ bool is_there(const fs::path& file) {
 /// Returns the outputs in a folder of results that an earlier version wrote, without their list:
 /// kResults, records of steps, and fixes of drives that are recorded or `planned`. A run that was
 /// interrupted has fixes of a drive without its record.
-std::set<std::string> unlisted_outputs(const fs::path& results,
-                                       const std::vector<StepOutputs>& planned) {
+std::set<std::string> find_unlisted_outputs(const fs::path& results,
+                                            const std::vector<StepOutputs>& planned) {
   std::set<std::string> names(kResults.begin(), kResults.end());
   for (const char* step : kNamedSteps) names.insert(record_name(step));
   const auto insert_drive = [&](const std::string& step) {
@@ -105,7 +105,7 @@ std::set<std::string> unlisted_outputs(const fs::path& results,
   };
   for (const auto& entry : fs::directory_iterator(results / "steps")) {
     const std::string step = entry.path().stem().string();
-    if (is_drive_name(step) && read_step(entry.path())) insert_drive(step);
+    if (is_drive_name(step) && read_step_record(entry.path())) insert_drive(step);
   }
   for (const auto& [step, files] : planned) {
     if (is_drive_name(step)) insert_drive(step);
@@ -135,8 +135,8 @@ SessionResults::SessionResults(fs::path folder, const fs::path& session)
   std::error_code not_made;
   fs::create_directories(folder_, not_made);
   if (not_made) throw InputError(folder_, "cannot be made: " + not_made.message());
-  const SharedFolder steps = steps_in(folder_);
-  lock_ = lock_of(steps, folder_);
+  const SharedFolder steps = make_steps_folder(folder_);
+  lock_ = lock_folder(steps, folder_);
   steps.find_folder({"corners", folder_, "step"});  // throws if it is a link
   if (steps.has("session")) return;
   // The list of files that do not require a plan, written before the mark: a folder without the
@@ -147,14 +147,14 @@ SessionResults::SessionResults(fs::path folder, const fs::path& session)
 
 SessionResults::~SessionResults() { ::close(lock_); }
 
-fs::path SessionResults::record_of(const std::string& step) const {
+fs::path SessionResults::record_file(const std::string& step) const {
   return file(record_name(step));
 }
 
 std::set<std::string> SessionResults::outputs() const {
   constexpr std::size_t max_bytes = 1 << 20;
-  const auto list = steps_in(folder_).read(kOutputs, max_bytes);
-  if (!list) return unlisted_outputs(folder_, steps_);
+  const auto list = make_steps_folder(folder_).read(kOutputs, max_bytes);
+  if (!list) return find_unlisted_outputs(folder_, steps_);
   std::set<std::string> names;
   std::istringstream lines(*list);
   for (std::string name; std::getline(lines, name);) {
@@ -183,14 +183,14 @@ void SessionResults::plan(std::vector<StepOutputs> steps) {
   }
   const std::set<std::string> written = outputs();
   for (const std::string& name : wanted) {
-    if (is_there(file(name)) && (!written.contains(name) || fs::is_symlink(file(name)))) {
+    if (is_existing(file(name)) && (!written.contains(name) || fs::is_symlink(file(name)))) {
       throw InputError(folder_, fmt::format("holds {}, which is not of vlp-calibrate; give the "
                                             "results a folder of their own",
                                             name));
     }
   }
   wanted.merge(remove_outputs(wanted));  // the next run tries again
-  const SharedFolder records = steps_in(folder_);
+  const SharedFolder records = make_steps_folder(folder_);
   // An unchanged list is not written again, which avoids waiting for the disk.
   if (wanted == written && records.has(kOutputs)) return;
   std::string list;
@@ -198,56 +198,58 @@ void SessionResults::plan(std::vector<StepOutputs> steps) {
   records.replace(kOutputs, list);
 }
 
-std::optional<StepResult> SessionResults::kept(const std::string& step,
-                                               const std::string& key) const {
-  auto kept = read_step(record_of(step));
-  if (!kept || kept->result.failure == StepFailure::bad_input) return std::nullopt;
-  if (kept->key != key || kept->outputs != digest_of_outputs(step)) return std::nullopt;
-  return std::move(kept->result);
+std::optional<StepResult> SessionResults::cached_result(const std::string& step,
+                                                        const std::string& key) const {
+  auto cached_result = read_step_record(record_file(step));
+  if (!cached_result || cached_result->result.failure == StepFailure::bad_input)
+    return std::nullopt;
+  if (cached_result->key != key || cached_result->outputs != compute_outputs_digest(step))
+    return std::nullopt;
+  return std::move(cached_result->result);
 }
 
-void SessionResults::keep(const std::string& step, const std::string& key,
-                          const StepResult& result) const {
-  write_step(record_of(step), {key, digest_of_outputs(step), result});
+void SessionResults::store_result(const std::string& step, const std::string& key,
+                                  const StepResult& result) const {
+  write_step_record(record_file(step), {key, compute_outputs_digest(step), result});
 }
 
-std::string SessionResults::digest_of_outputs(const std::string& step) const {
+std::string SessionResults::compute_outputs_digest(const std::string& step) const {
   std::string digests;
   for (const auto& [name, files] : steps_) {
     if (name != step) continue;
     for (const std::string& output : files) {
-      const bool there = fs::exists(file(output));
+      const bool exists = fs::exists(file(output));
       digests.append(output).append(" ");
-      digests.append(there ? sha256_of_file(file(output)) : "").append("\n");
+      digests.append(exists ? sha256_of_file(file(output)) : "").append("\n");
     }
   }
   return sha256_of_text(digests);
 }
 
-void SessionResults::forget(const std::string& step) const {
+void SessionResults::remove_step(const std::string& step) const {
   std::error_code ignored;
-  fs::remove(record_of(step), ignored);
+  fs::remove(record_file(step), ignored);
   for (const auto& [name, files] : steps_) {
     if (name != step) continue;
     for (const std::string& output : files) fs::remove(file(output), ignored);
   }
 }
 
-void SessionResults::forget_behind(const std::string& step) const {
-  bool behind = false;
+void SessionResults::remove_later_steps(const std::string& step) const {
+  bool is_later = false;
   for (const auto& [name, files] : steps_) {
-    if (behind) forget(name);
-    behind = behind || name == step;
+    if (is_later) remove_step(name);
+    is_later = is_later || name == step;
   }
 }
 
-void SessionResults::forget_evaluation() const {
+void SessionResults::remove_evaluation() const {
   const std::set<std::string> written = outputs();
   for (const char* name : {"evaluation.json", "report.html", "steps/evaluate.json"}) {
     if (written.contains(name)) fs::remove(file(name));
   }
 }
 
-void SessionResults::forget_all() const { remove_outputs({}); }
+void SessionResults::remove_all_steps() const { remove_outputs({}); }
 
 }  // namespace vlp

@@ -51,26 +51,27 @@ class SessionResults {
   /// Returns the result of the last execution of a step if it is up to date. `key`, the digest of
   /// all that the step depends on, and the outputs must be unchanged. Returns std::nullopt
   /// otherwise, and after bad_input, because the file may have been corrected.
-  std::optional<StepResult> kept(const std::string& step, const std::string& key) const;
+  std::optional<StepResult> cached_result(const std::string& step, const std::string& key) const;
   /// Records the result of a step, with its key and the digest of its outputs.
-  void keep(const std::string& step, const std::string& key, const StepResult& result) const;
+  void store_result(const std::string& step, const std::string& key,
+                    const StepResult& result) const;
 
   /// Removes the outputs and the record of a step.
-  void forget(const std::string& step) const;
+  void remove_step(const std::string& step) const;
   /// Removes outputs and records of all later steps.
-  void forget_behind(const std::string& step) const;
+  void remove_later_steps(const std::string& step) const;
   /// Removes outputs and record of the step evaluate, which depend on the gates. Does not require
   /// plan().
-  void forget_evaluation() const;
+  void remove_evaluation() const;
   /// Removes outputs and records of all steps. Does not require plan().
-  void forget_all() const;
+  void remove_all_steps() const;
 
  private:
-  std::filesystem::path record_of(const std::string& step) const;
+  std::filesystem::path record_file(const std::string& step) const;
   std::set<std::string> outputs() const;
   /// Removes the outputs that are not wanted. Returns those that cannot be removed.
   std::set<std::string> remove_outputs(const std::set<std::string>& wanted) const;
-  std::string digest_of_outputs(const std::string& step) const;
+  std::string compute_outputs_digest(const std::string& step) const;
 
   std::filesystem::path folder_;
   std::vector<StepOutputs> steps_;

@@ -34,7 +34,7 @@ std::vector<SkippedImage> skipped_images(const std::vector<Observation>& images)
   for (const Observation& image : images) {
     if (image.is_kept()) continue;
     const std::string name = is_one_folder ? image.name() : image.file.string();
-    const auto video = video_of_frame(name);
+    const auto video = parse_video_name(name);
     if (!video) {
       skipped.push_back({name, image.rejection->message});
       continue;
@@ -50,7 +50,7 @@ std::vector<SkippedImage> skipped_images(const std::vector<Observation>& images)
     }
   }
   for (const auto& [video, reason, count] : frames) {
-    skipped.push_back({video, fmt::format("{} of its frames: {}", count, name_of(reason))});
+    skipped.push_back({video, fmt::format("{} of its frames: {}", count, to_string(reason))});
   }
   return skipped;
 }
@@ -62,7 +62,7 @@ void add_remarks(const Observations& seen, StepResult& result) {
   prepend(seen.notes, result.notes);
   prepend(seen.details, result.details);
   for (const Observation& image : seen.images) {
-    if (image.is_kept() || !video_of_frame(image.name())) continue;
+    if (image.is_kept() || !parse_video_name(image.name())) continue;
     result.details.push_back(image.name() + ": " + image.rejection->message);
   }
   if (!seen.failure) return;

@@ -21,21 +21,22 @@ constexpr const char* kFormat = "vlp-step/1";
 constexpr std::size_t kMaxStepBytes = std::size_t{64} << 20;
 
 Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-double number_of(const Json& json) {
+double number_or_nan(const Json& json) {
   return json.is_null() ? std::numeric_limits<double>::quiet_NaN() : json.get<double>();
 }
 
-Eigen::Vector2d vector_of(const Json& json) {
+Eigen::Vector2d parse_vector(const Json& json) {
   return {json.at(0).get<double>(), json.at(1).get<double>()};
 }
 
-StepResult result_of(const Json& json) {
+StepResult parse_result(const Json& json) {
   StepResult result;
   const auto failure = step_failure_from_name(json.at("failure").get<std::string>());
   result.fail(failure.value_or(StepFailure::bad_input), json.at("why").get<std::string>(),
               json.at("subject").get<std::string>());
   for (const Json& metric : json.at("metrics")) {
-    result.metrics.push_back({metric.at("name").get<std::string>(), number_of(metric.at("value"))});
+    result.metrics.push_back(
+        {metric.at("name").get<std::string>(), number_or_nan(metric.at("value"))});
   }
   json.at("warnings").get_to(result.warnings);
   json.at("notes").get_to(result.notes);
@@ -48,29 +49,33 @@ StepResult result_of(const Json& json) {
   }
   for (const Json& lamp : json.at("lamp_offsets")) {
     result.lamp_offsets.push_back({lamp.at("lamp").get<int>(), lamp.at("captures").get<int>(),
-                                   vector_of(lamp.at("map_m")),
-                                   vector_of(lamp.at("offset_mm")) / kMillimetres,
-                                   vector_of(lamp.at("offset_sd_mm")) / kMillimetres});
+                                   parse_vector(lamp.at("map_m")),
+                                   parse_vector(lamp.at("offset_mm")) / kMillimetersPerMeter,
+                                   parse_vector(lamp.at("offset_sd_mm")) / kMillimetersPerMeter});
   }
   return result;
 }
 
 }  // namespace
 
-Json json_of(const CheckedMetric& gate) {
+Json to_json(const CheckedMetric& gate) {
   return {{"name", gate.name},
           {"unit", gate.unit},
           {"value", gate.value ? Json(*gate.value) : Json(nullptr)},
           {"limit", gate.limit ? Json(*gate.limit) : Json(nullptr)},
-          {"asked", words_of(gate.asked)},
-          {"met", gate.met()}};
+          {"asked", describe(gate.direction)},
+          {"met", gate.passed()}};
 }
 
-Json json_of(const StepResult& result) {
-  Json json{{"failure", name_of(result.failure)}, {"why", result.why},
-            {"subject", result.subject.string()}, {"metrics", Json::array()},
-            {"warnings", result.warnings},        {"notes", result.notes},
-            {"skipped", Json::array()},           {"lamps_left_out", Json::array()},
+Json to_json(const StepResult& result) {
+  Json json{{"failure", to_string(result.failure)},
+            {"why", result.why},
+            {"subject", result.subject.string()},
+            {"metrics", Json::array()},
+            {"warnings", result.warnings},
+            {"notes", result.notes},
+            {"skipped", Json::array()},
+            {"lamps_left_out", Json::array()},
             {"lamp_offsets", Json::array()}};
   for (const auto& [name, value] : result.metrics) {
     json["metrics"].push_back({{"name", name}, {"value", number_or_null(value)}});
@@ -86,13 +91,13 @@ Json json_of(const StepResult& result) {
         {{"lamp", lamp},
          {"captures", captures},
          {"map_m", {map_m.x(), map_m.y()}},
-         {"offset_mm", {kMillimetres * offset_m.x(), kMillimetres * offset_m.y()}},
-         {"offset_sd_mm", {kMillimetres * sd_m.x(), kMillimetres * sd_m.y()}}});
+         {"offset_mm", {kMillimetersPerMeter * offset_m.x(), kMillimetersPerMeter * offset_m.y()}},
+         {"offset_sd_mm", {kMillimetersPerMeter * sd_m.x(), kMillimetersPerMeter * sd_m.y()}}});
   }
   return json;
 }
 
-std::optional<KeptStep> read_step(const std::filesystem::path& file) {
+std::optional<StepRecord> read_step_record(const std::filesystem::path& file) {
   try {
     const auto text =
         SharedFolder(file.parent_path()).read(file.filename().string(), kMaxStepBytes);
@@ -101,19 +106,19 @@ std::optional<KeptStep> read_step(const std::filesystem::path& file) {
     const Json json = Json::parse(*text, nullptr, false);
     if (!json.is_object()) return std::nullopt;
     if (json.at("format").get<std::string>() != kFormat) return std::nullopt;
-    return KeptStep{json.at("key").get<std::string>(), json.at("outputs").get<std::string>(),
-                    result_of(json.at("result"))};
+    return StepRecord{json.at("key").get<std::string>(), json.at("outputs").get<std::string>(),
+                      parse_result(json.at("result"))};
   } catch (const std::exception&) {
     return std::nullopt;
   }
 }
 
-void write_step(const std::filesystem::path& file, const KeptStep& step) {
+void write_step_record(const std::filesystem::path& file, const StepRecord& step) {
   const Json json{{"format", kFormat},
                   {"key", step.key},
                   {"outputs", step.outputs},
-                  {"result", json_of(step.result)}};
-  WholeFile whole(file);
+                  {"result", to_json(step.result)}};
+  AtomicFileWriter whole(file);
   whole.write(json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
   whole.save_unsynced();  // an incomplete record is ignored, and the step runs again
 }

@@ -10,25 +10,25 @@
 
 namespace vlp {
 
-std::string last_name(const std::filesystem::path& path) {
+std::string last_path_component(const std::filesystem::path& path) {
   return std::filesystem::weakly_canonical(path).filename().string();
 }
 
-const std::string& InputDigests::of_file(const std::filesystem::path& file) {
+const std::string& InputDigests::digest_file(const std::filesystem::path& file) {
   const auto known = known_.find(file);
   return known != known_.end() ? known->second
                                : known_.emplace(file, sha256_of_file(file)).first->second;
 }
 
-std::string InputDigests::of_images(const std::filesystem::path& folder) {
+std::string InputDigests::digest_images(const std::filesystem::path& folder) {
   std::string digests;
   for (const auto& image : list_images(folder)) {
-    digests += fmt::format("{}  {}\n", of_file(image), image.filename().string());
+    digests += fmt::format("{}  {}\n", digest_file(image), image.filename().string());
   }
   return sha256_of_text(digests);
 }
 
-std::string InputDigests::of_all(const std::filesystem::path& folder) {
+std::string InputDigests::digest_folder(const std::filesystem::path& folder) {
   std::map<std::string, std::string> digests;
   std::error_code error;
   for (std::filesystem::recursive_directory_iterator entry(folder, error), end;
@@ -37,7 +37,7 @@ std::string InputDigests::of_all(const std::filesystem::path& folder) {
     if (!entry->is_regular_file(no_file)) continue;
     std::string& digest = digests[entry->path().lexically_relative(folder).string()];
     try {
-      digest = of_file(entry->path());
+      digest = digest_file(entry->path());
     } catch (const InputError&) {
       digest = "cannot be read";
     }
@@ -47,14 +47,15 @@ std::string InputDigests::of_all(const std::filesystem::path& folder) {
   return sha256_of_text(text);
 }
 
-HistoryEntry history_of(const ProgramVersion& program, const std::string& options,
-                        const std::vector<std::filesystem::path>& inputs, InputDigests& digests) {
+HistoryEntry make_history_entry(const ProgramVersion& program, const std::string& options,
+                                const std::vector<std::filesystem::path>& inputs,
+                                InputDigests& digests) {
   HistoryEntry entry{"", program.program, program.version, options, {}};
   for (const auto& input : inputs) {
     if (input.empty()) continue;
-    entry.inputs.push_back({last_name(input), std::filesystem::is_directory(input)
-                                                  ? digests.of_images(input)
-                                                  : digests.of_file(input)});
+    entry.inputs.push_back({last_path_component(input), std::filesystem::is_directory(input)
+                                                            ? digests.digest_images(input)
+                                                            : digests.digest_file(input)});
   }
   return entry;
 }

@@ -20,7 +20,7 @@ constexpr std::array<std::pair<StepFailure, std::string_view>, 6> kNames{
 
 }  // namespace
 
-std::string_view name_of(StepFailure failure) {
+std::string_view to_string(StepFailure failure) {
   for (const auto& [known, name] : kNames) {
     if (known == failure) return name;
   }

@@ -70,7 +70,7 @@ struct StepResult {
 };
 
 /// Returns the name of the enumerator, for example "wrong_map".
-std::string_view name_of(StepFailure failure);
+std::string_view to_string(StepFailure failure);
 /// Returns the failure with this name; std::nullopt if there is none.
 std::optional<StepFailure> step_failure_from_name(std::string_view name);
 

@@ -48,7 +48,7 @@ bool has_examples(std::span<const LabelledLight> lights, const LampMap& lamps,
 }
 
 /// Returns true if training kept enough lights of each lamp; otherwise fails the step.
-bool kept_enough(const LampClassifier& classifier, TrainStepResult& result) {
+bool has_kept_examples(const LampClassifier& classifier, TrainStepResult& result) {
   std::string few;
   for (const auto& lamp : classifier.lamps) {
     if (lamp.examples >= kMinExamples) continue;
@@ -63,22 +63,22 @@ bool kept_enough(const LampClassifier& classifier, TrainStepResult& result) {
 }
 
 void warn_of_inseparable(const LampClassifier& classifier, TrainStepResult& result) {
-  constexpr std::size_t most_lines = 10;
-  const auto pairs = inseparable(classifier);
-  for (std::size_t i = 0; i < std::min(pairs.size(), most_lines); ++i) {
+  constexpr std::size_t max_lines = 10;
+  const auto pairs = find_inseparable_lamps(classifier);
+  for (std::size_t i = 0; i < std::min(pairs.size(), max_lines); ++i) {
     result.warnings.push_back(fmt::format(
         "lamps {} and {} look alike ({:.1f} standard deviations apart) and may be left unknown: "
         "change a frequency or a duty",
         pairs[i].first, pairs[i].second, pairs[i].distance));
   }
-  if (pairs.size() > most_lines) {
+  if (pairs.size() > max_lines) {
     result.warnings.push_back(
-        fmt::format("and {} more pairs that look alike", pairs.size() - most_lines));
+        fmt::format("and {} more pairs that look alike", pairs.size() - max_lines));
   }
 }
 
 /// Warns if the labelled lamps contradict the row time of the calibration.
-void warn_of_row_time(const SeenLights& seen, const std::vector<std::vector<Frame>>& labels,
+void warn_of_row_time(const DetectedLights& seen, const std::vector<std::vector<Frame>>& labels,
                       const LampMap& lamps, TrainStepResult& result) {
   if (!seen.camera.row_time_s) return;
   std::vector<const std::vector<Observation>*> folders;
@@ -92,10 +92,12 @@ void warn_of_row_time(const SeenLights& seen, const std::vector<std::vector<Fram
 
 }  // namespace
 
-TrainStepResult train_lamps(const SeenLights& seen, const std::vector<std::vector<Frame>>& labels,
-                            const LampMap& lamps, const std::filesystem::path& first_folder) {
+TrainStepResult train_lamp_classifier(const DetectedLights& seen,
+                                      const std::vector<std::vector<Frame>>& labels,
+                                      const LampMap& lamps,
+                                      const std::filesystem::path& first_folder) {
   TrainStepResult result;
-  Labelled& labelled = result.labelled;
+  LabelledLights& labelled = result.labelled;
   for (std::size_t i = 0; i < labels.size(); ++i) {
     add_labelled(seen.folders[i].images, labels[i], labelled);
   }
@@ -107,8 +109,8 @@ TrainStepResult train_lamps(const SeenLights& seen, const std::vector<std::vecto
   if (!has_examples(labelled.lights, lamps, result)) return result;
   result.classifier = train_classifier(labelled.lights);
   result.classifier.row_time_s = seen.camera.row_time_s;
-  if (!kept_enough(result.classifier, result)) return result;
-  result.confusion = cross_validated(labelled.lights, train_classifier);
+  if (!has_kept_examples(result.classifier, result)) return result;
+  result.confusion = cross_validate(labelled.lights, train_classifier);
   warn_of_inseparable(result.classifier, result);
   warn_of_row_time(seen, labels, lamps, result);
   return result;

@@ -11,23 +11,25 @@
 
 namespace vlp {
 
-/// Result of train_lamps().
+/// Result of train_lamp_classifier().
 struct TrainStepResult : StepResult {
-  Labelled labelled;
+  LabelledLights labelled;
   LampClassifier classifier;
   /// Cross-validated confusion matrix: answers of classifiers to lights held out of their training.
   Confusion confusion;
 };
 
 /// Trains the lamp classifier with the lights that the labels of each folder identify. Warns of
-/// inseparable lamps, and if lamps with known frequencies contradict the row time of the calibration
-/// (compare_row_times()). Failure: undetermined, if there is one lamp only, or a lamp has too few
-/// lights or too dissimilar ones.
+/// inseparable lamps, and if lamps with known frequencies contradict the row time of the
+/// calibration (compare_row_times()). Failure: undetermined, if there is one lamp only, or a lamp
+/// has too few lights or too dissimilar ones.
 ///
 /// @param first_folder  folder named in the error about labels
 /// @throws InputError if the labels name no usable image of any folder
 /// @throws std::invalid_argument if the labels name a lamp that is not in the map
-TrainStepResult train_lamps(const SeenLights& seen, const std::vector<std::vector<Frame>>& labels,
-                            const LampMap& lamps, const std::filesystem::path& first_folder);
+TrainStepResult train_lamp_classifier(const DetectedLights& seen,
+                                      const std::vector<std::vector<Frame>>& labels,
+                                      const LampMap& lamps,
+                                      const std::filesystem::path& first_folder);
 
 }  // namespace vlp

@@ -30,8 +30,8 @@ void check(const Scene& scene) {
 void write_table(const Scene& scene, std::size_t sessions, const fs::path& output) {
   CsvWriter table(output / "archive.csv", {"camera", "session", "fault", "damage", "damaged"});
   for (std::size_t i = 0; i < sessions; ++i) {
-    const ArchiveSession session = archive_session(scene, i);
-    table.row({session.camera, session.session, name_of(session.fault), name_of(session.damage),
+    const ArchiveSession session = make_archive_session(scene, i);
+    table.row({session.camera, session.session, to_string(session.fault), to_string(session.damage),
                session.damaged});
   }
   table.save();
@@ -39,13 +39,13 @@ void write_table(const Scene& scene, std::size_t sessions, const fs::path& outpu
 
 /// Renders a session into a temporary folder, then moves it into place. Returns false if the
 /// session exists already.
-bool render(const ArchiveSession& session, const fs::path& output, const std::string& origin) {
+bool render(const ArchiveSession& session, const fs::path& output, const std::string& provenance) {
   const fs::path place = output / session.camera / session.session;
   if (fs::exists(place)) return false;
   const fs::path unfinished = output / ".unfinished" / (session.camera + "-" + session.session);
   fs::create_directories(place.parent_path());
   fs::create_directories(unfinished);
-  const std::string first_line = origin.substr(0, origin.find('\n'));
+  const std::string first_line = provenance.substr(0, provenance.find('\n'));
   simulate(session.scene, unfinished,
            {{}, 1, first_line + ": " + session.camera + "/" + session.session + " of an archive\n"},
            [](const SimulationSummary&, std::size_t) {});
@@ -60,13 +60,13 @@ SimulationSummary simulate_archive(const Scene& scene, std::size_t sessions, con
                                    const SimulationOptions& options,
                                    const SimulationProgress& progress) {
   check(scene);
-  claim_for_simulation(output, options.origin);
+  claim_for_simulation(output, options.provenance);
   write_table(scene, sessions, output);
   SimulationSummary summary;
   std::mutex counting;
   try {
-    in_parallel(sessions, options.threads, [&](std::size_t index) {
-      const bool rendered = render(archive_session(scene, index), output, options.origin);
+    parallel_for(sessions, options.threads, [&](std::size_t index) {
+      const bool rendered = render(make_archive_session(scene, index), output, options.provenance);
       const std::lock_guard lock(counting);
       ++(rendered ? summary.rendered : summary.found);
       progress(summary, sessions);

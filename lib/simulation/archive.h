@@ -14,7 +14,7 @@ namespace vlp {
 /// Fault of a simulated unit whose captures are complete.
 enum class ArchiveFault {
   none,
-  leaning,       // camera tilt larger by 4 degrees
+  tilted,        // camera tilt larger by 4 degrees
   out_of_focus,  // blur sigma times 1.5, at least 0.8 px
   moved_lamp,    // 30 mm added to the map error of the first lamp, along x
   cut_image      // the first image of the last lamp folder is truncated
@@ -42,8 +42,8 @@ struct ArchiveSession {
 };
 
 /// Returns the names used in archive.csv; empty for `none`.
-std::string_view name_of(ArchiveFault fault);
-std::string_view name_of(ArchiveDamage damage);
+std::string_view to_string(ArchiveFault fault);
+std::string_view to_string(ArchiveDamage damage);
 
 /// Returns session `index` of an archive, counted from 0. It depends on scene and index only, so
 /// that an archive can grow without changes to existing sessions.
@@ -52,7 +52,7 @@ std::string_view name_of(ArchiveDamage damage);
 /// to within one. A session chosen for both is damaged only. Kinds of fault and of damage are used
 /// cyclically.
 /// @pre the scene has an `archive`
-ArchiveSession archive_session(const Scene& scene, std::size_t index);
+ArchiveSession make_archive_session(const Scene& scene, std::size_t index);
 
 /// Applies the cut_image fault and the damage of a session to its files in `folder`. A second call
 /// has no further effect.

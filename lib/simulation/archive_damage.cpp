@@ -21,16 +21,16 @@ std::vector<fs::path> images_in_order(const fs::path& folder) {
 }
 
 /// Truncates an image to its header and a few hundred bytes.
-void cut(const fs::path& image) {
+void truncate_image(const fs::path& image) {
   constexpr std::uintmax_t kept_bytes = 600;
   if (fs::file_size(image) > kept_bytes) fs::resize_file(image, kept_bytes);
 }
 
 }  // namespace
 
-std::string_view name_of(ArchiveFault fault) {
+std::string_view to_string(ArchiveFault fault) {
   switch (fault) {
-    case ArchiveFault::leaning:
+    case ArchiveFault::tilted:
       return "leaning";
     case ArchiveFault::out_of_focus:
       return "out-of-focus";
@@ -44,7 +44,7 @@ std::string_view name_of(ArchiveFault fault) {
   return "";
 }
 
-std::string_view name_of(ArchiveDamage damage) {
+std::string_view to_string(ArchiveDamage damage) {
   switch (damage) {
     case ArchiveDamage::cut_images:
       return "cut-images";
@@ -65,12 +65,12 @@ void damage(const ArchiveSession& session, const fs::path& folder) {
     const auto& sets = session.scene.sets;
     const auto lamps =
         std::find_if(sets.rbegin(), sets.rend(), [](const CaptureSet& set) { return !set.board; });
-    cut(images_in_order(folder / lamps->folder).front());
+    truncate_image(images_in_order(folder / lamps->folder).front());
   }
   const fs::path target = folder / session.damaged;
   switch (session.damage) {
     case ArchiveDamage::cut_images:
-      for (const fs::path& image : images_in_order(target)) cut(image);
+      for (const fs::path& image : images_in_order(target)) truncate_image(image);
       break;
     case ArchiveDamage::missing:
       fs::remove_all(target);

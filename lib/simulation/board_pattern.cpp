@@ -15,7 +15,8 @@ void add_corner_squares(const Board& board, std::vector<PrintedRectangle>& all) 
   const double gap_m = board.tag_size_m * board.tag_spacing;
   for (int row = 0; row <= board.rows; ++row) {
     for (int col = 0; col <= board.cols; ++col) {
-      const double right_m = col * tag_pitch_m(board), bottom_m = row * tag_pitch_m(board);
+      const double right_m = col * compute_tag_pitch_m(board),
+                   bottom_m = row * compute_tag_pitch_m(board);
       all.push_back({right_m - gap_m, bottom_m - gap_m, right_m, bottom_m, false});
     }
   }
@@ -32,9 +33,9 @@ void add_squares(const Board& board, std::vector<PrintedRectangle>& all) {
   }
 }
 
-TagPattern pattern_of(const Board& board, int id) {
-  if (!board.has_squares()) return tag_pattern(board.family, id, board.border_bits);
-  const ArucoMarker marker = aruco_marker(board.family, id);
+TagPattern make_bits(const Board& board, int id) {
+  if (!board.has_squares()) return make_tag_pattern(board.family, id, board.border_bits);
+  const ArucoMarker marker = make_aruco_marker(board.family, id);
   TagPattern pattern{marker.width + 2, 0, {}};
   pattern.white.assign(pattern.index(0, pattern.width()), false);
   for (int row = 0; row < marker.width; ++row) {
@@ -47,7 +48,7 @@ TagPattern pattern_of(const Board& board, int id) {
 }
 
 void add_tag(const Board& board, const BoardTag& tag, std::vector<PrintedRectangle>& all) {
-  const TagPattern pattern = pattern_of(board, tag.id);
+  const TagPattern pattern = make_bits(board, tag.id);
   const double bit_m = board.tag_size_m / pattern.border_width;
   if (2 * pattern.outside * bit_m > board.tag_size_m * board.tag_spacing) {
     throw std::invalid_argument("the gap between the tags is too small for " + board.family);
@@ -65,11 +66,11 @@ void add_tag(const Board& board, const BoardTag& tag, std::vector<PrintedRectang
 
 }  // namespace
 
-std::vector<PrintedRectangle> board_pattern(const Board& board) {
+std::vector<PrintedRectangle> make_board_pattern(const Board& board) {
   std::vector<PrintedRectangle> all;
   if (board.has_squares()) add_squares(board, all);
   if (board.corner_squares) add_corner_squares(board, all);
-  for (const BoardTag& tag : board_layout(board)) add_tag(board, tag, all);
+  for (const BoardTag& tag : compute_board_layout(board)) add_tag(board, tag, all);
   return all;
 }
 

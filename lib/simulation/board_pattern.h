@@ -8,7 +8,7 @@
 
 namespace vlp {
 
-/// Rectangle on a board, in the board frame (board_layout.h).
+/// Rectangle on a board, in the board frame (compute_board_layout.h).
 struct PrintedRectangle {
   double left_m, top_m, right_m, bottom_m;
   bool white;
@@ -18,7 +18,7 @@ struct PrintedRectangle {
 /// ones.
 /// @throws std::invalid_argument if the family lacks an id, or if the gaps are too small for the
 /// family
-std::vector<PrintedRectangle> board_pattern(const Board& board);
+std::vector<PrintedRectangle> make_board_pattern(const Board& board);
 
 /// Returns the distance from the edge of the tag field (tag_field_m()) to the outermost printed
 /// edge, m. Corner squares and the outer squares of chessboards extend beyond the field; otherwise

@@ -28,19 +28,19 @@ double border_m(const Board& board) {
   return std::min(board.tag_size_m * board.tag_spacing, board.tag_size_m) / 2;
 }
 
-Eigen::Vector2d print_m(const Board& board) {
+Eigen::Vector2d printed_size_m(const Board& board) {
   return tag_field_m(board) + 2 * Eigen::Vector2d::Constant(border_m(board));
 }
 
 bool fits(const Board& board, const Eigen::Vector2d& sheet_m) {
   const Eigen::Vector2d room_m =
       sheet_m - 2 * Eigen::Vector2d::Constant(kMargin_m) - Eigen::Vector2d(0, kFooter_m);
-  return (print_m(board).array() <= room_m.array() + 1e-9).all();
+  return (printed_size_m(board).array() <= room_m.array() + 1e-9).all();
 }
 
 /// Returns the page size, in landscape only if the board fits only so; std::nullopt if it does not
 /// fit.
-std::optional<Eigen::Vector2d> sheet_for(const Board& board, const Paper& paper) {
+std::optional<Eigen::Vector2d> find_sheet_m(const Board& board, const PageSize& paper) {
   if (fits(board, paper.size_m)) return paper.size_m;
   const Eigen::Vector2d lying = paper.size_m.reverse();
   if (fits(board, lying)) return lying;
@@ -49,7 +49,7 @@ std::optional<Eigen::Vector2d> sheet_for(const Board& board, const Paper& paper)
 
 /// Draws all black areas as one path, which avoids seams between neighboring bits.
 void draw_board(cairo_t* context, const Board& board) {
-  for (const PrintedRectangle& part : board_pattern(board)) {
+  for (const PrintedRectangle& part : make_board_pattern(board)) {
     if (part.white) continue;
     cairo_rectangle(context, part.left_m, part.top_m, part.right_m - part.left_m,
                     part.bottom_m - part.top_m);
@@ -57,28 +57,31 @@ void draw_board(cairo_t* context, const Board& board) {
   cairo_fill(context);
 }
 
-std::string in_mm(double length_m) {
+std::string format_mm(double length_m) {
   constexpr double um_per_m = 1e6, um_per_mm = 1e3;
   return shortest(std::round(length_m * um_per_m) / um_per_mm) + " mm";
 }
 
-std::string parameters_of_squares(const Board& board) {
+std::string describe_square_parameters(const Board& board) {
   const bool charuco = board.kind == BoardKind::charuco;
   std::string text = charuco ? "ChArUco, " : "chessboard, ";
   text.append(std::to_string(board.cols)).append(" x ").append(std::to_string(board.rows));
-  text.append(" squares of ").append(in_mm(board.square_size_m));
+  text.append(" squares of ").append(format_mm(board.square_size_m));
   if (!charuco) return text;
-  text.append(", markers of ").append(in_mm(board.tag_size_m)).append(", ").append(board.family);
+  text.append(", markers of ")
+      .append(format_mm(board.tag_size_m))
+      .append(", ")
+      .append(board.family);
   return text.append(" from id ").append(std::to_string(board.first_id));
 }
 
-std::string parameters_of(const Board& board) {
-  if (board.has_squares()) return parameters_of_squares(board);
+std::string describe_parameters(const Board& board) {
+  if (board.has_squares()) return describe_square_parameters(board);
   std::string text = board.family + ", ";
   text.append(std::to_string(board.cols)).append(" x ").append(std::to_string(board.rows));
-  text.append(" tags of ").append(in_mm(board.tag_size_m)).append(", gap ");
-  text.append(in_mm(board.tag_size_m * board.tag_spacing)).append(", ids from ");
-  text.append(std::to_string(board.first_id)).append(", ").append(name_of(board.id_order));
+  text.append(" tags of ").append(format_mm(board.tag_size_m)).append(", gap ");
+  text.append(format_mm(board.tag_size_m * board.tag_spacing)).append(", ids from ");
+  text.append(std::to_string(board.first_id)).append(", ").append(to_string(board.id_order));
   if (board.border_bits == 2) text += ", Kalibr AprilGrid";
   return text;
 }
@@ -99,7 +102,7 @@ void draw_footer(cairo_t* context, const Board& board) {
   cairo_move_to(context, 0, 2 * tick_m + 1.2 * text_m);
   cairo_show_text(context, "The ruler is 100 mm long; else print again at 100 %.");
   cairo_move_to(context, 0, 2 * tick_m + 2.6 * text_m);
-  cairo_show_text(context, parameters_of(board).c_str());
+  cairo_show_text(context, describe_parameters(board).c_str());
 }
 
 cairo_status_t append(void* text, const unsigned char* bytes, unsigned int count) {
@@ -109,39 +112,40 @@ cairo_status_t append(void* text, const unsigned char* bytes, unsigned int count
 
 }  // namespace
 
-const std::vector<Paper>& papers() {
-  static const std::vector<Paper> all{{"A4", {0.210, 0.297}}, {"A3", {0.297, 0.420}},
-                                      {"A2", {0.420, 0.594}}, {"A1", {0.594, 0.841}},
-                                      {"A0", {0.841, 1.189}}, {"Letter", {0.2159, 0.2794}}};
+const std::vector<PageSize>& page_sizes() {
+  static const std::vector<PageSize> all{{"A4", {0.210, 0.297}}, {"A3", {0.297, 0.420}},
+                                         {"A2", {0.420, 0.594}}, {"A1", {0.594, 0.841}},
+                                         {"A0", {0.841, 1.189}}, {"Letter", {0.2159, 0.2794}}};
   return all;
 }
 
-const Paper& paper_named(const std::string& name) {
-  for (const Paper& paper : papers()) {
+const PageSize& find_page_size(const std::string& name) {
+  for (const PageSize& paper : page_sizes()) {
     if (paper.name == name) return paper;
   }
   std::string names;
-  for (const Paper& paper : papers()) names.append(names.empty() ? "" : ", ").append(paper.name);
+  for (const PageSize& paper : page_sizes())
+    names.append(names.empty() ? "" : ", ").append(paper.name);
   throw std::invalid_argument("there is no paper '" + name + "', only " + names);
 }
 
-std::optional<double> largest_size_m(const Board& board, const Paper& paper) {
-  constexpr int least_mm = 5, most_mm = 1000;
-  Board tried = board;
-  double& size_m = board.has_squares() ? tried.square_size_m : tried.tag_size_m;
-  for (int size_mm = most_mm; size_mm >= least_mm; --size_mm) {
+std::optional<double> find_largest_size_m(const Board& board, const PageSize& paper) {
+  constexpr int min_mm = 5, max_mm = 1000;
+  Board candidate = board;
+  double& size_m = board.has_squares() ? candidate.square_size_m : candidate.tag_size_m;
+  for (int size_mm = max_mm; size_mm >= min_mm; --size_mm) {
     size_m = size_mm / 1000.0;
-    if (sheet_for(tried, paper)) return size_m;
+    if (find_sheet_m(candidate, paper)) return size_m;
   }
   return {};
 }
 
-std::string board_pdf(const Board& board, const Paper& paper) {
-  const auto sheet_m = sheet_for(board, paper);
+std::string render_board_pdf(const Board& board, const PageSize& paper) {
+  const auto sheet_m = find_sheet_m(board, paper);
   if (!sheet_m) {
-    const Eigen::Vector2d needed_m = print_m(board);
-    throw std::invalid_argument("the board is " + in_mm(needed_m.x()) + " x " +
-                                in_mm(needed_m.y()) + " and does not fit on " + paper.name);
+    const Eigen::Vector2d needed_m = printed_size_m(board);
+    throw std::invalid_argument("the board is " + format_mm(needed_m.x()) + " x " +
+                                format_mm(needed_m.y()) + " and does not fit on " + paper.name);
   }
   std::string bytes;
   {

@@ -10,9 +10,9 @@
 namespace vlp {
 
 /// Deflection of a warped board along z of the board frame (SceneBoard::warp_m).
-class BoardBend {
+class BoardWarp {
  public:
-  explicit BoardBend(const SceneBoard& board);
+  explicit BoardWarp(const SceneBoard& board);
 
   /// Deflection and its derivatives with respect to x and y.
   struct Depth {
@@ -27,25 +27,25 @@ class BoardBend {
   Eigen::Vector2d field_m_, warp_m_;
 };
 
-/// Printed board, warped or flat, for add_shape_in_halves(). Values are radiances minus that of the
-/// surroundings.
-class BoardPrint {
+/// Printed board, warped or flat, for add_shape_supersampled(). Values are radiances minus that of
+/// the surroundings.
+class BoardPattern {
  public:
-  /// @throws std::invalid_argument if the board cannot be printed, see tag_pattern()
-  explicit BoardPrint(const SceneBoard& board);
+  /// @throws std::invalid_argument if the board cannot be printed, see make_tag_pattern()
+  explicit BoardPattern(const SceneBoard& board);
 
   /// Returns (x, y) of the intersection of a ray with the board, in the board frame; NaN if there
   /// is none.
   Eigen::Vector2d hit(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const;
-  double edge_integral(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const {
-    return mosaic_.edge_integral(p, q);
+  double integrate_edge(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const {
+    return mosaic_.integrate_edge(p, q);
   }
-  std::optional<double> even_value(const std::array<Eigen::Vector2d, 4>& corners) const {
-    return mosaic_.even_value(corners);
+  std::optional<double> constant_value(const std::array<Eigen::Vector2d, 4>& corners) const {
+    return mosaic_.constant_value(corners);
   }
 
  private:
-  BoardBend bend_;
+  BoardWarp warp_;
   Mosaic mosaic_;
 };
 

@@ -57,7 +57,7 @@ void read_yaws(YamlMap& map, LampShots& captures) {
   for (int i = 0; i < count; ++i) captures.yaws_rad.push_back(rad_from_deg(360.0 * i / count));
 }
 
-void read_lean(YamlMap map, LampShots& captures) {
+void read_roll_pitch(YamlMap map, LampShots& captures) {
   const auto ramp = [&](const std::string& key) {
     const auto value = map.optional(key);
     if (!value) return std::pair(0.0, 0.0);
@@ -87,9 +87,9 @@ LampShots read_lamp_captures(YamlMap& map, const Scene& scene, const Room& room)
   const auto rate = map.optional("turn_rate_deg_per_s");
   captures.turn_rate_rad_per_s =
       rate ? rad_from_deg(rate->number_within(-720, 720, "degrees per second")) : 0;
-  if (const auto lean = map.optional("lean")) read_lean(lean->map(), captures);
+  if (const auto lean = map.optional("lean")) read_roll_pitch(lean->map(), captures);
   const auto repeat = map.optional("repeat");
-  captures.repeat = repeat ? repeat->integer_within(1, kMostCaptures) : 1;
+  captures.repeat = repeat ? repeat->integer_within(1, kMaxCaptures) : 1;
   const auto known = map.optional("known");
   captures.known = known && known->boolean();
   check_count(double(captures.spots_m.size()) * double(captures.heights_m.size()) *
@@ -103,7 +103,7 @@ LampShots read_lamp_captures(YamlMap& map, const Scene& scene, const Room& room)
 
 BoardViews read_board_views(YamlMap map) {
   BoardViews views;
-  views.count = map.required("count").integer_within(1, kMostCaptures);
+  views.count = map.required("count").integer_within(1, kMaxCaptures);
   views.distance_m = read_range(map.required("distance_m"), 1e-3, 100, "m");
   views.tilt_rad = rad_from_deg(map.required("tilt_deg").number_within(0, 80, "degrees"));
   views.roll_rad = rad_from_deg(map.required("roll_deg").number_within(0, 180, "degrees"));

@@ -114,27 +114,30 @@ Sign read_sign(YamlMap map) {
 }
 
 /// Returns the height of the lowest light, m. Mirror images do not count.
-double lowest_light_m(const std::vector<SceneLamp>& lamps, const Clutter& clutter) {
+double find_lowest_light_m(const std::vector<SceneLamp>& lamps, const Clutter& clutter) {
   double lowest_m = std::numeric_limits<double>::infinity();
-  const auto see = [&](double height_m) { lowest_m = std::min(lowest_m, height_m); };
-  const auto see_panel = [&](const Panel& panel) {
-    see(panel.corner_m.z() + std::min(0.0, panel.edge_a_m.z()) + std::min(0.0, panel.edge_b_m.z()));
+  const auto include_height = [&](double height_m) { lowest_m = std::min(lowest_m, height_m); };
+  const auto include_panel = [&](const Panel& panel) {
+    include_height(panel.corner_m.z() + std::min(0.0, panel.edge_a_m.z()) +
+                   std::min(0.0, panel.edge_b_m.z()));
   };
-  for (const SceneLamp& lamp : lamps) see(lamp.glow.position_m.z());
-  for (const Glow& lamp : clutter.steady_lamps) see(lamp.position_m.z());
-  for (const Reflection& reflection : clutter.reflections) see(reflection.glow.position_m.z());
-  for (const ForeignLight& light : clutter.foreign_lights) see(light.glow.position_m.z());
-  for (const Panel& window : clutter.windows) see_panel(window);
-  for (const Blind& blind : clutter.blinds) see_panel(blind.window);
-  for (const Sign& sign : clutter.signs) see_panel(sign.panel);
+  for (const SceneLamp& lamp : lamps) include_height(lamp.glow.position_m.z());
+  for (const Glow& lamp : clutter.steady_lamps) include_height(lamp.position_m.z());
+  for (const Reflection& reflection : clutter.reflections)
+    include_height(reflection.glow.position_m.z());
+  for (const ForeignLight& light : clutter.foreign_lights)
+    include_height(light.glow.position_m.z());
+  for (const Panel& window : clutter.windows) include_panel(window);
+  for (const Blind& blind : clutter.blinds) include_panel(blind.window);
+  for (const Sign& sign : clutter.signs) include_panel(sign.panel);
   return lowest_m;
 }
 
 /// Rejects an occluder that is not below every light, since it is rendered as hiding all lights.
-void check_occluder(const YamlValue& item, const Panel& occluder, double lowest_light_m) {
+void check_occluder(const YamlValue& item, const Panel& occluder, double find_lowest_light_m) {
   const double highest_m = occluder.corner_m.z() + std::max(0.0, occluder.edge_a_m.z()) +
                            std::max(0.0, occluder.edge_b_m.z());
-  if (highest_m < lowest_light_m) return;
+  if (highest_m < find_lowest_light_m) return;
   throw item.error("is not below every lamp and other light");
 }
 
@@ -171,7 +174,7 @@ Clutter read_clutter(YamlMap map, const std::vector<SceneLamp>& lamps, const Roo
   if (const auto flicker = map.optional("ambient_flicker")) {
     clutter.ambient_flicker = read_mains(flicker->map());
   }
-  const double lowest_m = lowest_light_m(lamps, clutter);
+  const double lowest_m = find_lowest_light_m(lamps, clutter);
   for (const YamlValue& item : items(map, "occluders")) {
     clutter.occluders.push_back(read_panel(item.map()));
     check_occluder(item, clutter.occluders.back(), lowest_m);

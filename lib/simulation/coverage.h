@@ -28,7 +28,7 @@ inline double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
 }
 
 /// Returns a bit mask of the sides of the bounds on whose outer side the point lies; 0 for NaN.
-inline unsigned sides_beyond(const Eigen::AlignedBox2d& bounds, const Eigen::Vector2d& point) {
+inline unsigned find_sides_beyond(const Eigen::AlignedBox2d& bounds, const Eigen::Vector2d& point) {
   return unsigned(point.x() < bounds.min().x()) | unsigned(point.x() > bounds.max().x()) << 1 |
          unsigned(point.y() < bounds.min().y()) << 2 | unsigned(point.y() > bounds.max().y()) << 3;
 }
@@ -37,10 +37,10 @@ inline unsigned sides_beyond(const Eigen::AlignedBox2d& bounds, const Eigen::Vec
 /// pattern g over the pixel.
 ///
 /// The mean is exact for the pixel's image on the pattern, a quadrilateral Q. By Green's theorem
-/// the integral of g over Q is the sum of shape.edge_integral(p, q) over its edges. An edge
+/// the integral of g over Q is the sum of shape.integrate_edge(p, q) over its edges. An edge
 /// integral is the integral along the edge of any G(x, y) that Green's theorem turns into g.
 ///
-/// A shape has hit(origin, direction) in its frame, edge_integral(p, q) and bounds().
+/// A shape has hit(origin, direction) in its frame, integrate_edge(p, q) and bounds().
 /// Quadrilaterals whose corners all lie on the outer side of one side of these bounds are skipped,
 /// as g is 0 there.
 template <typename Shape>
@@ -51,7 +51,7 @@ void add_shape(const PixelRays& rays, const PixelWindow& window,
     double integral, area;
   };
   const auto edge = [&](const Eigen::Vector2d& p, const Eigen::Vector2d& q) {
-    return Edge{shape.edge_integral(p, q), cross(p, q) / 2};
+    return Edge{shape.integrate_edge(p, q), cross(p, q) / 2};
   };
   const auto corners = static_cast<std::size_t>(window.place_end - window.place_begin) + 1;
   const Eigen::AlignedBox2d bounds = shape.bounds();
@@ -65,7 +65,7 @@ void add_shape(const PixelRays& rays, const PixelWindow& window,
       const int place = window.place_begin + static_cast<int>(i);
       above[i] = shape.hit(origin, pose.linear() * rays.corner(line, place));
       below[i] = shape.hit(origin, pose.linear() * rays.corner(line + 1, place));
-      sides[i] = sides_beyond(bounds, above[i]) & sides_beyond(bounds, below[i]);
+      sides[i] = find_sides_beyond(bounds, above[i]) & find_sides_beyond(bounds, below[i]);
     }
     float* pixel = image[line - window.line_begin];
     Edge left = edge(below[0], above[0]);
@@ -90,11 +90,11 @@ void add_shape(const PixelRays& rays, const PixelWindow& window,
 
 /// Returns the mean of a shape's pattern over a quadrilateral with its corners in order.
 template <typename Shape>
-double mean_over(const std::array<Eigen::Vector2d, 4>& corners, const Shape& shape) {
+double compute_mean_over(const std::array<Eigen::Vector2d, 4>& corners, const Shape& shape) {
   double integral = 0, area = 0;
   for (std::size_t i = 0; i < 4; ++i) {
     const Eigen::Vector2d &p = corners[i], &q = corners[(i + 1) % 4];
-    integral += shape.edge_integral(p, q);
+    integral += shape.integrate_edge(p, q);
     area += cross(p, q) / 2;
   }
   return integral / area;
@@ -105,12 +105,12 @@ double mean_over(const std::array<Eigen::Vector2d, 4>& corners, const Shape& sha
 ///
 /// Reason: a lens blurs the light before pixels integrate it. Blurring pixel means instead would
 /// displace an edge by 0.01 px. Rays within a pixel are interpolated linearly between those of its
-/// corners. The shape also has even_value(corners): the value of its pattern where it is constant
-/// over a whole quadrilateral.
+/// corners. The shape also has constant_value(corners): the value of its pattern where it is
+/// constant over a whole quadrilateral.
 template <typename Shape>
-void add_shape_in_halves(const PixelRays& rays, const PixelWindow& window,
-                         const TargetFromCamera& target_from_camera, const Shape& shape,
-                         double weight, cv::Mat1f& image) {
+void add_shape_supersampled(const PixelRays& rays, const PixelWindow& window,
+                            const TargetFromCamera& target_from_camera, const Shape& shape,
+                            double weight, cv::Mat1f& image) {
   const auto corners = static_cast<std::size_t>(window.place_end - window.place_begin) + 1;
   std::vector<Eigen::Vector2d> above(corners), below(corners);
   for (int line = window.line_begin; line < window.line_end; ++line) {
@@ -130,7 +130,7 @@ void add_shape_in_halves(const PixelRays& rays, const PixelWindow& window,
         if (std::isfinite(value)) *half += static_cast<float>(weight * value);
       };
       const Eigen::Vector2d &a = above[i], &b = above[i + 1], &c = below[i + 1], &d = below[i];
-      if (const auto even = shape.even_value({a, b, c, d})) {
+      if (const auto even = shape.constant_value({a, b, c, d})) {
         for (float* half : {upper + 2 * i, lower + 2 * i}) {
           add(half, *even);
           add(half + 1, *even);
@@ -145,10 +145,10 @@ void add_shape_in_halves(const PixelRays& rays, const PixelWindow& window,
       const Eigen::Vector2d bc =
           hit(rays.corner(line, place + 1) + rays.corner(line + 1, place + 1));
       const Eigen::Vector2d da = hit(rays.corner(line, place) + rays.corner(line + 1, place));
-      add(upper + 2 * i, mean_over({a, ab, middle, da}, shape));
-      add(upper + 2 * i + 1, mean_over({ab, b, bc, middle}, shape));
-      add(lower + 2 * i, mean_over({da, middle, cd, d}, shape));
-      add(lower + 2 * i + 1, mean_over({middle, bc, c, cd}, shape));
+      add(upper + 2 * i, compute_mean_over({a, ab, middle, da}, shape));
+      add(upper + 2 * i + 1, compute_mean_over({ab, b, bc, middle}, shape));
+      add(lower + 2 * i, compute_mean_over({da, middle, cd, d}, shape));
+      add(lower + 2 * i + 1, compute_mean_over({middle, bc, c, cd}, shape));
     }
   }
 }

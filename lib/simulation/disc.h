@@ -27,11 +27,11 @@ class Disc {
   /// radius. add_shape() needs no other triangles.
   ///   Triangle inside: the area (p x q) / 2; of r^2, (p x q) (p p + p q + q q) / 12.
   ///   Sector of angle a: the area a / 2; of r^2, a / 4.
-  double edge_integral(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const;
+  double integrate_edge(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const;
 
  private:
-  double triangle(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const;
-  double sector(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const;
+  double integrate_triangle(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const;
+  double integrate_sector(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const;
 
   Eigen::Vector2d half_axes_m_;
   double fall_;

@@ -13,17 +13,17 @@ namespace {
 /// End of the halo, in lengths from the rim: 3e-4 of the value at the rim is left there.
 constexpr double kHaloLengths = 8;
 
-double wall_share(const Recess& recess, double radius_m, const Eigen::Vector2d& at_m) {
+double compute_wall_fraction(const Recess& recess, double radius_m, const Eigen::Vector2d& at_m) {
   if (!recess.dark_side) return recess.reflector_share;
   const DarkSide& dark = *recess.dark_side;
   const Eigen::Vector2d towards(std::cos(dark.azimuth_rad), std::sin(dark.azimuth_rad));
-  const double way = std::clamp((1 + at_m.dot(towards) / radius_m) / 2, 0.0, 1.0);
-  return recess.reflector_share + way * (dark.reflector_share - recess.reflector_share);
+  const double position = std::clamp((1 + at_m.dot(towards) / radius_m) / 2, 0.0, 1.0);
+  return recess.reflector_share + position * (dark.reflector_share - recess.reflector_share);
 }
 
 /// Returns the added fraction from the chips around a point of the disc. Chips further away add
 /// less than 1e-3.
-double share_of_chips(const Chips& chips, double radius_m, const Eigen::Vector2d& at_m) {
+double compute_chip_fraction(const Chips& chips, double radius_m, const Eigen::Vector2d& at_m) {
   constexpr double widths = 1.6;
   const Eigen::Array2d first = ((at_m.array() - widths * chips.width_m) / chips.pitch_m).ceil();
   const Eigen::Array2d last = ((at_m.array() + widths * chips.width_m) / chips.pitch_m).floor();
@@ -36,10 +36,11 @@ double share_of_chips(const Chips& chips, double radius_m, const Eigen::Vector2d
       sum += std::exp2(-ratio * ratio);
     }
   }
-  return chips.share * sum;
+  return chips.fraction * sum;
 }
 
-double share_of_hot_spots(const std::vector<HotSpot>& hot_spots, const Eigen::Vector2d& at_m) {
+double compute_hot_spot_fraction(const std::vector<HotSpot>& hot_spots,
+                                 const Eigen::Vector2d& at_m) {
   double sum = 0;
   for (const HotSpot& spot : hot_spots) {
     const double ratio = (at_m - spot.center_m).norm() / spot.sigma_m;
@@ -48,18 +49,18 @@ double share_of_hot_spots(const std::vector<HotSpot>& hot_spots, const Eigen::Ve
   return sum;
 }
 
-double share_around(const Halo& halo, double radius_m, const Eigen::Vector2d& at_m) {
+double compute_halo_fraction(const Halo& halo, double radius_m, const Eigen::Vector2d& at_m) {
   const double lengths = std::max(0.0, at_m.norm() - radius_m) / halo.length_m;
-  return lengths < kHaloLengths ? halo.share * std::exp(-lengths) : 0;
+  return lengths < kHaloLengths ? halo.fraction * std::exp(-lengths) : 0;
 }
 
 }  // namespace
 
-double share_inside(const Recess& recess, double radius_m, const Eigen::Vector3d& eye_m,
-                    const Eigen::Vector2d& at_m) {
+double compute_radiance_fraction(const Recess& recess, double radius_m,
+                                 const Eigen::Vector3d& eye_m, const Eigen::Vector2d& at_m) {
   if (eye_m.z() >= 0) return 0;
   const Eigen::Vector2d slope = (at_m - eye_m.head<2>()) / -eye_m.z();
-  double wall = wall_share(recess, radius_m, at_m);
+  double wall = compute_wall_fraction(recess, radius_m, at_m);
   if (recess.rim_power > 0) wall *= std::pow(at_m.norm() / radius_m, recess.rim_power);
   if (recess.far_side_slope) {
     const double halvings = (slope.norm() + at_m.dot(slope) / radius_m) / 2;
@@ -72,7 +73,7 @@ double share_inside(const Recess& recess, double radius_m, const Eigen::Vector3d
   return wall + (1 - wall) * source;
 }
 
-double reach_m(const Glow& glow) {
+double light_radius_m(const Glow& glow) {
   return glow.radius_m() + (glow.halo ? kHaloLengths * glow.halo->length_m : 0);
 }
 
@@ -99,13 +100,14 @@ void add_downlight(const PixelRays& rays, const PixelWindow& window,
                                     hit(line + 1, place + 1)) /
                                    4;
       if (!at_m.allFinite()) continue;
-      double share = 0;
-      if (glow.recess) share += part * share_inside(*glow.recess, radius_m, eye_m, at_m);
-      if (glow.chips) share += part * share_of_chips(*glow.chips, radius_m, at_m);
-      share += part * share_of_hot_spots(glow.hot_spots, at_m);
+      double fraction = 0;
+      if (glow.recess)
+        fraction += part * compute_radiance_fraction(*glow.recess, radius_m, eye_m, at_m);
+      if (glow.chips) fraction += part * compute_chip_fraction(*glow.chips, radius_m, at_m);
+      fraction += part * compute_hot_spot_fraction(glow.hot_spots, at_m);
       if (glow.halo && eye_m.z() < 0)
-        share += (1 - part) * share_around(*glow.halo, radius_m, at_m);
-      image(row, column) += static_cast<float>(glow.radiance_e_per_s * share);
+        fraction += (1 - part) * compute_halo_fraction(*glow.halo, radius_m, at_m);
+      image(row, column) += static_cast<float>(glow.radiance_e_per_s * fraction);
     }
   }
 }

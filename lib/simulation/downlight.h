@@ -8,15 +8,15 @@
 namespace vlp {
 
 /// Returns the radius up to which a glow emits light, its halo included, m.
-double reach_m(const Glow& glow);
+double light_radius_m(const Glow& glow);
 
 /// Returns the radiance on a ray inside the rim, as a fraction of the source's radiance; see
 /// Recess. 0 for an eye above the rim's plane.
 ///
 /// @param eye_m  start of the ray, from the rim's center, m
 /// @param at_m  intersection of the ray with the rim's plane, from the rim's center, m
-double share_inside(const Recess& recess, double radius_m, const Eigen::Vector3d& eye_m,
-                    const Eigen::Vector2d& at_m);
+double compute_radiance_fraction(const Recess& recess, double radius_m,
+                                 const Eigen::Vector3d& eye_m, const Eigen::Vector2d& at_m);
 
 /// Adds to each pixel of the window, which is all of `image`, the radiance of a glow with a recess,
 /// chips, hot spots or a halo.

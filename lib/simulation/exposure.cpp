@@ -17,7 +17,7 @@ namespace {
 /// Means from 16 on: quantile of a normal random number with the skewness correction of Cornish and
 /// Fisher (1938), rounded. Correction and rounding add 1/18 + 1/12 to the variance, which is
 /// subtracted beforehand. Mean and variance are exact, the distribution nearly.
-float poisson(float mean, cv::RNG& random) {
+float draw_poisson(float mean, cv::RNG& random) {
   constexpr float small = 16;
   if (mean <= 0) return 0;
   if (mean < small) {
@@ -38,13 +38,13 @@ void add_bloom(const Bloom& bloom, float full_well_e, cv::Mat1f& electrons) {
   excess = cv::max(excess, 0);
   if (cv::countNonZero(excess) == 0) return;
   cv::GaussianBlur(excess, excess, {}, bloom.sigma_px, bloom.sigma_px, cv::BORDER_CONSTANT);
-  electrons += bloom.share * excess;
+  electrons += bloom.fraction * excess;
 }
 
-void filter(const Bayer& bayer, cv::Mat1f& electrons) {
+void apply_filters(const Bayer& bayer, cv::Mat1f& electrons) {
   for (int line = 0; line < electrons.rows; ++line) {
     for (int place = 0; place < electrons.cols; ++place) {
-      electrons(line, place) *= static_cast<float>(passed_share(bayer, line, place));
+      electrons(line, place) *= static_cast<float>(filter_transmission(bayer, line, place));
     }
   }
 }
@@ -52,12 +52,12 @@ void filter(const Bayer& bayer, cv::Mat1f& electrons) {
 }  // namespace
 
 cv::Mat expose(const Sensor& sensor, const cv::Mat1f& mean_electrons, std::uint64_t seed,
-               const std::optional<Picture>& picture) {
+               const std::optional<ImageProcessing>& picture) {
   cv::RNG random(seed);
   cv::Mat1f electrons = mean_electrons.clone();
-  if (picture && picture->bayer) filter(*picture->bayer, electrons);
+  if (picture && picture->bayer) apply_filters(*picture->bayer, electrons);
   if (sensor.shot_noise) {
-    for (float& value : electrons) value = poisson(value, random);
+    for (float& value : electrons) value = draw_poisson(value, random);
   }
   const auto full_well = static_cast<float>(sensor.full_well_e);
   if (sensor.bloom) add_bloom(*sensor.bloom, full_well, electrons);
@@ -81,11 +81,11 @@ cv::Mat expose(const Sensor& sensor, const cv::Mat1f& mean_electrons, std::uint6
   }
   // The analog-to-digital converter rounds before demosaicing.
   for (float& level : levels) level = std::clamp(std::round(level), 0.F, float(white_dn(sensor)));
-  auto colours = colours_of(*picture->bayer, sensor, levels);
-  for (cv::Mat1f& colour : colours) develop(*picture, sensor, colour);
-  cv::Mat colour_image;
-  cv::merge(colours, colour_image);
-  colour_image.convertTo(image, type);
+  auto colors = demosaic(*picture->bayer, sensor, levels);
+  for (cv::Mat1f& color : colors) develop(*picture, sensor, color);
+  cv::Mat color_image;
+  cv::merge(colors, color_image);
+  color_image.convertTo(image, type);
   return image;
 }
 

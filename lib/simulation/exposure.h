@@ -16,6 +16,6 @@ namespace vlp {
 /// bits. The result has 8 or 16 bits; behind color filters it has three colors, blue first. The
 /// same seed yields the same image.
 cv::Mat expose(const Sensor& sensor, const cv::Mat1f& mean_electrons, std::uint64_t seed,
-               const std::optional<Picture>& picture = {});
+               const std::optional<ImageProcessing>& picture = {});
 
 }  // namespace vlp

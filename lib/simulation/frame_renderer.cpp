@@ -22,7 +22,7 @@ namespace vlp {
 
 namespace {
 
-cv::Mat1f vignetting_of(const PixelRays& rays, double power) {
+cv::Mat1f compute_vignetting(const PixelRays& rays, double power) {
   cv::Mat1f image(rays.lines(), rays.places());
   for (int line = 0; line < rays.lines(); ++line) {
     for (int place = 0; place < rays.places(); ++place) {
@@ -32,8 +32,10 @@ cv::Mat1f vignetting_of(const PixelRays& rays, double power) {
       const double cosine = ray.normalized().z();
       // Rays beyond 90 degrees off the axis arrive only without vignetting. NaN: the pixel has no
       // ray.
-      const double share = cosine > 0 ? std::pow(cosine, power) : power == 0 && cosine <= 0 ? 1 : 0;
-      image(line, place) = static_cast<float>(share);
+      const double fraction = cosine > 0                  ? std::pow(cosine, power)
+                              : power == 0 && cosine <= 0 ? 1
+                                                          : 0;
+      image(line, place) = static_cast<float>(fraction);
     }
   }
   return image;
@@ -43,14 +45,15 @@ cv::Mat1f vignetting_of(const PixelRays& rays, double power) {
 
 FrameRenderer::FrameRenderer(const Scene& scene)
     : scene_(scene),
-      rays_(scene.camera, reach_px(scene.optics)),
+      rays_(scene.camera, blur_radius_px(scene.optics)),
       optics_(scene.optics, rays_),
-      transmission_(vignetting_of(rays_, scene.optics.vignetting_power)) {
-  transmission_ = transmission_.mul(transmission_of(scene.optics.dust, rays_));
-  if (scene.board) print_.emplace(*scene.board);
+      transmission_(compute_vignetting(rays_, scene.optics.vignetting_power)) {
+  transmission_ = transmission_.mul(compute_dust_transmission(scene.optics.dust, rays_));
+  if (scene.board) pattern_.emplace(*scene.board);
 }
 
-cv::Mat1f FrameRenderer::collected(const cv::Mat1f& electrons_per_s, double exposure_s) const {
+cv::Mat1f FrameRenderer::integrate_exposure(const cv::Mat1f& electrons_per_s,
+                                            double exposure_s) const {
   return cv::Mat1f(rays_.without_margin(electrons_per_s).mul(transmission_, exposure_s));
 }
 
@@ -64,7 +67,7 @@ Eigen::Isometry3d panel_from_world(const Panel& panel) {
   return world_from_panel.inverse();
 }
 
-std::vector<Eigen::AlignedBox2d> bars_of(const Blind& blind) {
+std::vector<Eigen::AlignedBox2d> make_bars(const Blind& blind) {
   std::vector<Eigen::AlignedBox2d> bars;
   bars.reserve(std::size_t(blind.slats));
   for (int slat = 0; slat < blind.slats; ++slat) {
@@ -75,7 +78,7 @@ std::vector<Eigen::AlignedBox2d> bars_of(const Blind& blind) {
 }
 
 /// Returns a mosaic with the value 1 in boxes of a panel, given as fractions of its edges.
-Mosaic mosaic_on(const Panel& panel, const std::vector<Eigen::AlignedBox2d>& boxes) {
+Mosaic make_mosaic(const Panel& panel, const std::vector<Eigen::AlignedBox2d>& boxes) {
   const Eigen::Vector2d size_m(panel.edge_a_m.norm(), panel.edge_b_m.norm());
   std::vector<Rectangle> rectangles;
   for (const Eigen::AlignedBox2d& box : boxes) {
@@ -86,7 +89,7 @@ Mosaic mosaic_on(const Panel& panel, const std::vector<Eigen::AlignedBox2d>& box
   return Mosaic(rectangles);
 }
 
-Mosaic mosaic_of(const Panel& panel) {
+Mosaic make_mosaic(const Panel& panel) {
   return Mosaic({{0, 0, panel.edge_a_m.norm(), panel.edge_b_m.norm(), 1}});
 }
 
@@ -102,40 +105,40 @@ class LampFrame {
         shot_(shot),
         motion_(shot.motion),
         part_(part) {
-    if (!scene.clutter.occluders.empty() || mirror) open_ = rays_.image(1);
+    if (!scene.clutter.occluders.empty() || mirror) transmittance_ = rays_.image(1);
     for (const Panel& occluder : scene.clutter.occluders) {
-      open_ = open_.mul(1 - covered_by(occluder));
+      transmittance_ = transmittance_.mul(1 - compute_coverage(occluder));
     }
     if (!mirror) return;
-    open_ = open_.mul(mirror->reflectance * covered_by(mirror->pane));
-    pane_ = window_of(outline_of(mirror->pane), motion_, part_, rays_);
+    transmittance_ = transmittance_.mul(mirror->reflectance * compute_coverage(mirror->pane));
+    pane_window_ = compute_window(outline_of(mirror->pane), motion_, part_, rays_);
     mirror_ = mirror;
     reflection_ = reflection_about(mirror->pane);
   }
 
   /// Returns the light of all sources that are always on.
-  cv::Mat1f steady() const {
+  cv::Mat1f render_steady() const {
     const Clutter& clutter = scene_.clutter;
-    cv::Mat1f image = ceiling();
+    cv::Mat1f image = render_ceiling();
     if (clutter.windows.empty() && clutter.steady_lamps.empty() && clutter.occluders.empty() &&
         clutter.blinds.empty() && clutter.signs.empty()) {
       return image;
     }
     for (const Panel& window : clutter.windows) {
-      replace_ceiling(window, mosaic_of(window), image);
+      replace_ceiling(window, make_mosaic(window), image);
     }
     for (const Blind& blind : clutter.blinds) {
-      replace_ceiling(blind.window, mosaic_on(blind.window, bars_of(blind)), image);
+      replace_ceiling(blind.window, make_mosaic(blind.window, make_bars(blind)), image);
     }
     for (const Sign& sign : clutter.signs) {
-      replace_ceiling(sign.panel, mosaic_on(sign.panel, sign.strokes), image);
+      replace_ceiling(sign.panel, make_mosaic(sign.panel, sign.strokes), image);
     }
     for (const Glow& lamp : clutter.steady_lamps) {
-      const PixelWindow window = window_of_light(lamp);
-      if (!window.empty()) draw(lamp, window, window.of(image, rays_.margin_px()));
+      const PixelWindow window = compute_light_window(lamp);
+      if (!window.empty()) draw(lamp, window, window.crop(image, rays_.margin_px()));
     }
     for (const Panel& occluder : clutter.occluders) {
-      const cv::Mat1f hidden = covered_by(occluder);
+      const cv::Mat1f hidden = compute_coverage(occluder);
       image = image.mul(1 - hidden) + occluder.radiance_e_per_s * hidden;
     }
     optics_.spread(image, {-rays_.margin_px(), -rays_.margin_px()});
@@ -148,17 +151,17 @@ class LampFrame {
   void add(const Glow& glow, const Wave& wave, cv::Mat1f& image) const {
     const Eigen::Vector3d eye_m = motion_.world_from_camera(0).translation();
     if (mirror_ && !is_before(*mirror_, glow.position_m, eye_m)) return;
-    const PixelWindow window = window_of_light(glow);
+    const PixelWindow window = compute_light_window(glow);
     if (window.empty()) return;
     cv::Mat1f patch = window.image(0);
     draw(glow, window, patch);
-    if (!open_.empty()) patch = patch.mul(window.of(open_, rays_.margin_px()));
+    if (!transmittance_.empty()) patch = patch.mul(window.crop(transmittance_, rays_.margin_px()));
     optics_.spread(patch, {window.line_begin, window.place_begin});
     add_scattered(optics_.scatter(patch), wave, image);
-    cv::Mat1f target = window.of(image, rays_.margin_px());
+    cv::Mat1f target = window.crop(image, rays_.margin_px());
     for (int line = window.line_begin; line < window.line_end; ++line) {
       const int row = line - window.line_begin;
-      target.row(row) += wave.lit_share(part_.begin_s(line), part_.end_s(line)) * patch.row(row);
+      target.row(row) += wave.lit_fraction(part_.begin_s(line), part_.end_s(line)) * patch.row(row);
     }
   }
 
@@ -169,49 +172,50 @@ class LampFrame {
     if (scattered_e_per_s == 0) return;
     for (int row = 0; row < image.rows; ++row) {
       const int line = row - rays_.margin_px();
-      image.row(row) += wave.lit_share(part_.begin_s(line), part_.end_s(line)) * scattered_e_per_s;
+      image.row(row) +=
+          wave.lit_fraction(part_.begin_s(line), part_.end_s(line)) * scattered_e_per_s;
     }
   }
 
   /// Returns the ceiling's radiance while a line is exposed.
-  double ceiling_of(int line) const {
+  double ceiling_radiance(int line) const {
     if (!scene_.clutter.ambient_flicker) return scene_.ambient_e_per_s;
     RectifiedSine wave = *scene_.clutter.ambient_flicker;
     wave.phase = shot_.ambient_phase;
-    return scene_.ambient_e_per_s * wave.lit_share(part_.begin_s(line), part_.end_s(line));
+    return scene_.ambient_e_per_s * wave.lit_fraction(part_.begin_s(line), part_.end_s(line));
   }
-  cv::Mat1f ceiling() const {
+  cv::Mat1f render_ceiling() const {
     cv::Mat1f image = rays_.image(static_cast<float>(scene_.ambient_e_per_s));
     if (!scene_.clutter.ambient_flicker) return image;
     for (int row = 0; row < image.rows; ++row) {
-      image.row(row) = static_cast<float>(ceiling_of(row - rays_.margin_px()));
+      image.row(row) = static_cast<float>(ceiling_radiance(row - rays_.margin_px()));
     }
     return image;
   }
   /// Replaces the radiance of the ceiling by that of a panel where the pattern is 1.
   void replace_ceiling(const Panel& panel, const Mosaic& pattern, cv::Mat1f& image) const {
-    const PixelWindow window = window_of(outline_of(panel), motion_, part_, rays_);
+    const PixelWindow window = compute_window(outline_of(panel), motion_, part_, rays_);
     if (window.empty()) return;
     cv::Mat1f cover = window.image(0);
     add_shape(rays_, window, target_from_camera(panel_from_world(panel)), pattern, 1, cover);
-    cv::Mat1f target = window.of(image, rays_.margin_px());
+    cv::Mat1f target = window.crop(image, rays_.margin_px());
     for (int line = window.line_begin; line < window.line_end; ++line) {
       const int row = line - window.line_begin;
-      target.row(row) += (panel.radiance_e_per_s - ceiling_of(line)) * cover.row(row);
+      target.row(row) += (panel.radiance_e_per_s - ceiling_radiance(line)) * cover.row(row);
     }
   }
   /// Returns the fraction of each pixel that a panel covers.
-  cv::Mat1f covered_by(const Panel& panel) const {
+  cv::Mat1f compute_coverage(const Panel& panel) const {
     cv::Mat1f covered = rays_.image(0);
-    const PixelWindow window = window_of(outline_of(panel), motion_, part_, rays_);
-    if (!window.empty()) draw(panel, 1, window, window.of(covered, rays_.margin_px()));
+    const PixelWindow window = compute_window(outline_of(panel), motion_, part_, rays_);
+    if (!window.empty()) draw(panel, 1, window, window.crop(covered, rays_.margin_px()));
     return covered;
   }
-  PixelWindow window_of_light(const Glow& glow) const {
+  PixelWindow compute_light_window(const Glow& glow) const {
     auto outline_m = outline_of(glow);
-    if (!mirror_) return window_of(outline_m, motion_, part_, rays_);
+    if (!mirror_) return compute_window(outline_m, motion_, part_, rays_);
     for (Eigen::Vector3d& point_m : outline_m) point_m = reflection_ * point_m;
-    return intersection(window_of(outline_m, motion_, part_, rays_), pane_);
+    return intersect(compute_window(outline_m, motion_, part_, rays_), pane_window_);
   }
   /// Returns the pose of the camera in a target's frame; for a mirror, of the reflected camera.
   TargetFromCamera target_from_camera(const Eigen::Isometry3d& target_from_world) const {
@@ -222,12 +226,12 @@ class LampFrame {
   /// Draws a glow. `target` is the window's part of an image.
   void draw(const Glow& glow, const PixelWindow& window, cv::Mat1f target) const {
     if (!traits_of(glow.shape.kind).is_round) {
-      const Panel panel = panel_of(glow);
+      const Panel panel = make_bounding_panel(glow);
       if (glow.edge_share == 1) return draw(panel, glow.radiance_e_per_s, window, target);
-      cv::Mat1f own = window.image(0);
-      draw(panel, glow.radiance_e_per_s, window, own);
-      fade(panel, glow.edge_share, window, own);
-      target += own;
+      cv::Mat1f patch = window.image(0);
+      draw(panel, glow.radiance_e_per_s, window, patch);
+      fade(panel, glow.edge_share, window, patch);
+      target += patch;
       return;
     }
     const Eigen::Isometry3d world_from_glow =
@@ -243,13 +247,13 @@ class LampFrame {
   }
   /// Applies the falloff of Glow towards the edges of a panel, evaluated at each pixel's center.
   void fade(const Panel& panel, double edge_share, const PixelWindow& window,
-            cv::Mat1f& own) const {
+            cv::Mat1f& patch) const {
     const TargetFromCamera panel_from_camera = target_from_camera(panel_from_world(panel));
     const Eigen::Array2d size_m(panel.edge_a_m.norm(), panel.edge_b_m.norm());
     for (int line = window.line_begin; line < window.line_end; ++line) {
       const Eigen::Isometry3d pose = panel_from_camera(line);
       for (int place = window.place_begin; place < window.place_end; ++place) {
-        float& value = own(line - window.line_begin, place - window.place_begin);
+        float& value = patch(line - window.line_begin, place - window.place_begin);
         if (value == 0) continue;
         const Eigen::Vector3d middle =
             rays_.corner(line, place) + rays_.corner(line + 1, place + 1);
@@ -262,7 +266,7 @@ class LampFrame {
   }
   /// Draws a panel. `target` is the window's part of an image.
   void draw(const Panel& panel, double value, const PixelWindow& window, cv::Mat1f target) const {
-    add_shape(rays_, window, target_from_camera(panel_from_world(panel)), mosaic_of(panel), value,
+    add_shape(rays_, window, target_from_camera(panel_from_world(panel)), make_mosaic(panel), value,
               target);
   }
 
@@ -270,18 +274,18 @@ class LampFrame {
   const PixelRays& rays_;
   const PointSpread& optics_;
   const LampShot& shot_;
-  const CarrierMotion& motion_;
+  const BaseMotion& motion_;
   const Shutter& part_;
   /// Fraction of each pixel's light that is not hidden by an occluder, times the reflectance of the
   /// pane for a mirror. Empty if all light arrives.
-  cv::Mat1f open_;
+  cv::Mat1f transmittance_;
   const Mirror* mirror_ = nullptr;
-  PixelWindow pane_{};
+  PixelWindow pane_window_{};
   Eigen::Isometry3d reflection_ = Eigen::Isometry3d::Identity();
 };
 
 struct AlwaysOn {
-  static double lit_share(double, double) { return 1; }
+  static double lit_fraction(double, double) { return 1; }
 };
 
 /// Adds the mirror images of all lights.
@@ -299,8 +303,8 @@ void add_mirror_images(const Scene& scene, const LampShot& shot, const LampFrame
   }
 }
 
-/// Returns points on the outlines of everything in view, for moved_px().
-std::vector<Eigen::Vector3d> outlines_of(const Scene& scene) {
+/// Returns points on the outlines of everything in view, for compute_motion_px().
+std::vector<Eigen::Vector3d> collect_outlines(const Scene& scene) {
   std::vector<Eigen::Vector3d> points_m;
   const auto add = [&](const auto& thing) {
     const auto outline_m = outline_of(thing);
@@ -326,12 +330,13 @@ cv::Mat1f FrameRenderer::lamp_electrons(const LampShot& shot) const {
     const auto pose = [&](double time_s) {
       return shot.motion.world_from_camera(time_s).inverse();
     };
-    part.count = parts_of_exposure(moved_px(outlines_of(scene_), pose, shot.exposure_s, rays_));
+    part.count = count_exposure_parts(
+        compute_motion_px(collect_outlines(scene_), pose, shot.exposure_s, rays_));
   }
   cv::Mat1f sum = rays_.image(0);
   for (; part.index < part.count; ++part.index) {
     const LampFrame frame(scene_, rays_, optics_, shot, part);
-    sum += frame.steady();
+    sum += frame.render_steady();
     for (std::size_t i = 0; i < scene_.lamps.size(); ++i) {
       frame.add(scene_.lamps[i].glow, shot.waves[i], sum);
     }
@@ -346,13 +351,13 @@ cv::Mat1f FrameRenderer::lamp_electrons(const LampShot& shot) const {
       add_mirror_images(scene_, shot, LampFrame(scene_, rays_, optics_, shot, part, &mirror), sum);
     }
   }
-  return collected(sum, shot.exposure_s / part.count);
+  return integrate_exposure(sum, shot.exposure_s / part.count);
 }
 
 namespace {
 
-/// Returns points all over the board, for moved_px().
-std::vector<Eigen::Vector3d> points_on(const Board& board) {
+/// Returns points all over the board, for compute_motion_px().
+std::vector<Eigen::Vector3d> sample_points(const Board& board) {
   std::vector<Eigen::Vector3d> points_m;
   if (board.has_squares()) {
     for (const Eigen::Vector2d& at_m : square_corners_m(board)) {
@@ -360,7 +365,7 @@ std::vector<Eigen::Vector3d> points_on(const Board& board) {
     }
     return points_m;
   }
-  for (const BoardTag& tag : board_layout(board)) {
+  for (const BoardTag& tag : compute_board_layout(board)) {
     points_m.emplace_back(tag.corners_m[0].x(), tag.corners_m[0].y(), 0);
     points_m.emplace_back(tag.corners_m[2].x(), tag.corners_m[2].y(), 0);
   }
@@ -373,23 +378,23 @@ cv::Mat1f FrameRenderer::board_electrons(const BoardShot& shot) const {
   Shutter part = shutter(shot.exposure_s);
   if (!shot.velocity_in_camera_m_per_s.isZero(0)) {
     const auto pose = [&](double time_s) { return shot.camera_from_board(time_s); };
-    part.count =
-        parts_of_exposure(moved_px(points_on(scene_.board->print), pose, shot.exposure_s, rays_));
+    part.count = count_exposure_parts(
+        compute_motion_px(sample_points(scene_.board->print), pose, shot.exposure_s, rays_));
   }
   const auto surround = static_cast<float>(scene_.board->surround_e_per_s);
   const cv::Size pixels = rays_.image(0).size();
-  cv::Mat1f halves(2 * pixels.height, 2 * pixels.width, surround), image;
+  cv::Mat1f supersampled(2 * pixels.height, 2 * pixels.width, surround), image;
   for (; part.index < part.count; ++part.index) {
     const auto board_from_camera = [&](int line) {
       return shot.camera_from_board(part.middle_s(line)).inverse();
     };
-    add_shape_in_halves(rays_, whole_window(rays_), board_from_camera, *print_, 1.0 / part.count,
-                        halves);
+    add_shape_supersampled(rays_, whole_window(rays_), board_from_camera, *pattern_,
+                           1.0 / part.count, supersampled);
   }
-  optics_.spread(halves, {-rays_.margin_px(), -rays_.margin_px(), 2});
-  cv::resize(halves, image, pixels, 0, 0, cv::INTER_AREA);
+  optics_.spread(supersampled, {-rays_.margin_px(), -rays_.margin_px(), 2});
+  cv::resize(supersampled, image, pixels, 0, 0, cv::INTER_AREA);
   optics_.add_veil(image);
-  return collected(image, shot.exposure_s);
+  return integrate_exposure(image, shot.exposure_s);
 }
 
 }  // namespace vlp

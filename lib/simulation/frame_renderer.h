@@ -17,7 +17,8 @@ namespace vlp {
 ///   - A pixel integrates over its area (add_shape()) and over its exposure. Line i is exposed
 ///     around Shutter::center_s(i), from the pose of the camera at that time. Exposures during
 ///     which something in view moves by more than 0.1 px are sums of several shorter ones.
-///   - A board is blurred at twice the resolution, before pixels integrate (add_shape_in_halves()).
+///   - A board is blurred at twice the resolution, before pixels integrate
+///   (add_shape_supersampled()).
 ///   - Mirrors (Clutter::mirrors) show lights by rays that are reflected at the plane of the pane.
 ///   - The light of a lamp is first blurred by the lens, then switched at each line's exposure
 ///     time, as with a rolling shutter.
@@ -38,14 +39,14 @@ class FrameRenderer {
   }
 
  private:
-  cv::Mat1f collected(const cv::Mat1f& electrons_per_s, double exposure_s) const;
+  cv::Mat1f integrate_exposure(const cv::Mat1f& electrons_per_s, double exposure_s) const;
 
   const Scene& scene_;
   PixelRays rays_;
   PointSpread optics_;
   /// Vignetting and dust on the lens, 0 to 1.
   cv::Mat1f transmission_;
-  std::optional<BoardPrint> print_;
+  std::optional<BoardPattern> pattern_;
 };
 
 }  // namespace vlp

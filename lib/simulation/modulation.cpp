@@ -8,7 +8,7 @@
 
 namespace vlp {
 
-double SquareWave::lit_share(double begin_s, double end_s) const {
+double SquareWave::lit_fraction(double begin_s, double end_s) const {
   const auto lit_periods_until = [&](double t_s) {
     const double periods = frequency_hz * t_s + phase;
     const double whole = std::floor(periods);
@@ -18,7 +18,7 @@ double SquareWave::lit_share(double begin_s, double end_s) const {
          (frequency_hz * (end_s - begin_s));
 }
 
-double RectifiedSine::lit_share(double begin_s, double end_s) const {
+double RectifiedSine::lit_fraction(double begin_s, double end_s) const {
   // The integral of |sin(pi x)| from 0 to x grows by 2 / pi for each whole period.
   const auto integral_until = [&](double t_s) {
     const double periods = frequency_hz * t_s + phase;

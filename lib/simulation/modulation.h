@@ -13,7 +13,7 @@ struct SquareWave {
   double phase;  // in periods
 
   /// Returns the lit fraction of the time from begin_s to end_s > begin_s, in closed form.
-  double lit_share(double begin_s, double end_s) const;
+  double lit_fraction(double begin_s, double end_s) const;
 };
 
 /// Wave of a light on the mains, as a fraction of its greatest brightness:
@@ -25,7 +25,7 @@ struct RectifiedSine {
   double phase;  // in periods
 
   /// Returns the mean over the time from begin_s to end_s > begin_s, in closed form.
-  double lit_share(double begin_s, double end_s) const;
+  double lit_fraction(double begin_s, double end_s) const;
 };
 
 using LightWave = std::variant<SquareWave, RectifiedSine>;

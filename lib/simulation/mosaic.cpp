@@ -12,7 +12,7 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// Returns the coordinates in ascending order, with those that differ by rounding only merged.
-std::vector<double> distinct(std::vector<double> lines) {
+std::vector<double> merge_lines(std::vector<double> lines) {
   constexpr double same_m = 1e-9;
   std::sort(lines.begin(), lines.end());
   const auto same = [](double a, double b) { return b - a < same_m; };
@@ -21,22 +21,22 @@ std::vector<double> distinct(std::vector<double> lines) {
 }
 
 /// Returns the number of lines at or below a coordinate: 0 before the first.
-int cell_of(const std::vector<double>& lines, double at) {
+int find_cell(const std::vector<double>& lines, double at) {
   return static_cast<int>(std::upper_bound(lines.begin(), lines.end(), at) - lines.begin());
 }
 
 /// Returns the index of the closest line.
-int line_at(const std::vector<double>& lines, double at) {
+int find_closest_line(const std::vector<double>& lines, double at) {
   const auto closer = [&](double a, double b) { return std::abs(a - at) < std::abs(b - at); };
   return static_cast<int>(std::min_element(lines.begin(), lines.end(), closer) - lines.begin());
 }
 
 /// Traversal of the cells along one axis: the current cell, and the fraction of the path at which
 /// it ends.
-struct Walk {
-  Walk(const std::vector<double>& all, double from, double way)
-      : lines(all), start(from), length(way), cell(cell_of(all, from)) {
-    if (way < 0 && cell > 0 && all[std::size_t(cell) - 1] == from) --cell;  // downwards
+struct CellTraversal {
+  CellTraversal(const std::vector<double>& all, double from, double displacement)
+      : lines(all), start(from), length(displacement), cell(find_cell(all, from)) {
+    if (displacement < 0 && cell > 0 && all[std::size_t(cell) - 1] == from) --cell;  // downwards
   }
   double end() const {
     const int line = length > 0 ? cell : cell - 1;
@@ -57,17 +57,19 @@ Mosaic::Mosaic(const std::vector<Rectangle>& rectangles) {
     x_m_.insert(x_m_.end(), {each.left_m, each.right_m});
     y_m_.insert(y_m_.end(), {each.top_m, each.bottom_m});
   }
-  x_m_ = distinct(std::move(x_m_));
-  y_m_ = distinct(std::move(y_m_));
+  x_m_ = merge_lines(std::move(x_m_));
+  y_m_ = merge_lines(std::move(y_m_));
   stride_ = x_m_.size() + 1;
   values_.assign(stride_ * (y_m_.size() + 1), 0);
   for (const Rectangle& rectangle : rectangles) fill(rectangle);
-  sum_up();
+  accumulate_rows();
 }
 
 void Mosaic::fill(const Rectangle& rectangle) {
-  const int top = line_at(y_m_, rectangle.top_m), bottom = line_at(y_m_, rectangle.bottom_m);
-  const int left = line_at(x_m_, rectangle.left_m), right = line_at(x_m_, rectangle.right_m);
+  const int top = find_closest_line(y_m_, rectangle.top_m),
+            bottom = find_closest_line(y_m_, rectangle.bottom_m);
+  const int left = find_closest_line(x_m_, rectangle.left_m),
+            right = find_closest_line(x_m_, rectangle.right_m);
   for (int row = top + 1; row <= bottom; ++row) {
     for (int column = left + 1; column <= right; ++column) {
       values_[index(column, row)] = rectangle.value;
@@ -75,7 +77,7 @@ void Mosaic::fill(const Rectangle& rectangle) {
   }
 }
 
-void Mosaic::sum_up() {
+void Mosaic::accumulate_rows() {
   sums_.assign(values_.size(), 0);
   for (std::size_t i = 0; i < values_.size(); ++i) {
     const std::size_t column = i % stride_;
@@ -91,15 +93,15 @@ double Mosaic::value_sum(int column, int row, double x) const {
   return sums_[i] + values_[i] * (x - x_m_[static_cast<std::size_t>(column) - 1]);
 }
 
-double Mosaic::edge_integral(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const {
-  const Eigen::Vector2d way = q - p;
-  if (!way.allFinite()) return std::numeric_limits<double>::quiet_NaN();
-  Walk x(x_m_, p.x(), way.x()), y(y_m_, p.y(), way.y());
+double Mosaic::integrate_edge(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const {
+  const Eigen::Vector2d displacement = q - p;
+  if (!displacement.allFinite()) return std::numeric_limits<double>::quiet_NaN();
+  CellTraversal x(x_m_, p.x(), displacement.x()), y(y_m_, p.y(), displacement.y());
   double sum = 0, done = 0;
   while (done < 1) {
     const double x_end = x.end(), y_end = y.end();
     const double next = std::min({x_end, y_end, 1.0});
-    const double middle = p.x() + way.x() * (done + next) / 2;
+    const double middle = p.x() + displacement.x() * (done + next) / 2;
     sum += value_sum(x.cell, y.cell, middle) * (next - done);
     if (x_end <= y_end) {
       x.step();
@@ -108,21 +110,22 @@ double Mosaic::edge_integral(const Eigen::Vector2d& p, const Eigen::Vector2d& q)
     }
     done = next;
   }
-  return sum * way.y();
+  return sum * displacement.y();
 }
 
-std::optional<double> Mosaic::even_value(const std::array<Eigen::Vector2d, 4>& corners) const {
-  Eigen::Vector2d least = corners[0], most = corners[0];
+std::optional<double> Mosaic::constant_value(const std::array<Eigen::Vector2d, 4>& corners) const {
+  Eigen::Vector2d lower = corners[0], upper = corners[0];
   for (const Eigen::Vector2d& corner : corners) {
     if (!corner.allFinite()) return std::nullopt;
-    least = least.cwiseMin(corner);
-    most = most.cwiseMax(corner);
+    lower = lower.cwiseMin(corner);
+    upper = upper.cwiseMax(corner);
   }
-  const int column = cell_of(x_m_, least.x()), row = cell_of(y_m_, least.y());
+  const int column = find_cell(x_m_, lower.x()), row = find_cell(y_m_, lower.y());
   const auto ends_before = [](const std::vector<double>& lines, int cell, double at) {
     return cell < static_cast<int>(lines.size()) && lines[static_cast<std::size_t>(cell)] <= at;
   };
-  if (ends_before(x_m_, column, most.x()) || ends_before(y_m_, row, most.y())) return std::nullopt;
+  if (ends_before(x_m_, column, upper.x()) || ends_before(y_m_, row, upper.y()))
+    return std::nullopt;
   return values_[index(column, row)];
 }
 

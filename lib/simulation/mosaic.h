@@ -35,15 +35,15 @@ class Mosaic {
 
   /// Returns the integral of G dy along the edge from p to q. G(x, y) is the integral of the
   /// pattern along the row from minus infinity to x.
-  double edge_integral(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const;
+  double integrate_edge(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const;
 
   /// Returns the value of the pattern over a quadrilateral; std::nullopt if a line of the pattern
   /// lies between its corners.
-  std::optional<double> even_value(const std::array<Eigen::Vector2d, 4>& corners) const;
+  std::optional<double> constant_value(const std::array<Eigen::Vector2d, 4>& corners) const;
 
  private:
   void fill(const Rectangle& rectangle);
-  void sum_up();
+  void accumulate_rows();
   std::size_t index(int column, int row) const {
     return static_cast<std::size_t>(row) * stride_ + static_cast<std::size_t>(column);
   }

@@ -18,23 +18,23 @@ double white_dn(const Sensor& sensor);
 int filter_at(int line, int place);
 
 /// Returns the fraction of a pixel's light that its filter passes, relative to green.
-double passed_share(const Bayer& bayer, int line, int place);
+double filter_transmission(const Bayer& bayer, int line, int place);
 
 /// Demosaics the gray levels behind a mosaic of filters and balances the three colors.
-std::vector<cv::Mat1f> colours_of(const Bayer& bayer, const Sensor& sensor,
-                                  const cv::Mat1f& levels);
+std::vector<cv::Mat1f> demosaic(const Bayer& bayer, const Sensor& sensor, const cv::Mat1f& levels);
 
 /// Applies the tone curve of Picture to one gray level, DN.
-double coded_level(const Picture& picture, const Sensor& sensor, double level_dn);
+double apply_tone_curve(const ImageProcessing& picture, const Sensor& sensor, double level_dn);
 
 /// Applies tone curve and sharpening of Picture to gray levels before rounding. Border pixels are
 /// replicated.
-void develop(const Picture& picture, const Sensor& sensor, cv::Mat1f& levels);
+void develop(const ImageProcessing& picture, const Sensor& sensor, cv::Mat1f& levels);
 
 /// Returns the file name extension of the images: ".jpg" or ".png".
-std::string image_ending(const std::optional<Picture>& picture);
+std::string image_extension(const std::optional<ImageProcessing>& picture);
 
 /// Encodes the image as JPEG, or losslessly as PNG.
-std::vector<unsigned char> encoded(const cv::Mat& image, const std::optional<Picture>& picture);
+std::vector<unsigned char> encode_image(const cv::Mat& image,
+                                        const std::optional<ImageProcessing>& picture);
 
 }  // namespace vlp

@@ -5,11 +5,11 @@
 
 namespace vlp {
 
-Picture read_picture(YamlMap map, const Sensor& sensor) {
+ImageProcessing read_image_processing(YamlMap map, const Sensor& sensor) {
   if (sensor.black_level_dn >= white_dn(sensor)) {
     throw map.error("needs levels between sensor.black_level_dn and white");
   }
-  Picture picture;
+  ImageProcessing picture;
   picture.gamma = map.required("gamma").number_within(0.1, 10, "(of the tone curve)");
   if (const auto sharpening = map.optional("sharpening")) {
     YamlMap keys = sharpening->map();
@@ -23,11 +23,11 @@ Picture read_picture(YamlMap map, const Sensor& sensor) {
   }
   if (const auto bayer = map.optional("bayer")) {
     YamlMap keys = bayer->map();
-    const auto share = [&](const char* key) {
+    const auto fraction = [&](const char* key) {
       return keys.required(key).number_within(0.05, 2, "(of what green filters pass)");
     };
-    const double red_share = share("red_share");
-    picture.bayer = Bayer{red_share, share("blue_share")};
+    const double red_share = fraction("red_share");
+    picture.bayer = Bayer{red_share, fraction("blue_share")};
     keys.finish();
   }
   map.finish();

@@ -15,46 +15,48 @@ PixelWindow whole_window(const PixelRays& rays) {
   return {-margin, rays.lines() + margin, -margin, rays.places() + margin};
 }
 
-PixelWindow window_of(const std::vector<Eigen::Vector3d>& outline_m, const CarrierMotion& motion,
-                      const Shutter& shutter, const PixelRays& rays) {
+PixelWindow compute_window(const std::vector<Eigen::Vector3d>& outline_m, const BaseMotion& motion,
+                           const Shutter& shutter, const PixelRays& rays) {
   const double begin_s = shutter.begin_s(-rays.margin_px());
   const double end_s = shutter.end_s(rays.lines() + rays.margin_px());
   // Between two samples an arc of 450 px deviates from its chord by less than 0.1 px.
   const double step_rad = rad_from_deg(2);
-  constexpr double a_period = 16;
-  const double of_vibration =
-      motion.vibration.amplitude_rad > 0 ? a_period * motion.vibration.frequency_hz : 0;
+  constexpr double samples_per_period = 16;
+  const double samples_for_vibration =
+      motion.vibration.amplitude_rad > 0 ? samples_per_period * motion.vibration.frequency_hz : 0;
   const int samples =
-      4 + static_cast<int>((std::abs(motion.turn_rate_rad_per_s) / step_rad + of_vibration) *
-                           (end_s - begin_s));
-  constexpr double far = 1e6;
-  Eigen::Array2d least = Eigen::Array2d::Constant(far), most = -least;
+      4 +
+      static_cast<int>((std::abs(motion.turn_rate_rad_per_s) / step_rad + samples_for_vibration) *
+                       (end_s - begin_s));
+  constexpr double max_coordinate = 1e6;
+  Eigen::Array2d lower = Eigen::Array2d::Constant(max_coordinate), upper = -lower;
   for (int i = 0; i <= samples; ++i) {
     const double time_s = begin_s + (end_s - begin_s) * i / samples;
     const Eigen::Isometry3d camera_from_world = motion.world_from_camera(time_s).inverse();
     for (const Eigen::Vector3d& point_m : outline_m) {
       const auto pixel = rays.lens().project(camera_from_world * point_m);
       if (!pixel) return whole_window(rays);
-      const Eigen::Array2d at = rays.line_and_place(*pixel).array().max(-far).min(far);
-      least = least.min(at);
-      most = most.max(at);
+      const Eigen::Array2d at =
+          rays.line_and_place(*pixel).array().max(-max_coordinate).min(max_coordinate);
+      lower = lower.min(at);
+      upper = upper.max(at);
     }
   }
-  constexpr int between_points_px = 2;  // bulge of the outline between two points
-  const int spare = rays.margin_px() + between_points_px;
+  constexpr int bulge_px = 2;  // bulge of the outline between two points
+  const int spare = rays.margin_px() + bulge_px;
   const PixelWindow all = whole_window(rays);
-  return {std::max(all.line_begin, int(std::floor(least[0])) - spare),
-          std::min(all.line_end, int(std::ceil(most[0])) + spare + 1),
-          std::max(all.place_begin, int(std::floor(least[1])) - spare),
-          std::min(all.place_end, int(std::ceil(most[1])) + spare + 1)};
+  return {std::max(all.line_begin, int(std::floor(lower[0])) - spare),
+          std::min(all.line_end, int(std::ceil(upper[0])) + spare + 1),
+          std::max(all.place_begin, int(std::floor(lower[1])) - spare),
+          std::min(all.place_end, int(std::ceil(upper[1])) + spare + 1)};
 }
 
-PixelWindow intersection(const PixelWindow& a, const PixelWindow& b) {
+PixelWindow intersect(const PixelWindow& a, const PixelWindow& b) {
   return {std::max(a.line_begin, b.line_begin), std::min(a.line_end, b.line_end),
           std::max(a.place_begin, b.place_begin), std::min(a.place_end, b.place_end)};
 }
 
-Panel panel_of(const Glow& glow) {
+Panel make_bounding_panel(const Glow& glow) {
   const auto at = [&](double x, double y) {
     return world_from_shape(glow.shape, glow.position_m, {x, y});
   };
@@ -63,16 +65,17 @@ Panel panel_of(const Glow& glow) {
 }
 
 std::vector<Eigen::Vector3d> outline_of(const Glow& glow) {
-  return outline_of(glow.halo ? make_disc(2 * reach_m(glow)) : glow.shape, glow.position_m, 96);
+  return outline_of(glow.halo ? make_disc(2 * light_radius_m(glow)) : glow.shape, glow.position_m,
+                    96);
 }
 
 std::vector<Eigen::Vector3d> outline_of(const Panel& panel) {
   constexpr int per_edge = 24;
   std::vector<Eigen::Vector3d> points_m;
   for (int i = 0; i <= per_edge; ++i) {
-    const double share = double(i) / per_edge;
-    const Eigen::Vector3d along_a = panel.corner_m + share * panel.edge_a_m;
-    const Eigen::Vector3d along_b = panel.corner_m + share * panel.edge_b_m;
+    const double fraction = double(i) / per_edge;
+    const Eigen::Vector3d along_a = panel.corner_m + fraction * panel.edge_a_m;
+    const Eigen::Vector3d along_b = panel.corner_m + fraction * panel.edge_b_m;
     points_m.insert(points_m.end(),
                     {along_a, along_a + panel.edge_b_m, along_b, along_b + panel.edge_a_m});
   }

@@ -20,7 +20,7 @@ struct PixelWindow {
     return cv::Mat1f(line_end - line_begin, place_end - place_begin, value);
   }
   /// Returns the window's part of an image with margin (PixelRays::image()).
-  cv::Mat1f of(const cv::Mat1f& image, int margin_px) const {
+  cv::Mat1f crop(const cv::Mat1f& image, int margin_px) const {
     return image(cv::Rect(place_begin + margin_px, line_begin + margin_px, place_end - place_begin,
                           line_end - line_begin));
   }
@@ -34,14 +34,14 @@ PixelWindow whole_window(const PixelRays& rays);
 /// outline.
 ///
 /// @param outline_m  neighboring points on the outline, in the world, m
-PixelWindow window_of(const std::vector<Eigen::Vector3d>& outline_m, const CarrierMotion& motion,
-                      const Shutter& shutter, const PixelRays& rays);
+PixelWindow compute_window(const std::vector<Eigen::Vector3d>& outline_m, const BaseMotion& motion,
+                           const Shutter& shutter, const PixelRays& rays);
 
 /// Returns the pixels that are in both windows.
-PixelWindow intersection(const PixelWindow& a, const PixelWindow& b);
+PixelWindow intersect(const PixelWindow& a, const PixelWindow& b);
 
 /// Returns the box around a glow.
-Panel panel_of(const Glow& glow);
+Panel make_bounding_panel(const Glow& glow);
 
 /// Returns points around the light of a glow (its rim, or the end of its halo), or along the edges
 /// of a panel.

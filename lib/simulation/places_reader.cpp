@@ -54,15 +54,16 @@ StraightDrive read_drive(const YamlValue& value, const Room& room, double lever_
   return drive;
 }
 
-std::vector<Eigen::Vector2d> places_along(const StraightDrive& drive, double interval_s,
-                                          const YamlValue& value) {
-  const Eigen::Vector2d way = drive.to_m - drive.from_m;
+std::vector<Eigen::Vector2d> compute_positions_along(const StraightDrive& drive, double interval_s,
+                                                     const YamlValue& value) {
+  const Eigen::Vector2d displacement = drive.to_m - drive.from_m;
   const double step_m = drive.speed_m_per_s * interval_s;
   constexpr double rounding = 1e-12;
-  const double steps = std::floor(way.norm() / step_m * (1 + rounding));
+  const double steps = std::floor(displacement.norm() / step_m * (1 + rounding));
   check_count(steps + 1, value);
   std::vector<Eigen::Vector2d> places;
-  for (int i = 0; i <= steps; ++i) places.push_back(drive.from_m + way.normalized() * (step_m * i));
+  for (int i = 0; i <= steps; ++i)
+    places.push_back(drive.from_m + displacement.normalized() * (step_m * i));
   return places;
 }
 
@@ -84,7 +85,7 @@ void read_places(YamlMap& map, const Scene& scene, const Room& room, LampShots& 
     captures.spots_m = read_grid(*grid, room, lever_arm_m);
   } else {
     captures.drive = read_drive(*drive, room, lever_arm_m);
-    captures.spots_m = places_along(*captures.drive, captures.interval_s, *drive);
+    captures.spots_m = compute_positions_along(*captures.drive, captures.interval_s, *drive);
   }
 }
 

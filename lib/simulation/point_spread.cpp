@@ -68,7 +68,7 @@ double soft_spot(double distance) {
 
 }  // namespace
 
-int reach_px(const Optics& optics) {
+int blur_radius_px(const Optics& optics) {
   double reach = kGaussianReach * optics.blur_px;
   if (optics.defocus) reach += max_radius_px(*optics.defocus);
   double halo = 0;
@@ -134,7 +134,7 @@ float PointSpread::scatter(cv::Mat1f& part) const {
   return static_cast<float>(scattered);
 }
 
-cv::Mat1f transmission_of(const std::vector<Dust>& dust, const PixelRays& rays) {
+cv::Mat1f compute_dust_transmission(const std::vector<Dust>& dust, const PixelRays& rays) {
   cv::Mat1f transmission(rays.lines(), rays.places(), 1.F);
   for (const Dust& speck : dust) {
     const Eigen::Vector2d middle = rays.line_and_place(speck.at_px);

@@ -11,7 +11,7 @@ namespace vlp {
 
 /// Returns the radius of the point spread of the optics, px: less than 1e-3 of the light falls
 /// outside. The veil is not included, as it extends over the whole image.
-int reach_px(const Optics& optics);
+int blur_radius_px(const Optics& optics);
 
 /// Position and resolution of a part of an image, lines x places, to be blurred.
 struct SpreadWindow {
@@ -51,6 +51,6 @@ class PointSpread {
 };
 
 /// Returns the fraction of the light that passes the dust on the lens (Dust), as lines x places.
-cv::Mat1f transmission_of(const std::vector<Dust>& dust, const PixelRays& rays);
+cv::Mat1f compute_dust_transmission(const std::vector<Dust>& dust, const PixelRays& rays);
 
 }  // namespace vlp

@@ -28,7 +28,7 @@ void draw_hot_spots(cv::RNG random, Glow& glow) {
 
 /// Returns the strokes of a seven-segment digit as fractions of a letter's cell. x runs from left
 /// to right, y from bottom to top.
-const std::array<Eigen::AlignedBox2d, 7>& strokes_of_digit() {
+const std::array<Eigen::AlignedBox2d, 7>& digit_strokes() {
   constexpr double left = 0.15, right = 0.75, bottom = 0.15, top = 0.85, stroke = 0.14;
   constexpr double middle = (bottom + top) / 2, half = stroke / 2;
   using Box = Eigen::AlignedBox2d;
@@ -49,11 +49,11 @@ void draw_letters(cv::RNG random, Sign& sign) {
   sign.strokes.clear();
   for (int line = 0; line < sign.lines; ++line) {
     for (int letter = 0; letter < sign.letters; ++letter) {
-      const int drawn = random.uniform(1, 1 << 7);
+      const int stroke_mask = random.uniform(1, 1 << 7);
       const Eigen::Array2d corner(letter, sign.lines - 1 - line);
-      for (std::size_t stroke = 0; stroke < strokes_of_digit().size(); ++stroke) {
-        if ((drawn >> stroke & 1) == 0) continue;
-        const Eigen::AlignedBox2d& box = strokes_of_digit()[stroke];
+      for (std::size_t stroke = 0; stroke < digit_strokes().size(); ++stroke) {
+        if ((stroke_mask >> stroke & 1) == 0) continue;
+        const Eigen::AlignedBox2d& box = digit_strokes()[stroke];
         sign.strokes.emplace_back(((corner + box.min().array()) * cell).matrix(),
                                   ((corner + box.max().array()) * cell).matrix());
       }
@@ -65,7 +65,7 @@ void draw_letters(cv::RNG random, Sign& sign) {
 
 void draw_random_parts(Scene& scene) {
   const auto random = [&](std::string_view name, std::size_t index) {
-    return random_of(scene.seed, name, index);
+    return make_random(scene.seed, name, index);
   };
   for (SceneLamp& lamp : scene.lamps) {
     draw_hot_spots(random("chips of a lamp", static_cast<std::size_t>(lamp.id)), lamp.glow);

@@ -62,7 +62,7 @@ struct Recess {
 ///   radiance fraction exp(-(r - D / 2) / length)
 /// up to 8 lengths from the rim.
 struct Halo {
-  double share;
+  double fraction;
   double length_m;
 };
 
@@ -72,7 +72,7 @@ struct Halo {
 /// Rows and columns of the grid have the distance `pitch_m`, along x and y of the world. One chip
 /// is at the center of the disc.
 struct Chips {
-  double share;
+  double fraction;
   double pitch_m, width_m;
 };
 
@@ -237,7 +237,7 @@ struct Optics {
 /// Overflow of charge above the full well: the given fraction goes to the surrounding pixels, as
 /// a Gaussian.
 struct Bloom {
-  double share;
+  double fraction;
   double sigma_px;
 };
 
@@ -275,7 +275,7 @@ struct Bayer {
 ///   tone curve v = white ((level - black level) / (white - black level))^(1 / gamma), 0 to white
 ///   sharpening, rounding, JPEG
 /// Without a picture, the levels are those of the sensor.
-struct Picture {
+struct ImageProcessing {
   double gamma;
   std::optional<Sharpening> sharpening;
   /// JPEG quality as in libjpeg, 1 to 100, images of 8 bits only; PNG if not set.
@@ -307,7 +307,7 @@ struct SceneBoard {
 
 /// Variation of the cameras and sessions of an archive around the scene, see archive.h. Each value
 /// is the half width of a uniform distribution.
-struct ArchiveSpreads {
+struct ArchiveVariation {
   int sessions_per_camera;
   /// Variation of a camera: relative of both focal lengths together, of each coordinate of the
   /// center, and relative of each distortion coefficient.
@@ -328,7 +328,7 @@ struct Scene {
   Camera camera;
   Optics optics;
   Sensor sensor;
-  std::optional<Picture> picture;
+  std::optional<ImageProcessing> picture;
   Mount mount;
   /// Radiance of the ceiling.
   double ambient_e_per_s;
@@ -336,7 +336,7 @@ struct Scene {
   Clutter clutter;
   std::optional<SceneBoard> board;
   std::vector<CaptureSet> sets;
-  std::optional<ArchiveSpreads> archive;
+  std::optional<ArchiveVariation> archive;
 };
 
 /// Reads `vlp-scene/1`; datasets/README.md lists the keys, and the scenes there explain them.

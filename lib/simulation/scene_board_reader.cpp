@@ -22,15 +22,15 @@ SceneBoard read_scene_board(YamlMap map) {
   board.warp_m = Eigen::Vector2d(warp.numbers(2).data());
   constexpr double micrometres = 1e6;  // unit of the bound in messages
   const double tenth_m =
-      0.1 * tag_pitch_m(board.print) * std::min(board.print.cols, board.print.rows);
-  const double most = std::round(micrometres * tenth_m) / micrometres;
-  for (const YamlValue& part : warp.list()) part.number_within(-most, most, "m");
+      0.1 * compute_tag_pitch_m(board.print) * std::min(board.print.cols, board.print.rows);
+  const double max_warp_m = std::round(micrometres * tenth_m) / micrometres;
+  for (const YamlValue& part : warp.list()) part.number_within(-max_warp_m, max_warp_m, "m");
   board.white_e_per_s = read_radiance(map, "white_e_per_s");
   board.black_e_per_s = read_radiance(map, "black_e_per_s");
   board.surround_e_per_s = read_radiance(map, "surround_e_per_s");
   map.finish();
   try {
-    BoardPrint{board};
+    BoardPattern{board};
   } catch (const std::invalid_argument& failure) {
     throw print_value.error(failure.what());
   }

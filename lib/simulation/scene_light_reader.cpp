@@ -9,7 +9,7 @@
 namespace vlp {
 namespace {
 
-double read_share(YamlMap& map, const std::string& key) {
+double read_fraction(YamlMap& map, const std::string& key) {
   return map.required(key).number_within(0, 1, "(of the source's radiance)");
 }
 
@@ -21,16 +21,16 @@ Recess read_recess(YamlMap map, const Glow& rim) {
   if (recess.source_diameter_m > 2 * rim.radius_m()) {
     throw source.error("is larger than the rim, diameter_m");
   }
-  recess.reflector_share = read_share(map, "reflector_share");
+  recess.reflector_share = read_fraction(map, "reflector_share");
   if (const auto dark = map.optional("dark_side")) {
     YamlMap keys = dark->map();
     recess.dark_side =
-        DarkSide{read_share(keys, "reflector_share"),
+        DarkSide{read_fraction(keys, "reflector_share"),
                  rad_from_deg(keys.required("azimuth_deg").number_within(-360, 360, "degrees"))};
     keys.finish();
   }
-  const auto read_power = [&](const std::string& key, double least, double& power) {
-    if (const auto value = map.optional(key)) power = value->number_within(least, 30, "");
+  const auto read_power = [&](const std::string& key, double min_power, double& power) {
+    if (const auto value = map.optional(key)) power = value->number_within(min_power, 30, "");
   };
   read_power("source_power", 0.5, recess.source_power);
   read_power("rim_power", 0, recess.rim_power);
@@ -44,7 +44,7 @@ Recess read_recess(YamlMap map, const Glow& rim) {
 
 Chips read_chips(YamlMap map, const Glow& disc) {
   Chips chips;
-  chips.share = read_share(map, "share");
+  chips.fraction = read_fraction(map, "share");
   const YamlValue pitch = map.required("pitch_m");
   chips.pitch_m = pitch.number_within(1e-3, 10, "m");
   if (chips.pitch_m > 2 * disc.radius_m()) throw pitch.error("is larger than the disc, diameter_m");
@@ -100,14 +100,14 @@ void read_profile(YamlMap& map, Glow& glow) {
   if (const auto halo = map.optional("halo")) {
     YamlMap keys = halo->map();
     glow.halo =
-        Halo{read_share(keys, "share"), keys.required("length_m").number_within(1e-3, 2, "m")};
+        Halo{read_fraction(keys, "share"), keys.required("length_m").number_within(1e-3, 2, "m")};
     keys.finish();
   }
 }
 
 std::vector<SceneLamp> read_scene_lamps(const YamlValue& list, const Room& room) {
   std::vector<SceneLamp> lamps;
-  EarlierLamps earlier;
+  UniqueLamps earlier;
   for (const YamlValue& item : list.list()) {
     YamlMap map = item.map();
     const Lamp lamp = read_lamp(map);

@@ -19,18 +19,18 @@ struct Room {
 };
 
 /// Largest number of captures of one folder.
-inline constexpr int kMostCaptures = 1'000'000;
+inline constexpr int kMaxCaptures = 1'000'000;
 
 Eigen::Vector3d read_point(const YamlValue& value);
 double read_radiance(YamlMap& map, const std::string& key);
 /// Reads two ascending numbers [least, most] within min and max.
 std::pair<double, double> read_range(const YamlValue& value, double min, double max,
                                      std::string_view unit);
-/// Rejects more than kMostCaptures captures. `where` provides error() for the message.
+/// Rejects more than kMaxCaptures captures. `where` provides error() for the message.
 template <typename Place>
 void check_count(double captures, const Place& where) {
-  if (captures <= kMostCaptures) return;
-  throw where.error("makes more than " + std::to_string(kMostCaptures) + " captures");
+  if (captures <= kMaxCaptures) return;
+  throw where.error("makes more than " + std::to_string(kMaxCaptures) + " captures");
 }
 
 /// Read lamps, or other objects; lights are checked to be inside the room.
@@ -41,9 +41,9 @@ Glow read_glow(YamlMap& map, const Room& room);
 /// Reads the brightness profile of a disc: recess or edge_share, and halo. Other shapes are evenly
 /// bright.
 void read_profile(YamlMap& map, Glow& glow);
-Picture read_picture(YamlMap map, const Sensor& sensor);
+ImageProcessing read_image_processing(YamlMap map, const Sensor& sensor);
 SceneBoard read_scene_board(YamlMap map);
-ArchiveSpreads read_archive_spreads(YamlMap map);
+ArchiveVariation read_archive_variation(YamlMap map);
 /// Reads the position of the rotation axis at each capture: spots, a grid or a drive, all inside
 /// the room.
 void read_places(YamlMap& map, const Scene& scene, const Room& room, LampShots& captures);

@@ -35,8 +35,8 @@ Camera read_scene_camera(YamlMap map) {
   }
   const YamlValue imager = map.required("imager_px");
   for (const YamlValue& side : imager.list()) side.integer_within(8, 20000);
-  constexpr double most_px = 64e6;
-  if (double(camera.imager_px[0]) * camera.imager_px[1] > most_px) {
+  constexpr double max_px = 64e6;
+  if (double(camera.imager_px[0]) * camera.imager_px[1] > max_px) {
     throw imager.error("has more than 64 million pixels");
   }
   map.finish();
@@ -174,7 +174,7 @@ Scene read_scene(const std::filesystem::path& file) {
   scene.optics = read_optics(document.required("optics").map());
   scene.sensor = read_sensor(document.required("sensor").map());
   if (const auto picture = document.optional("picture")) {
-    scene.picture = read_picture(picture->map(), scene.sensor);
+    scene.picture = read_image_processing(picture->map(), scene.sensor);
   }
   scene.mount = read_mount(document.required("mount").map());
   scene.ambient_e_per_s = read_radiance(document, "ambient_e_per_s");
@@ -186,7 +186,7 @@ Scene read_scene(const std::filesystem::path& file) {
     scene.board = read_scene_board(board->map());
   }
   if (const auto archive = document.optional("archive")) {
-    scene.archive = read_archive_spreads(archive->map());
+    scene.archive = read_archive_variation(archive->map());
   }
   const YamlValue captures = document.required("captures");
   document.finish();

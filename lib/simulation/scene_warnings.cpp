@@ -12,12 +12,12 @@ namespace {
 
 /// Returns the gray level of a source that fills a pixel on the axis. Without a picture it may
 /// exceed white.
-double level_of(const Scene& scene, const CaptureSet& set, double radiance_e_per_s) {
+double compute_level(const Scene& scene, const CaptureSet& set, double radiance_e_per_s) {
   const Sensor& sensor = scene.sensor;
   const double level =
       sensor.black_level_dn +
       sensor.gain_dn_per_e * std::min(radiance_e_per_s * set.exposure_s, sensor.full_well_e);
-  return scene.picture ? coded_level(*scene.picture, sensor, level) : level;
+  return scene.picture ? apply_tone_curve(*scene.picture, sensor, level) : level;
 }
 
 std::string whole(double value) { return std::to_string(std::lround(value)); }
@@ -29,8 +29,8 @@ void add_brightness(const Scene& scene, const CaptureSet& set, const std::string
   const double white = white_dn(scene.sensor);
   const std::string fit =
       ": does sensor.gain_dn_per_e suit sensor.bits, and the light the exposure?";
-  const double high = level_of(scene, set, bright_e_per_s);
-  const double low = level_of(scene, set, dark_e_per_s);
+  const double high = compute_level(scene, set, bright_e_per_s);
+  const double low = compute_level(scene, set, dark_e_per_s);
   if (high - low < too_dark * white) {
     warnings.push_back(set.folder + ": " + bright + " is only " + whole(high - low) + " of " +
                        whole(white) + " grey levels above " + dark + fit);
@@ -42,21 +42,21 @@ void add_brightness(const Scene& scene, const CaptureSet& set, const std::string
 }
 
 void add_stripes(const Scene& scene, const CaptureSet& set, std::vector<std::string>& warnings) {
-  constexpr double finest_lines = 2.2;
+  constexpr double min_period_lines = 2.2;
   for (const SceneLamp& lamp : scene.lamps) {
     const std::string name = set.folder + ": lamp " + std::to_string(lamp.id);
     if (set.exposure_s * lamp.frequency_hz >= 1) {
       warnings.push_back(name + " has no clear stripes: the exposure is longer than its period");
-    } else if (lamp.frequency_hz * *scene.camera.row_time_s * finest_lines > 1) {
+    } else if (lamp.frequency_hz * *scene.camera.row_time_s * min_period_lines > 1) {
       warnings.push_back(name + " has stripes of less than " +
-                         std::to_string(finest_lines).substr(0, 3) + " lines");
+                         std::to_string(min_period_lines).substr(0, 3) + " lines");
     }
   }
 }
 
 }  // namespace
 
-std::vector<std::string> warnings_about(const Scene& scene, const CaptureSet& set) {
+std::vector<std::string> find_warnings(const Scene& scene, const CaptureSet& set) {
   std::vector<std::string> warnings;
   if (set.board) {
     add_brightness(scene, set, "the board's white", scene.board->white_e_per_s, "its black",

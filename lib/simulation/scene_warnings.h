@@ -14,6 +14,6 @@ namespace vlp {
 ///
 /// Covers images that are nearly black or white, exposures that blur the stripes, and stripes that
 /// are too fine.
-std::vector<std::string> warnings_about(const Scene& scene, const CaptureSet& set);
+std::vector<std::string> find_warnings(const Scene& scene, const CaptureSet& set);
 
 }  // namespace vlp

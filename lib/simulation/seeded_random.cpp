@@ -8,7 +8,7 @@
 
 namespace vlp {
 
-cv::RNG random_of(std::uint64_t seed, std::string_view name, std::size_t index) {
+cv::RNG make_random(std::uint64_t seed, std::string_view name, std::size_t index) {
   std::vector<std::uint32_t> words{std::uint32_t(seed), std::uint32_t(seed >> 32),
                                    std::uint32_t(index), std::uint32_t(index >> 32)};
   words.insert(words.end(), name.begin(), name.end());
@@ -18,7 +18,7 @@ cv::RNG random_of(std::uint64_t seed, std::string_view name, std::size_t index) 
   return cv::RNG(state[0] | std::uint64_t(state[1]) << 32);
 }
 
-std::uint64_t next_seed(cv::RNG& random) {
+std::uint64_t draw_seed(cv::RNG& random) {
   const std::uint64_t high = random.next();
   return high << 32 | random.next();
 }

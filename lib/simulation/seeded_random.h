@@ -11,9 +11,9 @@ namespace vlp {
 
 /// Returns a random generator seeded by a seed, a name and an index alone; the same on every
 /// machine.
-cv::RNG random_of(std::uint64_t seed, std::string_view name, std::size_t index);
+cv::RNG make_random(std::uint64_t seed, std::string_view name, std::size_t index);
 
 /// Draws a seed of 64 bits.
-std::uint64_t next_seed(cv::RNG& random);
+std::uint64_t draw_seed(cv::RNG& random);
 
 }  // namespace vlp

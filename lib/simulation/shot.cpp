@@ -16,10 +16,10 @@
 namespace vlp {
 namespace {
 
-std::string image_name(const Scene& scene, std::size_t index, std::size_t count) {
+std::string make_image_name(const Scene& scene, std::size_t index, std::size_t count) {
   const std::string number = std::to_string(index);
   const std::size_t digits = std::max<std::size_t>(4, std::to_string(count - 1).size());
-  return std::string(digits - number.size(), '0') + number + image_ending(scene.picture);
+  return std::string(digits - number.size(), '0') + number + image_extension(scene.picture);
 }
 
 Eigen::Matrix3d rotation(double angle_rad, const Eigen::Vector3d& axis) {
@@ -27,12 +27,12 @@ Eigen::Matrix3d rotation(double angle_rad, const Eigen::Vector3d& axis) {
 }
 
 /// Indices of a capture's height, spot and yaw, and the time since the start of its pass.
-struct Step {
+struct CaptureIndices {
   std::size_t height, spot, yaw;
   double driven_s;
 };
 
-Step step_of(const LampShots& captures, std::size_t index) {
+CaptureIndices find_capture_indices(const LampShots& captures, std::size_t index) {
   const std::size_t spots = captures.spots_m.size(), yaws = captures.yaws_rad.size();
   const auto repeat = static_cast<std::size_t>(captures.repeat);
   if (captures.drive) {
@@ -46,21 +46,21 @@ Step step_of(const LampShots& captures, std::size_t index) {
 
 /// Returns the ray of the pixel at the offset `off` from `middle`. If that pixel has no ray,
 /// returns the ray of the last pixel on the way there that has one.
-std::optional<Lens::Ray> last_ray(const Lens& lens, const Eigen::Vector2d& middle,
-                                  const Eigen::Vector2d& off) {
+std::optional<Lens::Ray> find_last_ray(const Lens& lens, const Eigen::Vector2d& middle,
+                                       const Eigen::Vector2d& offset) {
   constexpr int halvings = 30;
-  auto ray = lens.unproject(middle + off);
+  auto ray = lens.unproject(middle + offset);
   double within = 0, beyond = 1;
   for (int halving = 0; !ray && halving < halvings; ++halving) {
     const double between = (within + beyond) / 2;
-    (lens.unproject(middle + between * off) ? within : beyond) = between;
+    (lens.unproject(middle + between * offset) ? within : beyond) = between;
   }
-  return ray ? ray : lens.unproject(middle + within * off);
+  return ray ? ray : lens.unproject(middle + within * offset);
 }
 
 }  // namespace
 
-Pose CarrierMotion::pose(double time_s) const {
+Pose BaseMotion::pose(double time_s) const {
   const double yaw = yaw_rad + turn_rate_rad_per_s * time_s;
   Pose pose{axis_m, yaw};
   pose.position_m.head<2>() +=
@@ -68,18 +68,18 @@ Pose CarrierMotion::pose(double time_s) const {
   return pose;
 }
 
-Inclination CarrierMotion::inclination(double time_s) const {
+Inclination BaseMotion::inclination(double time_s) const {
   const double angle = phase_rad + 2 * std::numbers::pi * vibration.frequency_hz * time_s;
   return {lean.roll_rad + vibration.amplitude_rad * std::sin(angle),
           lean.pitch_rad + vibration.amplitude_rad * std::cos(angle)};
 }
 
-Eigen::Vector2d CarrierMotion::camera_velocity_m_per_s() const {
+Eigen::Vector2d BaseMotion::camera_velocity_m_per_s() const {
   const Eigen::Vector2d arm_m = Eigen::Rotation2Dd(yaw_rad) * mount.lever_arm_m;
   return velocity_m_per_s + turn_rate_rad_per_s * Eigen::Vector2d(-arm_m.y(), arm_m.x());
 }
 
-Eigen::Isometry3d CarrierMotion::world_from_camera(double time_s) const {
+Eigen::Isometry3d BaseMotion::world_from_camera(double time_s) const {
   const Pose level = pose(time_s);
   Eigen::Isometry3d world_from_camera;
   world_from_camera.linear() = rotation_about_z(level.yaw_rad) * mount.level_from_camera;
@@ -96,24 +96,24 @@ Eigen::Isometry3d BoardShot::camera_from_board(double time_s) const {
   return Eigen::Translation3d(velocity_in_camera_m_per_s * time_s) * camera_from_board_at_0;
 }
 
-std::size_t shots_in(const CaptureSet& set) {
+std::size_t count_shots(const CaptureSet& set) {
   if (set.board) return static_cast<std::size_t>(set.board->count);
   const LampShots& lamps = *set.lamps;
   return lamps.heights_m.size() * lamps.spots_m.size() * lamps.yaws_rad.size() *
          static_cast<std::size_t>(lamps.repeat);
 }
 
-LampShot lamp_shot(const Scene& scene, const CaptureSet& set, std::size_t index) {
+LampShot make_lamp_shot(const Scene& scene, const CaptureSet& set, std::size_t index) {
   const LampShots& captures = *set.lamps;
-  cv::RNG random = random_of(scene.seed, set.folder, index);
-  const Step step = step_of(captures, index);
+  cv::RNG random = make_random(scene.seed, set.folder, index);
+  const CaptureIndices indices = find_capture_indices(captures, index);
   const double jitter_rad = captures.yaw_jitter_rad * random.uniform(-1.0, 1.0);
 
   LampShot shot;
-  shot.image = image_name(scene, index, shots_in(set));
+  shot.image = make_image_name(scene, index, count_shots(set));
   shot.time_s = static_cast<double>(index) * captures.interval_s;
   shot.exposure_s = set.exposure_s;
-  shot.motion.axis_m << captures.spots_m[step.spot], captures.heights_m[step.height];
+  shot.motion.axis_m << captures.spots_m[indices.spot], captures.heights_m[indices.height];
   shot.motion.velocity_m_per_s.setZero();
   if (const auto& drive = captures.drive) {
     shot.motion.velocity_m_per_s =
@@ -121,12 +121,12 @@ LampShot lamp_shot(const Scene& scene, const CaptureSet& set, std::size_t index)
   }
   shot.motion.turn_rate_rad_per_s = captures.turn_rate_rad_per_s;
   shot.motion.yaw_rad =
-      captures.yaws_rad[step.yaw] + jitter_rad + captures.turn_rate_rad_per_s * step.driven_s;
+      captures.yaws_rad[indices.yaw] + jitter_rad + captures.turn_rate_rad_per_s * indices.driven_s;
   shot.motion.mount = scene.mount;
-  const std::size_t last = shots_in(set) - 1;
-  const double share = last > 0 ? static_cast<double>(index) / static_cast<double>(last) : 0;
+  const std::size_t last = count_shots(set) - 1;
+  const double fraction = last > 0 ? static_cast<double>(index) / static_cast<double>(last) : 0;
   const auto ramp = [&](const std::pair<double, double>& ends) {
-    return ends.first + share * (ends.second - ends.first);
+    return ends.first + fraction * (ends.second - ends.first);
   };
   shot.motion.lean = {ramp(captures.roll_rad), ramp(captures.pitch_rad)};
   shot.motion.vibration = captures.vibration;
@@ -137,7 +137,7 @@ LampShot lamp_shot(const Scene& scene, const CaptureSet& set, std::size_t index)
     const double periods = lamp.phase ? *lamp.phase + lamp.frequency_hz * shot.time_s : free_phase;
     shot.waves.push_back({lamp.frequency_hz, lamp.duty, periods - std::floor(periods)});
   }
-  shot.noise_seed = next_seed(random);
+  shot.noise_seed = draw_seed(random);
   // Drawn last, so that the other random values equal those of a scene without such lights.
   for (const ForeignLight& light : scene.clutter.foreign_lights) {
     const double free_phase = random.uniform(0.0, 1.0);
@@ -150,28 +150,30 @@ LampShot lamp_shot(const Scene& scene, const CaptureSet& set, std::size_t index)
   return shot;
 }
 
-BoardShot board_shot(const Scene& scene, const CaptureSet& set, std::size_t index) {
+BoardShot make_board_shot(const Scene& scene, const CaptureSet& set, std::size_t index) {
   const BoardViews& views = *set.board;
   const Lens lens(scene.camera.lens_model, scene.camera.intrinsics);
-  cv::RNG random = random_of(scene.seed, set.folder, index);
-  const auto share = [&] { return random.uniform(-1.0, 1.0); };
+  cv::RNG random = make_random(scene.seed, set.folder, index);
+  const auto fraction = [&] { return random.uniform(-1.0, 1.0); };
 
   // The board's center is placed on a random ray and the board faces the camera; then it is rotated
   // in place. Where the lens has no ray, the last ray on the way there is used.
   const Eigen::Vector2d half((scene.camera.imager_px[0] - 1) / 2.0,
                              (scene.camera.imager_px[1] - 1) / 2.0);
-  const Eigen::Vector2d off = views.spread * Eigen::Vector2d{share(), share()}.cwiseProduct(half);
-  const auto ray = last_ray(lens, half, off);
+  const Eigen::Vector2d offset =
+      views.spread * Eigen::Vector2d{fraction(), fraction()}.cwiseProduct(half);
+  const auto ray = find_last_ray(lens, half, offset);
   const Eigen::Vector3d sight =
       ray ? ray->direction.normalized() : Eigen::Vector3d(Eigen::Vector3d::UnitZ());
   const double distance_m = random.uniform(views.distance_m.first, views.distance_m.second);
-  const double azimuth = std::numbers::pi * share(), tilt = views.tilt_rad * std::abs(share());
-  const double roll = views.roll_rad * share();
+  const double azimuth = std::numbers::pi * fraction(),
+               tilt = views.tilt_rad * std::abs(fraction());
+  const double roll = views.roll_rad * fraction();
   const Eigen::Matrix3d facing = level_from_zenith(sight).transpose();
   const Eigen::Vector3d tilt_axis(std::cos(azimuth), std::sin(azimuth), 0);
 
   BoardShot shot;
-  shot.image = image_name(scene, index, shots_in(set));
+  shot.image = make_image_name(scene, index, count_shots(set));
   shot.exposure_s = set.exposure_s;
   shot.camera_from_board_at_0.linear() =
       facing * rotation(tilt, tilt_axis) * rotation(roll, Eigen::Vector3d::UnitZ());
@@ -180,7 +182,7 @@ BoardShot board_shot(const Scene& scene, const CaptureSet& set, std::size_t inde
   shot.camera_from_board_at_0.translation() =
       distance_m * sight - shot.camera_from_board_at_0.linear() * middle_m;
   shot.velocity_in_camera_m_per_s = views.velocity_m_per_s;
-  shot.noise_seed = next_seed(random);
+  shot.noise_seed = draw_seed(random);
   return shot;
 }
 

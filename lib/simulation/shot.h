@@ -14,7 +14,7 @@ namespace vlp {
 
 /// Motion of the camera on its base during a capture. Time 0 is the middle of the exposure of the
 /// image's middle row (or column), which is the time stamp of the capture.
-struct CarrierMotion {
+struct BaseMotion {
   /// Position of the vertical axis at time 0, at the height of the camera, in the world.
   Eigen::Vector3d axis_m;
   Eigen::Vector2d velocity_m_per_s;
@@ -46,7 +46,7 @@ struct LampShot {
   std::string image;
   double time_s;
   double exposure_s;
-  CarrierMotion motion;
+  BaseMotion motion;
   /// Waves of Scene::lamps, in their order; time 0 is time_s.
   std::vector<SquareWave> waves;
   std::uint64_t noise_seed;
@@ -68,11 +68,11 @@ struct BoardShot {
 };
 
 /// Returns the number of captures of a set.
-std::size_t shots_in(const CaptureSet& set);
+std::size_t count_shots(const CaptureSet& set);
 
 /// Returns capture `index` of a set. It depends on the scene, its seed, the set's folder and the
 /// index alone.
-LampShot lamp_shot(const Scene& scene, const CaptureSet& set, std::size_t index);
-BoardShot board_shot(const Scene& scene, const CaptureSet& set, std::size_t index);
+LampShot make_lamp_shot(const Scene& scene, const CaptureSet& set, std::size_t index);
+BoardShot make_board_shot(const Scene& scene, const CaptureSet& set, std::size_t index);
 
 }  // namespace vlp

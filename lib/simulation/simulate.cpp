@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::vector<CaptureSet> wanted_sets(const Scene& scene, const std::vector<std::string>& folders) {
+std::vector<CaptureSet> select_sets(const Scene& scene, const std::vector<std::string>& folders) {
   if (folders.empty()) return scene.sets;
   std::vector<CaptureSet> sets;
   for (const std::string& folder : folders) {
@@ -49,16 +49,16 @@ void make_folder(const fs::path& folder) {
 
 void write_common_files(const Scene& scene, const fs::path& output) {
   if (!scene.lamps.empty()) {
-    write_lamp_map(output / "lamps.yaml", lamp_map_of(scene, true));
-    write_lamp_map(output / "true_lamps.yaml", lamp_map_of(scene, false));
+    write_lamp_map(output / "lamps.yaml", make_lamp_map(scene, true));
+    write_lamp_map(output / "true_lamps.yaml", make_lamp_map(scene, false));
   }
   if (scene.board) write_board(output / "board.yaml", scene.board->print);
-  write_calibration(output / "true_calibration.yaml", true_calibration(scene));
+  write_calibration(output / "true_calibration.yaml", make_true_calibration(scene));
 }
 
 void write_image(const fs::path& file, const cv::Mat& lines, const Scene& scene) {
   const bool by_rows = scene.camera.readout == Readout::rows;
-  const auto bytes = encoded(by_rows ? lines : cv::Mat(lines.t()), scene.picture);
+  const auto bytes = encode_image(by_rows ? lines : cv::Mat(lines.t()), scene.picture);
   write_file(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 
@@ -71,21 +71,21 @@ bool render(const Scene& scene, const FrameRenderer& renderer, const CaptureSet&
     return true;
   };
   if (set.board) {
-    const BoardShot shot = board_shot(scene, set, index);
+    const BoardShot shot = make_board_shot(scene, set, index);
     return write(
         shot.image, [&] { return renderer.board_electrons(shot); }, shot.noise_seed);
   }
-  const LampShot shot = lamp_shot(scene, set, index);
+  const LampShot shot = make_lamp_shot(scene, set, index);
   return write(
       shot.image, [&] { return renderer.lamp_electrons(shot); }, shot.noise_seed);
 }
 
 }  // namespace
 
-std::string origin_of(const fs::path& scene, std::optional<std::uint64_t> seed,
-                      const std::string& program, const std::string& version) {
-  constexpr std::size_t most_bytes = 1 << 20;
-  std::string text = read_text_file(scene, most_bytes);
+std::string make_provenance(const fs::path& scene, std::optional<std::uint64_t> seed,
+                            const std::string& program, const std::string& version) {
+  constexpr std::size_t max_bytes = 1 << 20;
+  std::string text = read_text_file(scene, max_bytes);
   const std::string mark = "# " + program + " ";
   if (text.starts_with(mark)) text.erase(0, text.find('\n') + 1);
   if (seed) {
@@ -99,11 +99,11 @@ std::string origin_of(const fs::path& scene, std::optional<std::uint64_t> seed,
   return mark + version + '\n' + text;
 }
 
-void claim_for_simulation(const fs::path& output, const std::string& origin) {
+void claim_for_simulation(const fs::path& output, const std::string& provenance) {
   const fs::path mark = output / "scene.yaml";
   if (fs::exists(mark)) {
-    constexpr std::size_t most_bytes = 2 << 20;
-    if (read_text_file(mark, most_bytes) == origin) return;
+    constexpr std::size_t max_bytes = 2 << 20;
+    if (read_text_file(mark, max_bytes) == provenance) return;
     throw InputError(output,
                      "holds captures of another scene, seed or version: choose another folder or "
                      "remove it");
@@ -117,30 +117,30 @@ void claim_for_simulation(const fs::path& output, const std::string& origin) {
     throw InputError(output,
                      "is not empty and holds no captures of this scene: choose another folder");
   }
-  write_file(mark, origin);
+  write_file(mark, provenance);
 }
 
 SimulationSummary simulate(const Scene& scene, const fs::path& output,
                            const SimulationOptions& options, const SimulationProgress& progress) {
-  const std::vector<CaptureSet> sets = wanted_sets(scene, options.folders);
+  const std::vector<CaptureSet> sets = select_sets(scene, options.folders);
   const FrameRenderer renderer(scene);
-  claim_for_simulation(output, options.origin);
+  claim_for_simulation(output, options.provenance);
   write_common_files(scene, output);
 
   std::size_t total = 0;
-  for (const CaptureSet& set : sets) total += shots_in(set);
+  for (const CaptureSet& set : sets) total += count_shots(set);
   SimulationSummary summary;
   std::mutex counting;
   for (const CaptureSet& set : sets) {
     const fs::path folder = output / set.folder;
     make_folder(folder);
-    const auto warnings = warnings_about(scene, set);
+    const auto warnings = find_warnings(scene, set);
     summary.warnings.insert(summary.warnings.end(), warnings.begin(), warnings.end());
     if (const std::size_t empty = write_truth(scene, renderer, set, folder); empty > 0) {
       summary.warnings.push_back(set.folder + ": nothing is in view in " + std::to_string(empty) +
-                                 " of " + std::to_string(shots_in(set)) + " captures");
+                                 " of " + std::to_string(count_shots(set)) + " captures");
     }
-    in_parallel(shots_in(set), options.threads, [&](std::size_t index) {
+    parallel_for(count_shots(set), options.threads, [&](std::size_t index) {
       const bool rendered = render(scene, renderer, set, index, folder);
       const std::lock_guard lock(counting);
       ++(rendered ? summary.rendered : summary.found);

@@ -20,19 +20,19 @@ struct SimulationOptions {
   int threads = 1;
   /// Provenance of the output, written as its scene.yaml. It has to be identical when an
   /// interrupted simulation is resumed.
-  std::string origin;
+  std::string provenance;
 };
 
 /// Returns the provenance of a simulation: the scene file below a line with program and version, "#
 /// vlp-simulate 0.1.0". An existing line of that kind is replaced. If `seed` is given, it replaces
 /// the seed of the scene.
 /// @throws InputError if the file cannot be read, or if its seed has no line of its own
-std::string origin_of(const std::filesystem::path& scene, std::optional<std::uint64_t> seed,
-                      const std::string& program, const std::string& version);
+std::string make_provenance(const std::filesystem::path& scene, std::optional<std::uint64_t> seed,
+                            const std::string& program, const std::string& version);
 
 /// Counts and warnings of a simulation.
 struct SimulationSummary {
-  /// Warnings about useless captures: warnings_about() each folder, and captures without a lamp or
+  /// Warnings about useless captures: find_warnings() each folder, and captures without a lamp or
   /// corner in view.
   std::vector<std::string> warnings;
   std::size_t rendered = 0;
@@ -44,8 +44,8 @@ struct SimulationSummary {
 using SimulationProgress = std::function<void(const SimulationSummary& so_far, std::size_t total)>;
 
 /// Renders a scene into `output`:
-///   scene.yaml, lamps.yaml (as surveyed), board.yaml, true_calibration.yaml, true_lamps.yaml
-///   FOLDER/0000.png, 0001.png, ... (.jpg if the scene sets a JPEG quality)
+///   scene.yaml, lamps.yaml (as surveyed), board.yaml, make_true_calibration.yaml,
+///   find_true_lamps.yaml FOLDER/0000.png, 0001.png, ... (.jpg if the scene sets a JPEG quality)
 ///   FOLDER/ the tables of write_truth()
 /// Files are written atomically. Existing images are kept, so that an interrupted simulation can be
 /// resumed. The bytes depend on the scene alone, not on the number of threads.
@@ -57,6 +57,6 @@ SimulationSummary simulate(const Scene& scene, const std::filesystem::path& outp
 /// Claims a folder for captures by writing `origin` as its scene.yaml. Has no effect if the folder
 /// is claimed by the same `origin` already.
 /// @throws InputError if the folder holds something else
-void claim_for_simulation(const std::filesystem::path& output, const std::string& origin);
+void claim_for_simulation(const std::filesystem::path& output, const std::string& provenance);
 
 }  // namespace vlp

@@ -6,9 +6,9 @@
 
 namespace vlp {
 
-double moved_px(const std::vector<Eigen::Vector3d>& points_m,
-                const CameraFromTarget& camera_from_target, double exposure_s,
-                const PixelRays& rays) {
+double compute_motion_px(const std::vector<Eigen::Vector3d>& points_m,
+                         const CameraFromTarget& camera_from_target, double exposure_s,
+                         const PixelRays& rays) {
   constexpr int pieces = 16;
   const Eigen::Array2d size(rays.lines(), rays.places());
   const auto near_image = [&](const Eigen::Vector2d& pixel) {
@@ -16,22 +16,22 @@ double moved_px(const std::vector<Eigen::Vector3d>& points_m,
     return (at >= -0.1 * size).all() && (at <= 1.1 * size).all();
   };
   std::vector<std::optional<Eigen::Vector2d>> before(points_m.size());
-  std::vector<double> ways_px(points_m.size(), 0);
+  std::vector<double> lengths_px(points_m.size(), 0);
   for (int piece = 0; piece <= pieces; ++piece) {
     const auto pose = camera_from_target((double(piece) / pieces - 0.5) * exposure_s);
     for (std::size_t i = 0; i < points_m.size(); ++i) {
       const auto pixel = rays.lens().project(pose * points_m[i]);
       const bool counts = pixel && before[i] && (near_image(*pixel) || near_image(*before[i]));
-      if (counts) ways_px[i] += (*pixel - *before[i]).norm();
+      if (counts) lengths_px[i] += (*pixel - *before[i]).norm();
       before[i] = pixel;
     }
   }
-  return ways_px.empty() ? 0 : *std::max_element(ways_px.begin(), ways_px.end());
+  return lengths_px.empty() ? 0 : *std::max_element(lengths_px.begin(), lengths_px.end());
 }
 
-int parts_of_exposure(double moved_px) {
-  constexpr double still_px = 0.1, most = 1000;
-  return 1 + static_cast<int>(std::min(moved_px / still_px, most - 1));
+int count_exposure_parts(double compute_motion_px) {
+  constexpr double max_motion_px = 0.1, max_parts = 1000;
+  return 1 + static_cast<int>(std::min(compute_motion_px / max_motion_px, max_parts - 1));
 }
 
 }  // namespace vlp

@@ -17,12 +17,12 @@ using CameraFromTarget = std::function<Eigen::Isometry3d(double time_s)>;
 /// by 16 segments. Segments away from the image do not count.
 ///
 /// @param points_m  points in the target's frame
-double moved_px(const std::vector<Eigen::Vector3d>& points_m,
-                const CameraFromTarget& camera_from_target, double exposure_s,
-                const PixelRays& rays);
+double compute_motion_px(const std::vector<Eigen::Vector3d>& points_m,
+                         const CameraFromTarget& camera_from_target, double exposure_s,
+                         const PixelRays& rays);
 
 /// Returns the number of parts into which an exposure is divided so that the image moves by at most
 /// 0.1 px in each; at most 1000.
-int parts_of_exposure(double moved_px);
+int count_exposure_parts(double compute_motion_px);
 
 }  // namespace vlp

@@ -40,14 +40,14 @@ const std::map<std::string, Family>& families() {
 
 /// Converts the id to the type of libapriltag: int, since version 3.4 unsigned.
 template <typename Id>
-image_u8_t* drawn_by(image_u8_t* (*draw)(apriltag_family_t*, Id), apriltag_family_t* family,
-                     int id) {
+image_u8_t* render_tag(image_u8_t* (*draw)(apriltag_family_t*, Id), apriltag_family_t* family,
+                       int id) {
   return draw(family, static_cast<Id>(id));
 }
 
 }  // namespace
 
-TagPattern tag_pattern(const std::string& name, int id, int border_bits) {
+TagPattern make_tag_pattern(const std::string& name, int id, int border_bits) {
   const Family& family = families().at(name);
   const std::unique_ptr<apriltag_family_t, void (*)(apriltag_family_t*)> codes(family.create(),
                                                                                family.destroy);
@@ -67,12 +67,12 @@ TagPattern tag_pattern(const std::string& name, int id, int border_bits) {
   pattern.outside = (codes->total_width - codes->width_at_border) / 2 - trimmed;
   const int width = pattern.width();
   pattern.white.assign(pattern.index(0, width), false);
-  const std::unique_ptr<image_u8_t, void (*)(image_u8_t*)> drawn(
-      drawn_by(apriltag_to_image, codes.get(), id), image_u8_destroy);
+  const std::unique_ptr<image_u8_t, void (*)(image_u8_t*)> rendered(
+      render_tag(apriltag_to_image, codes.get(), id), image_u8_destroy);
   for (int row = extra; row < width - extra; ++row) {
     for (int column = extra; column < width - extra; ++column) {
       const int y = row - extra + trimmed, x = column - extra + trimmed;
-      pattern.white[pattern.index(column, row)] = drawn->buf[y * drawn->stride + x] > 127;
+      pattern.white[pattern.index(column, row)] = rendered->buf[y * rendered->stride + x] > 127;
     }
   }
   return pattern;

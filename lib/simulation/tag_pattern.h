@@ -27,6 +27,6 @@ struct TagPattern {
 /// Returns the pattern of a tag.
 /// @throws std::invalid_argument if the family has no such id, or if border_bits is 2 for a family
 /// without a plain black border
-TagPattern tag_pattern(const std::string& family, int id, int border_bits);
+TagPattern make_tag_pattern(const std::string& family, int id, int border_bits);
 
 }  // namespace vlp

@@ -16,7 +16,7 @@
 namespace vlp {
 namespace {
 
-struct Seen {
+struct ImagePoint {
   Eigen::Vector2d pixel;
   double time_s;
 };
@@ -27,33 +27,35 @@ struct Seen {
 /// Returns std::nullopt if the lens does not describe the point. The same if it moves along with
 /// the readout, so fast that there is no such time.
 template <typename Motion>
-std::optional<Seen> seen(const FrameRenderer& renderer, const Shutter& shutter,
-                         const Motion& camera_from_target, const Eigen::Vector3d& point_m) {
-  constexpr double exact_px = 1e-7;
+std::optional<ImagePoint> find_image_point(const FrameRenderer& renderer, const Shutter& shutter,
+                                           const Motion& camera_from_target,
+                                           const Eigen::Vector3d& point_m) {
+  constexpr double tolerance_px = 1e-7;
   std::optional<Eigen::Vector2d> before;
   double time_s = 0;
   // Each iteration multiplies the error by the lines that the point moves in a row time.
-  for (int round = 0; round < 200; ++round) {
+  for (int iteration = 0; iteration < 200; ++iteration) {
     const auto pixel = renderer.rays().lens().project(camera_from_target(time_s) * point_m);
     if (!pixel) return std::nullopt;
-    if (before && (*pixel - *before).norm() < exact_px) return Seen{*pixel, time_s};
+    if (before && (*pixel - *before).norm() < tolerance_px) return ImagePoint{*pixel, time_s};
     before = pixel;
     time_s = shutter.center_s(renderer.rays().line_and_place(*pixel)[0]);
   }
   return std::nullopt;
 }
 
-bool in_image(const Camera& camera, const Eigen::Vector2d& pixel) {
+bool is_in_image(const Camera& camera, const Eigen::Vector2d& pixel) {
   return pixel.minCoeff() >= -0.5 && pixel.x() < camera.imager_px[0] - 0.5 &&
          pixel.y() < camera.imager_px[1] - 0.5;
 }
 
-bool hidden_by(const Panel& panel, const Eigen::Vector3d& eye_m, const Eigen::Vector3d& point_m) {
+bool is_hidden_by(const Panel& panel, const Eigen::Vector3d& eye_m,
+                  const Eigen::Vector3d& point_m) {
   const Eigen::Vector3d normal = panel.edge_a_m.cross(panel.edge_b_m);
-  const Eigen::Vector3d way = point_m - eye_m;
-  const double share = normal.dot(panel.corner_m - eye_m) / normal.dot(way);
-  if (!(share > 0 && share < 1)) return false;
-  const Eigen::Vector3d on_panel = eye_m + share * way - panel.corner_m;
+  const Eigen::Vector3d displacement = point_m - eye_m;
+  const double fraction = normal.dot(panel.corner_m - eye_m) / normal.dot(displacement);
+  if (!(fraction > 0 && fraction < 1)) return false;
+  const Eigen::Vector3d on_panel = eye_m + fraction * displacement - panel.corner_m;
   const double a = on_panel.dot(panel.edge_a_m) / panel.edge_a_m.squaredNorm();
   const double b = on_panel.dot(panel.edge_b_m) / panel.edge_b_m.squaredNorm();
   return a >= 0 && a <= 1 && b >= 0 && b <= 1;
@@ -64,7 +66,7 @@ struct GlowPoints {
   std::vector<Eigen::Vector3d> face_m, rim_m;
 };
 
-GlowPoints points_of(const Glow& glow) {
+GlowPoints sample_points(const Glow& glow) {
   constexpr int count = 200, per_side = 14, rim_points = 120;
   constexpr double golden_angle = std::numbers::pi * (3 - 2.2360679774997896964);
   GlowPoints points;
@@ -87,27 +89,29 @@ GlowPoints points_of(const Glow& glow) {
 }
 
 /// Image of a glow's center and the visible fraction of the glow, directly or by a mirror.
-struct SeenGlow {
+struct GlowImage {
   Eigen::Vector2d pixel;
   double in_view;
 };
 
 template <typename Motion>
-double share_in_view(const Scene& scene, const FrameRenderer& renderer, const Shutter& shutter,
-                     const Motion& camera_from_world, const Glow& glow, const Mirror* mirror) {
+double compute_visible_fraction(const Scene& scene, const FrameRenderer& renderer,
+                                const Shutter& shutter, const Motion& camera_from_world,
+                                const Glow& glow, const Mirror* mirror) {
   Eigen::Isometry3d reflection = Eigen::Isometry3d::Identity();
   if (mirror) reflection = reflection_about(mirror->pane);
   const auto visible = [&](const Eigen::Vector3d& glow_point_m) {
     const Eigen::Vector3d point_m = reflection * glow_point_m;
-    const auto at = seen(renderer, shutter, camera_from_world, point_m);
-    if (!at || !in_image(scene.camera, at->pixel)) return false;
+    const auto at = find_image_point(renderer, shutter, camera_from_world, point_m);
+    if (!at || !is_in_image(scene.camera, at->pixel)) return false;
     const Eigen::Vector3d eye_m = camera_from_world(at->time_s).inverse().translation();
-    if (mirror && !hidden_by(mirror->pane, eye_m, point_m)) return false;
+    if (mirror && !is_hidden_by(mirror->pane, eye_m, point_m)) return false;
     const auto& occluders = scene.clutter.occluders;
-    return std::none_of(occluders.begin(), occluders.end(),
-                        [&](const Panel& occluder) { return hidden_by(occluder, eye_m, point_m); });
+    return std::none_of(occluders.begin(), occluders.end(), [&](const Panel& occluder) {
+      return is_hidden_by(occluder, eye_m, point_m);
+    });
   };
-  const auto [face_m, rim_m] = points_of(glow);
+  const auto [face_m, rim_m] = sample_points(glow);
   const auto count = std::count_if(face_m.begin(), face_m.end(), visible);
   const auto points = static_cast<double>(face_m.size());
   if (count < std::ptrdiff_t(face_m.size())) return double(count) / points;
@@ -117,9 +121,9 @@ double share_in_view(const Scene& scene, const FrameRenderer& renderer, const Sh
 
 /// Returns std::nullopt if the lens does not describe the glow's center, or if no part of it is in
 /// view.
-std::optional<SeenGlow> seen_glow(const Scene& scene, const FrameRenderer& renderer,
-                                  const LampShot& shot, const Glow& glow,
-                                  const Mirror* mirror = nullptr) {
+std::optional<GlowImage> find_glow_image(const Scene& scene, const FrameRenderer& renderer,
+                                         const LampShot& shot, const Glow& glow,
+                                         const Mirror* mirror = nullptr) {
   const auto camera_from_world = [&](double time_s) {
     return shot.motion.world_from_camera(time_s).inverse();
   };
@@ -130,26 +134,27 @@ std::optional<SeenGlow> seen_glow(const Scene& scene, const FrameRenderer& rende
     center_m = reflection_about(mirror->pane) * center_m;
   }
   const Shutter shutter = renderer.shutter(shot.exposure_s);
-  const auto center = seen(renderer, shutter, camera_from_world, center_m);
+  const auto center = find_image_point(renderer, shutter, camera_from_world, center_m);
   if (!center) return std::nullopt;
-  const double in_view = share_in_view(scene, renderer, shutter, camera_from_world, glow, mirror);
+  const double in_view =
+      compute_visible_fraction(scene, renderer, shutter, camera_from_world, glow, mirror);
   if (in_view == 0) return std::nullopt;
-  return SeenGlow{center->pixel, in_view};
+  return GlowImage{center->pixel, in_view};
 }
 
 }  // namespace
 
-std::vector<TrueLamp> true_lamps(const Scene& scene, const FrameRenderer& renderer,
-                                 const LampShot& shot) {
+std::vector<TrueLamp> find_true_lamps(const Scene& scene, const FrameRenderer& renderer,
+                                      const LampShot& shot) {
   std::vector<TrueLamp> lamps;
   for (const SceneLamp& lamp : scene.lamps) {
-    const auto seen_lamp = seen_glow(scene, renderer, shot, lamp.glow);
-    if (seen_lamp) lamps.push_back({lamp.id, seen_lamp->pixel, seen_lamp->in_view});
+    const auto glow_image = find_glow_image(scene, renderer, shot, lamp.glow);
+    if (glow_image) lamps.push_back({lamp.id, glow_image->pixel, glow_image->in_view});
   }
   return lamps;
 }
 
-std::string_view name_of(OtherLightKind kind) {
+std::string_view to_string(OtherLightKind kind) {
   switch (kind) {
     case OtherLightKind::mirror_image:
       return "mirror_image";
@@ -161,18 +166,19 @@ std::string_view name_of(OtherLightKind kind) {
   return "";
 }
 
-std::vector<TrueOtherLight> true_other_lights(const Scene& scene, const FrameRenderer& renderer,
-                                              const LampShot& shot) {
+std::vector<TrueOtherLight> find_true_other_lights(const Scene& scene,
+                                                   const FrameRenderer& renderer,
+                                                   const LampShot& shot) {
   std::vector<TrueOtherLight> lights;
   for (const Mirror& mirror : scene.clutter.mirrors) {
     for (const SceneLamp& lamp : scene.lamps) {
-      const auto image = seen_glow(scene, renderer, shot, lamp.glow, &mirror);
+      const auto image = find_glow_image(scene, renderer, shot, lamp.glow, &mirror);
       if (!image) continue;
       lights.push_back({OtherLightKind::mirror_image, lamp.id, image->pixel, image->in_view});
     }
   }
   for (const ForeignLight& light : scene.clutter.foreign_lights) {
-    const auto image = seen_glow(scene, renderer, shot, light.glow);
+    const auto image = find_glow_image(scene, renderer, shot, light.glow);
     if (!image) continue;
     const bool is_pwm = std::holds_alternative<SquareWave>(light.wave);
     lights.push_back(
@@ -181,15 +187,16 @@ std::vector<TrueOtherLight> true_other_lights(const Scene& scene, const FrameRen
   return lights;
 }
 
-std::vector<TrueCorner> true_corners(const Scene& scene, const FrameRenderer& renderer,
-                                     const BoardShot& shot) {
-  const BoardBend bend(*scene.board);
+std::vector<TrueCorner> find_true_corners(const Scene& scene, const FrameRenderer& renderer,
+                                          const BoardShot& shot) {
+  const BoardWarp warp(*scene.board);
   const auto camera_from_board = [&](double time_s) { return shot.camera_from_board(time_s); };
   std::vector<TrueCorner> corners;
   const auto add = [&](std::optional<int> tag, int corner, const Eigen::Vector2d& at_m) {
-    const Eigen::Vector3d point_m(at_m.x(), at_m.y(), bend.depth(at_m).depth_m);
-    const auto at = seen(renderer, renderer.shutter(shot.exposure_s), camera_from_board, point_m);
-    if (at && in_image(scene.camera, at->pixel)) corners.push_back({tag, corner, at->pixel});
+    const Eigen::Vector3d point_m(at_m.x(), at_m.y(), warp.depth(at_m).depth_m);
+    const auto at =
+        find_image_point(renderer, renderer.shutter(shot.exposure_s), camera_from_board, point_m);
+    if (at && is_in_image(scene.camera, at->pixel)) corners.push_back({tag, corner, at->pixel});
   };
   const Board& print = scene.board->print;
   if (print.has_squares()) {
@@ -197,7 +204,7 @@ std::vector<TrueCorner> true_corners(const Scene& scene, const FrameRenderer& re
     for (std::size_t i = 0; i < corners_m.size(); ++i) add({}, static_cast<int>(i), corners_m[i]);
     return corners;
   }
-  for (const BoardTag& tag : board_layout(print)) {
+  for (const BoardTag& tag : compute_board_layout(print)) {
     for (int corner = 0; corner < 4; ++corner) {
       add(tag.id, corner, tag.corners_m[static_cast<std::size_t>(corner)]);
     }
@@ -205,7 +212,7 @@ std::vector<TrueCorner> true_corners(const Scene& scene, const FrameRenderer& re
   return corners;
 }
 
-Calibration true_calibration(const Scene& scene) {
+Calibration make_true_calibration(const Scene& scene) {
   const Lens lens(scene.camera.lens_model, scene.camera.intrinsics);
   RotationCenter center;
   center.model = RotationModel::tilt;
@@ -218,7 +225,7 @@ Calibration true_calibration(const Scene& scene) {
   return calibration;
 }
 
-LampMap lamp_map_of(const Scene& scene, bool surveyed) {
+LampMap make_lamp_map(const Scene& scene, bool surveyed) {
   LampMap map;
   for (const SceneLamp& lamp : scene.lamps) {
     Eigen::Vector3d position_m = lamp.glow.position_m;

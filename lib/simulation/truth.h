@@ -25,8 +25,8 @@ struct TrueLamp {
 
 /// Returns the lamps that are at least partly in view and whose center the lens describes. The
 /// center may lie outside the image.
-std::vector<TrueLamp> true_lamps(const Scene& scene, const FrameRenderer& renderer,
-                                 const LampShot& shot);
+std::vector<TrueLamp> find_true_lamps(const Scene& scene, const FrameRenderer& renderer,
+                                      const LampShot& shot);
 
 enum class OtherLightKind {
   mirror_image,  ///< a lamp of the map, reflected by a mirror
@@ -34,8 +34,8 @@ enum class OtherLightKind {
   mains          ///< a foreign light on the mains
 };
 
-/// Returns the kind as in true_other_lights.csv: "mirror_image", "pwm", "mains".
-std::string_view name_of(OtherLightKind kind);
+/// Returns the kind as in find_true_other_lights.csv: "mirror_image", "pwm", "mains".
+std::string_view to_string(OtherLightKind kind);
 
 /// Flickering light that is not one of the lamps, as it appears in a capture.
 struct TrueOtherLight {
@@ -51,8 +51,9 @@ struct TrueOtherLight {
 
 /// Returns the mirror images and foreign lights that are at least partly in view and whose center
 /// the lens describes.
-std::vector<TrueOtherLight> true_other_lights(const Scene& scene, const FrameRenderer& renderer,
-                                              const LampShot& shot);
+std::vector<TrueOtherLight> find_true_other_lights(const Scene& scene,
+                                                   const FrameRenderer& renderer,
+                                                   const LampShot& shot);
 
 /// Corner of a tag's black border as it appears in a capture, in the order of BoardTag. For a board
 /// of squares without tags: an inner corner, numbered as in square_corners_m().
@@ -63,20 +64,20 @@ struct TrueCorner {
 };
 
 /// Returns the corners inside the image.
-std::vector<TrueCorner> true_corners(const Scene& scene, const FrameRenderer& renderer,
-                                     const BoardShot& shot);
+std::vector<TrueCorner> find_true_corners(const Scene& scene, const FrameRenderer& renderer,
+                                          const BoardShot& shot);
 
 /// Returns the scene's camera, with its tilt as the rotation center.
-Calibration true_calibration(const Scene& scene);
+Calibration make_true_calibration(const Scene& scene);
 
 /// Returns the lamp map with map errors (`surveyed` true), or with the true positions.
-LampMap lamp_map_of(const Scene& scene, bool surveyed);
+LampMap make_lamp_map(const Scene& scene, bool surveyed);
 
 /// Writes the ground truth of a set into `folder`.
 ///   Lamps: truth.csv, true_detections.csv (with the fraction in view), captures.csv and, for a
-///   scene with mirrors or foreign lights, true_other_lights.csv.
-///   Boards: true_corners.csv and true_boards.csv (camera_from_board as a position in meters and a
-///   rotation vector in radians).
+///   scene with mirrors or foreign lights, find_true_other_lights.csv.
+///   Boards: find_true_corners.csv and true_boards.csv (camera_from_board as a position in meters
+///   and a rotation vector in radians).
 /// Returns the number of captures without a lamp, or without a corner, in view.
 /// @throws InputError if a file cannot be written
 std::size_t write_truth(const Scene& scene, const FrameRenderer& renderer, const CaptureSet& set,

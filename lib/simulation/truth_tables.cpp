@@ -18,17 +18,17 @@ std::string pixel(double value_px) { return fixed(value_px, 6); }
 std::size_t write_lamp_truth(const Scene& scene, const FrameRenderer& renderer,
                              const CaptureSet& set, const std::filesystem::path& folder) {
   // Columns that no capture of the set needs are omitted.
-  bool moves = false, leans = false;
-  for (std::size_t i = 0; i < shots_in(set); ++i) {
-    const CarrierMotion motion = lamp_shot(scene, set, i).motion;
+  bool moves = false, has_roll_pitch = false;
+  for (std::size_t i = 0; i < count_shots(set); ++i) {
+    const BaseMotion motion = make_lamp_shot(scene, set, i).motion;
     moves = moves || !motion.at_rest();
-    leans = leans || !motion.is_level();
+    has_roll_pitch = has_roll_pitch || !motion.is_level();
   }
   std::vector<std::string> columns{"image", "x_m", "y_m", "z_m", "yaw_rad"};
   if (moves) {
     columns.insert(columns.end(), {"time_s", "vx_m_per_s", "vy_m_per_s", "yaw_rate_rad_per_s"});
   }
-  if (leans) columns.insert(columns.end(), {"roll_rad", "pitch_rad"});
+  if (has_roll_pitch) columns.insert(columns.end(), {"roll_rad", "pitch_rad"});
   CsvWriter truth(folder / "truth.csv", columns);
   CsvWriter detections(folder / "true_detections.csv",
                        {"image", "lamp", "u_px", "v_px", "in_view"});
@@ -38,18 +38,18 @@ std::size_t write_lamp_truth(const Scene& scene, const FrameRenderer& renderer,
       known ? std::initializer_list<std::string_view>{"image", "time_s", "x_m", "y_m", "z_m"}
             : std::initializer_list<std::string_view>{"image", "time_s"});
   std::size_t empty = 0;
-  for (std::size_t i = 0; i < shots_in(set); ++i) {
-    const LampShot shot = lamp_shot(scene, set, i);
+  for (std::size_t i = 0; i < count_shots(set); ++i) {
+    const LampShot shot = make_lamp_shot(scene, set, i);
     const auto& [position_m, yaw_rad] = shot.motion.pose(0);
     const std::string x = length(position_m.x()), y = length(position_m.y());
     const std::string z = length(position_m.z()), time = fixed(shot.time_s, 9);
-    std::vector<std::string> row{shot.image, x, y, z, angle(wrapped_rad(yaw_rad))};
+    std::vector<std::string> row{shot.image, x, y, z, angle(wrap_rad(yaw_rad))};
     if (moves) {
       const Eigen::Vector2d velocity_m_per_s = shot.motion.camera_velocity_m_per_s();
       row.insert(row.end(), {time, length(velocity_m_per_s.x()), length(velocity_m_per_s.y()),
                              angle(shot.motion.turn_rate_rad_per_s)});
     }
-    if (leans) {
+    if (has_roll_pitch) {
       const Inclination lean = shot.motion.inclination(0);
       row.insert(row.end(), {angle(lean.roll_rad), angle(lean.pitch_rad)});
     }
@@ -59,7 +59,7 @@ std::size_t write_lamp_truth(const Scene& scene, const FrameRenderer& renderer,
     } else {
       captures.row({shot.image, time});
     }
-    const auto lamps = true_lamps(scene, renderer, shot);
+    const auto lamps = find_true_lamps(scene, renderer, shot);
     empty += lamps.empty();
     for (const auto& [id, at_px, in_view] : lamps) {
       detections.row({shot.image, std::to_string(id), pixel(at_px.x()), pixel(at_px.y()),
@@ -77,10 +77,10 @@ void write_other_lights(const Scene& scene, const FrameRenderer& renderer, const
   if (scene.clutter.mirrors.empty() && scene.clutter.foreign_lights.empty()) return;
   CsvWriter table(folder / "true_other_lights.csv",
                   {"image", "kind", "lamp", "u_px", "v_px", "in_view"});
-  for (std::size_t i = 0; i < shots_in(set); ++i) {
-    const LampShot shot = lamp_shot(scene, set, i);
-    for (const auto& [kind, lamp, at_px, in_view] : true_other_lights(scene, renderer, shot)) {
-      table.row({shot.image, std::string(name_of(kind)), lamp ? std::to_string(*lamp) : "",
+  for (std::size_t i = 0; i < count_shots(set); ++i) {
+    const LampShot shot = make_lamp_shot(scene, set, i);
+    for (const auto& [kind, lamp, at_px, in_view] : find_true_other_lights(scene, renderer, shot)) {
+      table.row({shot.image, std::string(to_string(kind)), lamp ? std::to_string(*lamp) : "",
                  pixel(at_px.x()), pixel(at_px.y()), significant(in_view, 3)});
     }
   }
@@ -95,17 +95,18 @@ std::size_t write_board_truth(const Scene& scene, const FrameRenderer& renderer,
   if (scene.board->print.has_squares()) columns.erase(columns.begin() + 1);
   CsvWriter corners(folder / "true_corners.csv", columns);
   std::size_t empty = 0;
-  for (std::size_t i = 0; i < shots_in(set); ++i) {
-    const BoardShot shot = board_shot(scene, set, i);
+  for (std::size_t i = 0; i < count_shots(set); ++i) {
+    const BoardShot shot = make_board_shot(scene, set, i);
     const Eigen::Isometry3d camera_from_board = shot.camera_from_board(0);
     const Eigen::Vector3d place_m = camera_from_board.translation();
-    const Eigen::AngleAxisd turn(camera_from_board.linear());
-    const Eigen::Vector3d turn_rad = turn.angle() * turn.axis();
+    const Eigen::AngleAxisd rotation(camera_from_board.linear());
+    const Eigen::Vector3d rotation_vector_rad = rotation.angle() * rotation.axis();
     boards.row({shot.image, length(place_m.x()), length(place_m.y()), length(place_m.z()),
-                angle(turn_rad.x()), angle(turn_rad.y()), angle(turn_rad.z())});
-    const auto seen = true_corners(scene, renderer, shot);
-    empty += seen.empty();
-    for (const auto& [tag, corner, at_px] : seen) {
+                angle(rotation_vector_rad.x()), angle(rotation_vector_rad.y()),
+                angle(rotation_vector_rad.z())});
+    const auto visible_corners = find_true_corners(scene, renderer, shot);
+    empty += visible_corners.empty();
+    for (const auto& [tag, corner, at_px] : visible_corners) {
       std::vector<std::string> row{shot.image};
       if (tag) row.push_back(std::to_string(*tag));
       row.insert(row.end(), {std::to_string(corner), pixel(at_px.x()), pixel(at_px.y())});

@@ -24,7 +24,7 @@ constexpr int kPatience_s = 10, kPatienceWithFile_s = 5;
 using Parts = std::map<std::string, std::string>;
 
 /// Returns the options that have a value, and frees `option`.
-Parts parts_of(PQconninfoOption* options) {
+Parts parse_parts(PQconninfoOption* options) {
   const std::unique_ptr<PQconninfoOption, decltype(&PQconninfoFree)> owned(options, PQconninfoFree);
   Parts parts;
   for (; options != nullptr && options->keyword != nullptr; ++options) {
@@ -34,17 +34,18 @@ Parts parts_of(PQconninfoOption* options) {
 }
 
 /// Parses a connection string by libpq; empty if it is invalid.
-Parts parts_of(const std::string& where) {
-  return parts_of(PQconninfoParse(where.c_str(), nullptr));
+Parts parse_parts(const std::string& where) {
+  return parse_parts(PQconninfoParse(where.c_str(), nullptr));
 }
 
 /// Returns true if a part of the password could be interpreted as host or database.
 bool may_be_misread(const std::string& where, const Parts& parts) {
-  const std::string said = where.substr(0, where.find('?'));
-  const auto begin = said.find(kScheme) + std::string(kScheme).size();
-  const auto slash = std::min(said.find('/', begin), said.size());
-  const auto at = said.find('@', begin);
-  if (at != std::string::npos && (at > slash || said.find('@', at + 1) != std::string::npos)) {
+  const std::string without_parameters = where.substr(0, where.find('?'));
+  const auto begin = without_parameters.find(kScheme) + std::string(kScheme).size();
+  const auto slash = std::min(without_parameters.find('/', begin), without_parameters.size());
+  const auto at = without_parameters.find('@', begin);
+  if (at != std::string::npos &&
+      (at > slash || without_parameters.find('@', at + 1) != std::string::npos)) {
     return true;
   }
   // postgresql://USER:PASSWORD/NAME, without the host.
@@ -53,39 +54,41 @@ bool may_be_misread(const std::string& where, const Parts& parts) {
 }
 
 /// Returns true for a connection string of keywords, as of libpq's own tools.
-bool is_of_keywords(const std::string& where) {
+bool has_keyword_form(const std::string& where) {
   return where.find("password=") != std::string::npos || where.find("host=") != std::string::npos ||
          where.find("dbname=") != std::string::npos;
 }
 
 /// Returns true if libpq reaches a host through a socket or the loopback interface.
-bool is_here(const std::string& host) {
+bool is_local_host(const std::string& host) {
   return host.empty() || host.front() == '/' || host.front() == '@' || host == "localhost" ||
          host == "::1" || host.starts_with("127.");
 }
 
 }  // namespace
 
-std::string name_of_machine() {
+std::string get_host_name() {
   constexpr std::size_t longest = 256;
   std::array<char, longest> name{};
   return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "";
 }
 
-bool is_server(const std::string& where) { return where.find(kScheme) != std::string::npos; }
-
-bool states_password(const std::string& where) {
-  return is_server(where) && !parts_of(where)["password"].empty();
+bool is_server_address(const std::string& where) {
+  return where.find(kScheme) != std::string::npos;
 }
 
-std::string name_of_database(const std::string& where) {
+bool contains_password(const std::string& where) {
+  return is_server_address(where) && !parse_parts(where)["password"].empty();
+}
+
+std::string describe_database(const std::string& where) {
   const std::string form = "is not of the form postgresql://USER@HOST/NAME";
-  if (!is_server(where)) {
-    if (is_of_keywords(where)) throw InputError("a connection string of keywords", form);
+  if (!is_server_address(where)) {
+    if (has_keyword_form(where)) throw InputError("a connection string of keywords", form);
     return where;
   }
   const std::string hidden = where.substr(0, where.find(kScheme)) + kScheme + "...";
-  auto parts = parts_of(where);
+  auto parts = parse_parts(where);
   if (parts.empty()) throw InputError(hidden, form);
   if (may_be_misread(where, parts)) {
     throw InputError(hidden, form + "; in user and password '@' is %40, ':' is %3A, '/' is %2F");
@@ -94,25 +97,25 @@ std::string name_of_database(const std::string& where) {
   return "postgresql://" + parts["host"] + port + "/" + parts["dbname"];
 }
 
-std::string identity_of_database(const std::string& where) {
-  const std::string name = name_of_database(where);
-  if (!is_server(where)) {
-    return name_of_machine() + ":" + std::filesystem::absolute(name).lexically_normal().string();
+std::string make_database_identity(const std::string& where) {
+  const std::string name = describe_database(where);
+  if (!is_server_address(where)) {
+    return get_host_name() + ":" + std::filesystem::absolute(name).lexically_normal().string();
   }
-  Parts parts = parts_of(where);
-  parts.merge(parts_of(PQconndefaults()));  // given options take precedence
+  Parts parts = parse_parts(where);
+  parts.merge(parse_parts(PQconndefaults()));  // given options take precedence
   const auto stated = [&](const char* key, const char* before) {
     return parts[key].empty() ? "" : before + parts[key];
   };
-  constexpr const char* usual_port = "5432";
+  constexpr const char* default_port = "5432";
   const std::string &host = parts["host"], &address = parts["hostaddr"];
-  return (is_here(address.empty() ? host : address) ? name_of_machine() + ":" : "") +
-         "postgresql://" + host + (parts["port"] == usual_port ? "" : stated("port", ":")) + "/" +
+  return (is_local_host(address.empty() ? host : address) ? get_host_name() + ":" : "") +
+         "postgresql://" + host + (parts["port"] == default_port ? "" : stated("port", ":")) + "/" +
          (parts["dbname"].empty() ? parts["user"] : parts["dbname"]) + stated("hostaddr", " at ") +
          stated("service", " of the service ");
 }
 
-std::string connection_of(const std::string& where) {
+std::string make_connection_string(const std::string& where) {
   std::string connection;
   for (const char c : where) {
     if (c == ' ') {
@@ -123,30 +126,30 @@ std::string connection_of(const std::string& where) {
       connection += c;
     }
   }
-  if (parts_of(where).contains(kPatience)) return connection;
+  if (parse_parts(where).contains(kPatience)) return connection;
   return connection.append(connection.find('?') == std::string::npos ? "?" : "&")
       .append(kPatience)
       .append("=")
       .append(std::to_string(kPatience_s));
 }
 
-bool answers(const std::string& where) {
-  const std::string connection = connection_of(where);
+bool is_server_responding(const std::string& where) {
+  const std::string connection = make_connection_string(where);
   const std::array keywords{"dbname", "sslmode", kPatience, static_cast<const char*>(nullptr)};
   const std::array values{connection.c_str(), "prefer", "2", static_cast<const char*>(nullptr)};
   return PQpingParams(keywords.data(), values.data(), 1) == PQPING_OK;
 }
 
-int patience_s(const std::string& where) {
-  if (!is_server(where)) return kPatienceWithFile_s;
-  const auto parts = parts_of(where);
-  const auto said = parts.find(kPatience);
-  if (said == parts.end()) return kPatience_s;
+int timeout_s(const std::string& where) {
+  if (!is_server_address(where)) return kPatienceWithFile_s;
+  const auto parts = parse_parts(where);
+  const auto without_parameters = parts.find(kPatience);
+  if (without_parameters == parts.end()) return kPatience_s;
   // libpq rejects other texts than numbers.
   constexpr long a_day_s = 86'400;
   constexpr int decimal = 10;
   return static_cast<int>(
-      std::clamp(std::strtol(said->second.c_str(), nullptr, decimal), 0L, a_day_s));
+      std::clamp(std::strtol(without_parameters->second.c_str(), nullptr, decimal), 0L, a_day_s));
 }
 
 }  // namespace vlp

@@ -8,10 +8,10 @@ namespace vlp {
 
 /// Returns true if the records are on a server (postgresql://... or postgres://...), false for a
 /// file.
-bool is_server(const std::string& where);
+bool is_server_address(const std::string& where);
 
 /// Returns true if a connection string contains a password.
-bool states_password(const std::string& where);
+bool contains_password(const std::string& where);
 
 /// Returns the name of a database for messages. A server is named without user and passwords,
 /// wherever they are in the connection string.
@@ -19,10 +19,10 @@ bool states_password(const std::string& where);
 /// Throws InputError if `where` is no connection string or is ambiguous. In user and password '@',
 /// ':', '/' and '?' are written %40, %3A, %2F and %3F. The error quotes no part that could be a
 /// password.
-std::string name_of_database(const std::string& where);
+std::string describe_database(const std::string& where);
 
 /// Returns the host name of this machine; empty if it has none.
-std::string name_of_machine();
+std::string get_host_name();
 
 /// Returns an identity of a database that is unique also among machines that share a folder. It
 /// contains no password.
@@ -32,22 +32,22 @@ std::string name_of_machine();
 ///            including its environment variables and its defaults
 ///
 /// A server that is reached without a network has the machine, too. The user's name is included
-/// only if it is the name of the database because none is given. Throws as name_of_database().
-std::string identity_of_database(const std::string& where);
+/// only if it is the name of the database because none is given. Throws as describe_database().
+std::string make_database_identity(const std::string& where);
 
 /// Returns a connection string for SOCI's PostgreSQL backend, with the connection timeout
-/// patience_s(). SOCI 4.0 reads a string without a parameter as a database name and interprets
-/// blanks and quotes itself. Precondition: is_server().
-std::string connection_of(const std::string& where);
+/// timeout_s(). SOCI 4.0 reads a string without a parameter as a database name and interprets
+/// blanks and quotes itself. Precondition: is_server_address().
+std::string make_connection_string(const std::string& where);
 
 /// Returns true if a server answers, regardless of user and database. A server that refuses a
 /// password, or does not support the requested TLS, answers, too. Waits at most two seconds.
-/// Precondition: is_server().
-bool answers(const std::string& where);
+/// Precondition: is_server_address().
+bool is_server_responding(const std::string& where);
 
 /// Returns the maximum time to wait for a database that does not answer, s. For a server
 /// connect_timeout applies, at most one day; 0 or less means no limit; the default is 10 s. For a
 /// file that another program writes it is 5 s.
-int patience_s(const std::string& where);
+int timeout_s(const std::string& where);
 
 }  // namespace vlp

@@ -23,32 +23,32 @@ namespace fs = std::filesystem;
 constexpr int kMany = 10'000;
 
 /// Returns the path in a value.
-fs::path path_of(const YamlValue& value, const fs::path& file) {
+fs::path resolve_path(const YamlValue& value, const fs::path& file) {
   const fs::path path = value.text();
   if (path.empty()) throw value.error("names nothing");
   return path.is_absolute() ? path : file.parent_path() / path;
 }
 
-void read_into(YamlMap& map, const char* key, int& figure) {
-  if (const auto value = map.optional(key)) figure = value->integer_within(1, kMany);
+void read_into(YamlMap& map, const char* key, int& metric) {
+  if (const auto value = map.optional(key)) metric = value->integer_within(1, kMany);
 }
-void read_into(YamlMap& map, const char* key, double& figure, double max, const char* unit) {
-  if (const auto value = map.optional(key)) figure = value->number_within(0, max, unit);
+void read_into(YamlMap& map, const char* key, double& metric, double max, const char* unit) {
+  if (const auto value = map.optional(key)) metric = value->number_within(0, max, unit);
 }
 
-StationEnough read_enough(YamlMap map) {
-  StationEnough enough;
-  read_into(map, "board_views", enough.board_views);
-  read_into(map, "board_coverage", enough.board_coverage, 1, "(share)");
-  read_into(map, "turn_captures", enough.turn_captures);
-  read_into(map, "turn_heights", enough.turn_heights);
-  double arc_deg = deg_from_rad(enough.turn_arc_rad);
+CompletionCriteria read_enough(YamlMap map) {
+  CompletionCriteria sufficient;
+  read_into(map, "board_views", sufficient.board_views);
+  read_into(map, "board_coverage", sufficient.board_coverage, 1, "(share)");
+  read_into(map, "turn_captures", sufficient.turn_captures);
+  read_into(map, "turn_heights", sufficient.turn_heights);
+  double arc_deg = deg_from_rad(sufficient.turn_arc_rad);
   read_into(map, "turn_arc_deg", arc_deg, 360, "degrees");
-  enough.turn_arc_rad = rad_from_deg(arc_deg);
-  read_into(map, "dispersion_captures", enough.dispersion_captures);
-  read_into(map, "check_captures", enough.check_captures);
+  sufficient.turn_arc_rad = rad_from_deg(arc_deg);
+  read_into(map, "dispersion_captures", sufficient.dispersion_captures);
+  read_into(map, "check_captures", sufficient.check_captures);
   map.finish();
-  return enough;
+  return sufficient;
 }
 
 void read_refusal(YamlMap map, StationConfig& config) {
@@ -58,7 +58,7 @@ void read_refusal(YamlMap map, StationConfig& config) {
   read_into(map, "dark_share", limits.min_bright_fraction, 1, "(share)");
   read_into(map, "white_share", limits.max_white_fraction, 1, "(share)");
   read_into(map, "same_pose_share", limits.same_view_fraction, 1, "(share)");
-  read_into(map, "in_a_row", config.max_rejected_in_a_row);
+  read_into(map, "in_a_row", config.max_consecutive_rejections);
   map.finish();
 }
 
@@ -68,7 +68,7 @@ class Files {
   explicit Files(const fs::path& station) : station_(station) { add(station); }
 
   fs::path operator()(const YamlValue& value) {
-    fs::path file = path_of(value, station_);
+    fs::path file = resolve_path(value, station_);
     add(file);
     return file;
   }
@@ -97,9 +97,9 @@ Calibration read_shutter(const YamlValue& value, Files& files) {
 
 /// Adds guard bands to gates: {k: 1.645, standard_uncertainties: {METRIC: U}}.
 void read_guard_bands(YamlMap map, std::vector<Gate>& gates) {
-  constexpr double most_k = 10, most_u = 1e6;
+  constexpr double max_k = 10, max_u = 1e6;
   const YamlValue factor = map.required("k");
-  const double k = factor.number_within(0, most_k, "(factor)");
+  const double k = factor.number_within(0, max_k, "(factor)");
   const YamlValue stated = map.required("standard_uncertainties");
   YamlMap uncertainties = stated.map();
   int found = 0;
@@ -107,12 +107,13 @@ void read_guard_bands(YamlMap map, std::vector<Gate>& gates) {
     const auto value = uncertainties.optional(gate.metric.c_str());
     if (!value) continue;
     ++found;
-    const double u = value->number_within(0, most_u, "(in the gate's unit)");
+    const double u = value->number_within(0, max_u, "(in the gate's unit)");
     if (!(u > 0)) throw value->error("should be above 0");
     gate.guard = GuardBand{u, k};
     const MetricKind kind = metric_kind(gate.metric).value();
     const double accepted =
-        CheckedMetric{gate.metric, "", {}, gate.limit, kind.asked, gate.guard}.acceptance_limit();
+        CheckedMetric{gate.metric, "", {}, gate.limit, kind.direction, gate.guard}
+            .acceptance_limit();
     if (accepted >= 0 && accepted <= kind.largest) continue;
     throw value->error("leaves nothing within the gate: k times this is more than there is");
   }
@@ -135,10 +136,10 @@ GoldenUnit read_golden(YamlMap map, Files& files) {
   return golden;
 }
 
-VerifyDue read_verify_due(YamlMap map) {
-  VerifyDue due;
-  constexpr double most_h = 10'000;
-  if (const auto hours = map.optional("hours")) due.hours = hours->number_within(0, most_h, "h");
+VerificationInterval read_verify_due(YamlMap map) {
+  VerificationInterval due;
+  constexpr double max_h = 10'000;
+  if (const auto hours = map.optional("hours")) due.hours = hours->number_within(0, max_h, "h");
   if (const auto units = map.optional("units")) due.units = units->integer_within(1, 1'000'000);
   if (!due.hours && !due.units) throw map.error("should have hours or units");
   if (due.hours == 0) throw map.error("hours should be above 0");
@@ -148,9 +149,9 @@ VerifyDue read_verify_due(YamlMap map) {
 
 Retention read_retention(YamlMap map) {
   Retention keep;
-  constexpr int most_days = 36'525;
-  const auto days = [&](const char* key, std::optional<int>& figure) {
-    if (const auto value = map.optional(key)) figure = value->integer_within(1, most_days);
+  constexpr int max_days = 36'525;
+  const auto days = [&](const char* key, std::optional<int>& metric) {
+    if (const auto value = map.optional(key)) metric = value->integer_within(1, max_days);
   };
   days("images_days", keep.images_days);
   days("results_days", keep.results_days);
@@ -231,9 +232,9 @@ Hook read_hook(YamlMap map, const fs::path& file) {
   hook.folder = fs::absolute(file).parent_path();
   std::string& program = hook.command.front();
   if (program.find('/') != std::string::npos) program = (hook.folder / program).string();
-  constexpr double most_s = 3600;
+  constexpr double max_s = 3600;
   if (const auto limit = map.optional("time_limit_s")) {
-    hook.time_limit_s = limit->number_within(0, most_s, "seconds");
+    hook.time_limit_s = limit->number_within(0, max_s, "seconds");
     if (!(hook.time_limit_s > 0)) throw limit->error("should be above 0");
   }
   map.finish();
@@ -241,12 +242,12 @@ Hook read_hook(YamlMap map, const fs::path& file) {
 }
 
 /// Returns a database: a file relative to the station, or a server.
-std::string records_of(const YamlValue& value, const fs::path& file) {
+std::string read_records(const YamlValue& value, const fs::path& file) {
   const std::string where = value.text();
   if (where.starts_with("postgresql://") || where.starts_with("postgres://")) return where;
-  if (is_server(where)) throw value.error("should name a file, or be postgresql://...");
-  name_of_database(where);  // checks the name of a file
-  return path_of(value, file).string();
+  if (is_server_address(where)) throw value.error("should name a file, or be postgresql://...");
+  describe_database(where);  // checks the name of a file
+  return resolve_path(value, file).string();
 }
 
 }  // namespace
@@ -291,7 +292,8 @@ StationConfig read_station(const fs::path& file) {
   if (const auto place = document.optional("dispersion_station_m")) {
     config.dispersion_station_m = Eigen::Vector2d(place->numbers(2).data());
   }
-  if (const auto enough = document.optional("enough")) config.enough = read_enough(enough->map());
+  if (const auto sufficient = document.optional("enough"))
+    config.sufficient = read_enough(sufficient->map());
   if (const auto refuse = document.optional("refuse")) read_refusal(refuse->map(), config);
   config.gates = read_gates(document.required("gates"), unit_metrics());
   if (const auto guard = document.optional("guard_bands")) {
@@ -313,11 +315,11 @@ StationConfig read_station(const fs::path& file) {
     std::ranges::transform(names, std::back_inserter(config.void_operators),
                            [](const YamlValue& name) { return name.text(); });
   }
-  config.captures = path_of(document.required("captures"), file);
-  config.results = path_of(document.required("results"), file);
-  config.records = records_of(document.required("records"), file);
+  config.captures = resolve_path(document.required("captures"), file);
+  config.results = resolve_path(document.required("results"), file);
+  config.records = read_records(document.required("records"), file);
   const auto spool = document.optional("spool");
-  config.spool = spool ? path_of(*spool, file) : file.parent_path() / "spool";
+  config.spool = spool ? resolve_path(*spool, file) : file.parent_path() / "spool";
   if (const auto keep = document.optional("keep")) config.keep = read_retention(keep->map());
   if (const auto hook = document.optional("hook")) config.hook = read_hook(hook->map(), file);
   document.finish();

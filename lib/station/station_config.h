@@ -16,7 +16,7 @@
 namespace vlp {
 
 /// Completion criteria of the steps.
-struct StationEnough {
+struct CompletionCriteria {
   int board_views = 36;
   /// Fraction of the 8 x 6 cells of the image in which the views have corners.
   double board_coverage = 0.6;
@@ -48,7 +48,7 @@ struct Hook {
 };
 
 /// Limits after which the golden unit has to be measured again.
-struct VerifyDue {
+struct VerificationInterval {
   std::optional<double> hours;
   /// Number of judged units since its last measurement.
   std::optional<int> units;
@@ -75,16 +75,16 @@ struct StationConfig {
   LampMap lamps;
   /// Position of the camera in the step `dispersion`, unless its captures.csv contains positions.
   std::optional<Eigen::Vector2d> dispersion_station_m;
-  StationEnough enough;
+  CompletionCriteria sufficient;
   /// Acceptance limits of images.
   FrontendOptions frontend;
   /// Number of consecutive rejected images after which a step is aborted.
-  int max_rejected_in_a_row = 12;
+  int max_consecutive_rejections = 12;
   /// Gates, with guard bands if `guard_bands` contains standard uncertainties.
   std::vector<Gate> gates;
   std::optional<GoldenUnit> golden;
   /// Requires a golden unit.
-  std::optional<VerifyDue> verify_due;
+  std::optional<VerificationInterval> verify_due;
   /// ECMAScript regular expression that the whole serial of a unit must match; empty if every
   /// serial is valid.
   std::string serial_pattern;

@@ -16,7 +16,7 @@ void make_folder(const fs::path& folder) {
   if (error) throw InputError(folder, "cannot be made: " + error.message());
 }
 
-void check_room(const SharedFolder& folder, std::uintmax_t bytes) {
+void check_free_space(const SharedFolder& folder, std::uintmax_t bytes) {
   constexpr double megabyte = 1e6;
   std::error_code error;
   const fs::space_info space = fs::space(folder.path(), error);

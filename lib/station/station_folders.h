@@ -14,6 +14,6 @@ void make_folder(const std::filesystem::path& folder);
 
 /// Checks that a folder is writable and has `bytes` of free space, before a unit is started. Throws
 /// InputError.
-void check_room(const SharedFolder& folder, std::uintmax_t bytes);
+void check_free_space(const SharedFolder& folder, std::uintmax_t bytes);
 
 }  // namespace vlp

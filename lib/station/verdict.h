@@ -20,7 +20,7 @@ enum class Verdict {
 };
 
 /// Returns PASS, FAIL or INVALID.
-constexpr const char* name_of(Verdict verdict) {
+constexpr const char* to_string(Verdict verdict) {
   constexpr std::array names{"PASS", "FAIL", "INVALID"};
   return names[static_cast<std::size_t>(verdict)];
 }
@@ -35,7 +35,7 @@ struct Cause {
 
 /// Returns the verdict of the first cause, because later causes can follow from it; PASS without
 /// causes.
-inline Verdict verdict_of(const std::vector<Cause>& causes) {
+inline Verdict decide_verdict(const std::vector<Cause>& causes) {
   if (causes.empty()) return Verdict::pass;
   return causes.front().of_camera ? Verdict::fail : Verdict::invalid;
 }

@@ -32,9 +32,9 @@ namespace {
 
 constexpr int kSkipped = 77;  // SKIP_RETURN_CODE of the test
 #ifdef __SANITIZE_ADDRESS__
-constexpr double kLeastRatio = 0;  // the sanitizer slows down only the solve of this project
+constexpr double kMinRatio = 0;  // the sanitizer slows down only the solve of this project
 #else
-constexpr double kLeastRatio = 5;  // measured: 8.8 to 9.5
+constexpr double kMinRatio = 5;  // measured: 8.8 to 9.5
 #endif
 
 double cpu_of_children_s() {
@@ -46,7 +46,7 @@ double cpu_of_children_s() {
 }
 
 /// Reads the lens of a .cameramodel.
-Lens lens_of(const std::string& text, LensModel model) {
+Lens read_lens(const std::string& text, LensModel model) {
   const std::string key = "'intrinsics': [";
   const char* at = text.c_str() + text.find(key) + key.size();
   std::vector<double> parameters;
@@ -84,7 +84,7 @@ struct Case {
   const char* options;
   /// Limit of the uncertainty of projections below which the lenses are compared.
   double known_px;
-  double most_apart_px, least_ratio;
+  double max_apart_px, min_ratio;
 };
 
 /// Repeats mrcal's solve from the result of mrcal-calibrate-cameras, with the core of the solution.
@@ -104,48 +104,50 @@ print("'intrinsics': [" + ','.join('%.17g' % x for x in inputs['intrinsics'][0])
 )";
 
 int run_in_the_frame(const std::filesystem::path& folder, const BoardProblem& problem) {
-  std::string core, held;
+  std::string core, fixed_rays;
   for (std::size_t i = 0; i < 4; ++i) core += fmt::format("{:.17g},", problem.intrinsics[i]);
-  for (const auto& [pixel, ray] : problem.held) {
+  for (const auto& [pixel, ray] : problem.fixed_rays) {
     const Eigen::Vector3d unit = ray.normalized();
-    held += fmt::format("[{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g}],", pixel.x(), pixel.y(),
-                        1 / problem.noise_px, unit.x(), unit.y(), unit.z());
+    fixed_rays += fmt::format("[{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g}],", pixel.x(),
+                              pixel.y(), 1 / problem.noise_px, unit.x(), unit.y(), unit.z());
   }
   const std::string script = (folder / "in_the_frame.py").string(),
                     model = (folder / "camera-0.cameramodel").string();
   std::ofstream(script) << kInTheFrame;
   return std::system(
       fmt::format("/usr/bin/python3 {0} {1} '[{2}]' '[{3}]' >{1}.held && mv {1}.held {1}", script,
-                  model, core, held)
+                  model, core, fixed_rays)
           .c_str());
 }
 
-bool compare(const Case& one, int rounds) {
+bool compare(const Case& test_case, int num_repetitions) {
   const double children_s = cpu_of_children_s();
   const std::clock_t from = std::clock();
-  IntrinsicsSolution solution = solve_intrinsics(one.input);
-  for (int round = 1; round < rounds; ++round) solution = solve_intrinsics(one.input);
-  const double here_s = static_cast<double>(std::clock() - from) / CLOCKS_PER_SEC / rounds;
+  IntrinsicsSolution solution = solve_intrinsics(test_case.input);
+  for (int round = 1; round < num_repetitions; ++round)
+    solution = solve_intrinsics(test_case.input);
+  const double here_s = static_cast<double>(std::clock() - from) / CLOCKS_PER_SEC / num_repetitions;
 
   const std::filesystem::path folder =
       std::filesystem::temp_directory_path() / ("against_mrcal." + std::to_string(::getpid()));
   std::filesystem::create_directory(folder);
   const std::string corners = (folder / "corners.vnl").string();
   std::vector<std::string> names;
-  for (std::size_t i = 0; i < one.input.views.size(); ++i)
+  for (std::size_t i = 0; i < test_case.input.views.size(); ++i)
     names.push_back(fmt::format("{:03}.png", i));
   write_weighted(corners, solution, names);
-  const auto [width, height] = one.input.imager_px;
+  const auto [width, height] = test_case.input.imager_px;
   const std::string command = fmt::format(
       "mrcal-calibrate-cameras --corners-cache {} --corners-cache-has-weights --lensmodel {} "
       "--focal {} --object-spacing {} --object-width-n {} --object-height-n {} "
       "--imagersize {} {} --outdir {} {} '*.png*' >{}/log 2>&1",
-      corners, name_of(one.input.lens_model), one.focal_px, one.input.lattice.spacing_m(),
-      one.input.lattice.cols(), one.input.lattice.rows(), width, height, folder.string(),
-      one.options, folder.string());
+      corners, to_string(test_case.input.lens_model), test_case.focal_px,
+      test_case.input.lattice.spacing_m(), test_case.input.lattice.cols(),
+      test_case.input.lattice.rows(), width, height, folder.string(), test_case.options,
+      folder.string());
   int status = std::system(command.c_str());
   const double mrcal_s = cpu_of_children_s() - children_s;
-  if (status == 0 && !solution.problem.held.empty()) {
+  if (status == 0 && !solution.problem.fixed_rays.empty()) {
     status = run_in_the_frame(folder, solution.problem);
   }
   std::ostringstream model;
@@ -154,29 +156,31 @@ bool compare(const Case& one, int rounds) {
   log << std::ifstream(folder / "log").rdbuf();
   std::filesystem::remove_all(folder);
   if (status != 0) {
-    fmt::print("{}{}: solve {:.3f} s; mrcal-calibrate-cameras failed\n", log.str(), one.name,
+    fmt::print("{}{}: solve {:.3f} s; mrcal-calibrate-cameras failed\n", log.str(), test_case.name,
                here_s);
     return false;
   }
   const ProjectionUncertainty uncertainty(solution);
   const auto known = [&](const Eigen::Vector2d& pixel) {
-    return uncertainty.worst_px(pixel) <= one.known_px ? 1.0 : INFINITY;
+    return uncertainty.worst_px(pixel) <= test_case.known_px ? 1.0 : INFINITY;
   };
-  const auto difference = projection_difference(lens_of(model.str(), one.input.lens_model),
-                                                solution.lens(), one.input.imager_px, known);
+  const auto difference =
+      compute_projection_difference(read_lens(model.str(), test_case.input.lens_model),
+                                    solution.lens(), test_case.input.imager_px, known);
   if (!difference) {
-    fmt::print("{}: the lenses share no place\n", one.name);
+    fmt::print("{}: the lenses share no place\n", test_case.name);
     return false;
   }
   fmt::print("{}: solve {:.3f} s; mrcal-calibrate-cameras {:.2f} s, {:.1f} times as long\n",
-             one.name, here_s, mrcal_s, mrcal_s / here_s);
+             test_case.name, here_s, mrcal_s, mrcal_s / here_s);
   fmt::print("the lenses are {:.6f} px apart in the mean, {:.6f} px at worst\n",
              difference->mean_px, difference->worst_px);
-  const bool good =
-      difference->worst_px <= one.most_apart_px && mrcal_s >= one.least_ratio * here_s;
-  if (!good)
-    fmt::print("worse than {} px at worst or {} times\n", one.most_apart_px, one.least_ratio);
-  return good;
+  const bool is_good =
+      difference->worst_px <= test_case.max_apart_px && mrcal_s >= test_case.min_ratio * here_s;
+  if (!is_good)
+    fmt::print("worse than {} px at worst or {} times\n", test_case.max_apart_px,
+               test_case.min_ratio);
+  return is_good;
 }
 
 int compare() {
@@ -186,7 +190,7 @@ int compare() {
   }
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   Random random(1);
-  Case plain{"OPENCV8", views.input(36, random, 0.05), 520, "", 1, 0.01, kLeastRatio};
+  Case plain{"OPENCV8", views.input(36, random, 0.05), 520, "", 1, 0.01, kMinRatio};
   plain.input.warp = WarpChoice::on;  // as mrcal does
   const WideBoards boards{0.1, 0.2, 100 * std::numbers::pi / 180, true};
   Case splined{"splined",
@@ -196,7 +200,7 @@ int compare() {
                0.05,
                0.001,
                0};
-  splined.input.lens_model = splined_lens({3, 14, 14, 205});
+  splined.input.lens_model = lens_model_for({3, 14, 14, 205});
   splined.input.warp = WarpChoice::on;
   const bool plain_good = compare(plain, 10), splined_good = compare(splined, 1);
   return plain_good && splined_good ? 0 : 1;

@@ -33,12 +33,12 @@ struct Development {
   std::string name;
   /// White level over the sensor's full scale; 0 for the scene's exposure.
   double white;
-  std::optional<Picture> picture;
+  std::optional<ImageProcessing> picture;
 };
 
-Picture curve(double gamma, std::optional<int> jpeg_quality = {},
-              std::optional<Sharpening> sharpening = {}) {
-  Picture picture;
+ImageProcessing curve(double gamma, std::optional<int> jpeg_quality = {},
+                      std::optional<Sharpening> sharpening = {}) {
+  ImageProcessing picture;
   picture.gamma = gamma;
   picture.jpeg_quality = jpeg_quality;
   picture.sharpening = sharpening;
@@ -69,7 +69,7 @@ std::vector<Development> developments() {
 }
 
 /// JPEG has 8 bits: for sensors with more bits, white is the full well.
-Sensor sensor_behind(const Sensor& sensor, const std::optional<Picture>& picture) {
+Sensor sensor_behind(const Sensor& sensor, const std::optional<ImageProcessing>& picture) {
   constexpr int bits = 8;
   constexpr double black_dn = 2, white_dn = 255;
   if (!picture || !picture->jpeg_quality || sensor.bits == bits) return sensor;
@@ -81,18 +81,18 @@ Sensor sensor_behind(const Sensor& sensor, const std::optional<Picture>& picture
 }
 
 cv::Mat developed(const Scene& scene, const cv::Mat1f& electrons, std::uint64_t seed,
-                  const std::optional<Picture>& picture) {
+                  const std::optional<ImageProcessing>& picture) {
   cv::Mat image = expose(scene.sensor, electrons, seed, picture);
   if (scene.camera.readout == Readout::columns) image = image.t();  // lines are columns
-  return cv::imdecode(encoded(image, picture), cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
+  return cv::imdecode(encode_image(image, picture), cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
 }
 
 /// Difference over the pixels of a region, after rotating the lenses to the best agreement over the
 /// image.
 double worst_within(const ImageRegion& region, const Lens& truth, const Lens& lens,
                     const std::array<int, 2>& imager_px) {
-  const auto pixels = pixel_grid(imager_px);
-  const auto turned = b_from_a(truth, lens, pixels);
+  const auto pixels = make_pixel_grid(imager_px);
+  const auto turned = fit_rotation(truth, lens, pixels);
   double worst_px = 0;
   for (const Eigen::Vector2d& pixel : pixels) {
     const auto ray = truth.unproject(pixel);
@@ -116,34 +116,34 @@ void try_development(Scene scene, const CaptureSet& boards, const std::vector<cv
                (white_dn(scene.sensor) - scene.sensor.black_level_dn) / scene.sensor.gain_dn_per_e);
   const double white_e = scene.board->white_e_per_s * boards.exposure_s;
   const double exposures = development.white > 0 ? development.white * holds_e / white_e : 1;
-  in_parallel(electrons.size(), threads, [&](std::size_t i) {
-    const BoardShot shot = board_shot(scene, boards, i);
+  parallel_for(electrons.size(), threads, [&](std::size_t i) {
+    const BoardShot shot = make_board_shot(scene, boards, i);
     cv::Mat1f lit;
     electrons[i].convertTo(lit, CV_32F, exposures);
     const cv::Mat image = developed(scene, lit, shot.noise_seed, development.picture);
     input.seen.images[i] = observed({shot.image, {image.cols, image.rows}, detector.detect(image)});
   });
   std::size_t tags = 0, usable = 0;
-  for (const BoardView& view : kept_views(input.seen.images)) {
+  for (const BoardView& view : collect_kept_views(input.seen.images)) {
     usable += view.seen.tags.size();
     tags += view.seen.tags.size() + static_cast<std::size_t>(view.seen.unusable);
   }
   const BoardLattice lattice(input.board);
   for (Observation& image : input.seen.images) {
-    if (lattice.enough(image.board->seen)) continue;
+    if (lattice.sufficient(image.board->seen)) continue;
     image.reject(RejectionReason::too_few_corners, "shows too little of the board");
   }
   const LensResult result = solve_lens(input, {});
-  const std::string share =
+  const std::string detected_percent =
       fmt::format("{:.1f}", 100 * static_cast<double>(usable) / static_cast<double>(tags));
   if (!result.ok()) {
-    fmt::print("{:48} {:5} % of the tags: no lens\n", development.name, share);
+    fmt::print("{:48} {:5} % of the tags: no lens\n", development.name, detected_percent);
     return;
   }
   const Camera& camera = scene.camera;
   const Lens truth(camera.lens_model, camera.intrinsics), lens = result.lens.solution.lens();
   const auto even = [](const Eigen::Vector2d&) { return 1; };
-  const auto difference = projection_difference(truth, lens, camera.imager_px, even);
+  const auto difference = compute_projection_difference(truth, lens, camera.imager_px, even);
   fmt::print(
       "{:48} {:.4f} / {:.3f} px, in the region {:.3f}; {:.2f} x stated rms, worst stated {:.3f}, "
       "{:.3f} "
@@ -153,7 +153,7 @@ void try_development(Scene scene, const CaptureSet& boards, const std::vector<cv
       difference->rms_px / result.lens.report.expected_rms_px,
       std::max(result.lens.report.uncertainty_worst_px, result.lens.report.uncertainty_beyond_px),
       result.lens.report.uncertainty_worst_px, result.lens.solution.rms_px,
-      upper_median(result.lens.solution.edge_shifts_px), result.lens.gamma, share, tags);
+      upper_median(result.lens.solution.edge_shifts_px), result.lens.gamma, detected_percent, tags);
 }
 
 void try_seed(Scene scene, std::uint64_t seed, int views, const std::string& wanted) {
@@ -162,11 +162,11 @@ void try_seed(Scene scene, std::uint64_t seed, int views, const std::string& wan
   if (views > 0) boards.board->count = views;
   const FrameRenderer renderer(scene);
   const BoardDetector detector(scene.board->print);
-  std::vector<cv::Mat1f> electrons(shots_in(boards));
-  in_parallel(electrons.size(), static_cast<int>(std::thread::hardware_concurrency()),
-              [&](std::size_t i) {
-                electrons[i] = renderer.board_electrons(board_shot(scene, boards, i));
-              });
+  std::vector<cv::Mat1f> electrons(count_shots(boards));
+  parallel_for(electrons.size(), static_cast<int>(std::thread::hardware_concurrency()),
+               [&](std::size_t i) {
+                 electrons[i] = renderer.board_electrons(make_board_shot(scene, boards, i));
+               });
   fmt::print("seed {}, {} views\n", seed, electrons.size());
   for (const Development& development : developments()) {
     if (development.name.find(wanted) == std::string::npos) continue;
@@ -179,9 +179,9 @@ void try_seed(Scene scene, std::uint64_t seed, int views, const std::string& wan
 }  // namespace vlp
 
 int main(int argc, char** argv) {
-  constexpr int usual_seeds = 3;
+  constexpr int default_seeds = 3;
   const std::string name = argc > 1 ? argv[1] : "paper-rig";
-  const int seeds = argc > 2 ? std::atoi(argv[2]) : usual_seeds;
+  const int seeds = argc > 2 ? std::atoi(argv[2]) : default_seeds;
   const vlp::Scene scene = vlp::read_scene(VLP_SOURCE_DIR "/datasets/" + name + "/scene.yaml");
   for (int i = 0; i < seeds; ++i) {
     vlp::try_seed(scene, scene.seed + static_cast<std::uint64_t>(i),

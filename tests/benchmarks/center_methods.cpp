@@ -1,8 +1,9 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
 /// center_methods FOLDER: compares the errors of methods for lamp centers in a folder of rendered
-/// captures. The folder contains true_detections.csv; lamps.yaml and true_calibration.yaml are next
-/// to it. Lamps are those completely in view that our detector finds with and without the lens.
+/// captures. The folder contains true_detections.csv; lamps.yaml and make_true_calibration.yaml are
+/// next to it. Lamps are those completely in view that our detector finds with and without the
+/// lens.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -40,7 +41,7 @@ struct LitPixels {
 };
 
 template <typename Level>
-LitPixels lit_pixels_of(const cv::Mat& image, const Background& background, const cv::Rect& box) {
+LitPixels find_lit_pixels(const cv::Mat& image, const Background& background, const cv::Rect& box) {
   Vector2d low(box.br().x, box.br().y), high(box.x, box.y), moment(0, 0);
   double sum = 0;
   for (int row = box.y; row < box.br().y; ++row) {
@@ -57,16 +58,16 @@ LitPixels lit_pixels_of(const cv::Mat& image, const Background& background, cons
   return {(low + high) / 2, moment / sum};
 }
 
-LitPixels lit_pixels_of(const cv::Mat& image, const Light& light) {
+LitPixels find_lit_pixels(const cv::Mat& image, const Light& light) {
   constexpr int around_px = 4;
   const cv::Point low(int(std::floor(light.low.x())) - around_px,
                       int(std::floor(light.low.y())) - around_px);
   const cv::Point high(int(std::ceil(light.high.x())) + around_px + 1,
                        int(std::ceil(light.high.y())) + around_px + 1);
   const cv::Rect box = cv::Rect(low, high) & cv::Rect({0, 0}, image.size());
-  const Background background = background_of(image_view(image));
-  return image.depth() == CV_8U ? lit_pixels_of<std::uint8_t>(image, background, box)
-                                : lit_pixels_of<std::uint16_t>(image, background, box);
+  const Background background = estimate_background(image_view(image));
+  return image.depth() == CV_8U ? find_lit_pixels<std::uint8_t>(image, background, box)
+                                : find_lit_pixels<std::uint16_t>(image, background, box);
 }
 
 std::map<int, Light> lamps_in(const LightDetector& detector, const cv::Mat& image) {
@@ -95,7 +96,7 @@ std::map<std::string, std::map<int, Vector2d>> truth_in(const std::filesystem::p
 void run(const std::filesystem::path& folder) {
   const std::filesystem::path beside = folder / "..";
   const LampMap map = read_lamp_map(beside / "lamps.yaml");
-  DetectorCamera camera = detector_camera(read_calibration(beside / "true_calibration.yaml"));
+  DetectorCamera camera = make_detector_camera(read_calibration(beside / "true_calibration.yaml"));
   const LightDetector with_lens(map, camera);
   camera.lens.reset();
   const LightDetector without_lens(map, camera);
@@ -111,7 +112,7 @@ void run(const std::filesystem::path& folder) {
       missed_with += !lamps.contains(id);
       missed_without += !ellipses.contains(id);
       if (!lamps.contains(id) || !ellipses.contains(id)) continue;
-      const LitPixels lit = lit_pixels_of(image, lamps.at(id));
+      const LitPixels lit = find_lit_pixels(image, lamps.at(id));
       methods[0].add(lit.box_center - pixel);
       methods[1].add(lit.centroid - pixel);
       methods[2].add(ellipses.at(id).pixel - pixel);

@@ -64,7 +64,7 @@ constexpr std::array kCaptures{3, 6, 12, 40};
 constexpr std::array kHeadings{Heading::all, Heading::opposite, Heading::one};
 constexpr std::array kNoises{Noise::stated, Noise::not_stated, Noise::too_small};
 
-constexpr const char* name_of(Heading heading) {
+constexpr const char* to_string(Heading heading) {
   switch (heading) {
     case Heading::all:
       return "all yaws";
@@ -76,7 +76,7 @@ constexpr const char* name_of(Heading heading) {
   return "";
 }
 
-constexpr const char* name_of(Noise noise) {
+constexpr const char* to_string(Noise noise) {
   switch (noise) {
     case Noise::stated:
       return "stated";
@@ -116,7 +116,7 @@ class Room {
   Room(const Cell& cell, double tilt_rad, Random& random)
       : cell_(cell),
         random_(random),
-        rig_(leaning_rig(tilt_rad, kTiltAzimuth_rad)),
+        rig_(make_tilted_rig(tilt_rad, kTiltAzimuth_rad)),
         surveyed_(rig_.map),
         base_yaw_rad_(random.uniform(-std::numbers::pi, std::numbers::pi)) {
     for (Lamp& lamp : surveyed_.lamps) {
@@ -239,7 +239,7 @@ void add_lever_arm_errors(Trial& trial, const RotationCenter& found, const Eigen
 Trial try_rotation(const Cell& cell, Random& random, RotationMethod method, double tilt_rad,
                    const Turn& turn) {
   Room room(cell, tilt_rad, random);
-  LampCaptures input{{}, room.surveyed_map(), {}, camera_alone(room.calibration())};
+  LampCaptures input{{}, room.surveyed_map(), {}, extract_camera(room.calibration())};
   for (std::size_t height = 0; height < turn.heights_m.size(); ++height) {
     for (int k = 0; k < cell.captures; ++k) {
       const Pose pose = turn.pose(height, room.draw_yaw(k));
@@ -276,7 +276,7 @@ Trial try_axis(const Cell& cell, Random& random) {
 
 Trial try_lamps(const Cell& cell, Random& random) {
   Room room(cell, kTilt_rad, random);
-  LampCaptures input{{}, room.surveyed_map(), {}, camera_alone(room.calibration())};
+  LampCaptures input{{}, room.surveyed_map(), {}, extract_camera(room.calibration())};
   for (int k = 0; k < cell.captures; ++k) {
     input.frames.push_back({std::to_string(k), room.draw_detections(room.draw_pose(k))});
   }
@@ -296,7 +296,7 @@ Trial try_dispersion(const Cell& cell, Random& random, DispersionMethod method) 
   Calibration believed = room.calibration();
   believed.rotation_center =
       tilted_by(believed.camera, kTilt_rad - zenith_error_rad, kTiltAzimuth_rad);
-  std::vector<StationCapture> exact;
+  std::vector<ReferencePointCapture> exact;
   LampCaptures input{{}, room.surveyed_map(), {}, believed};
   KnownPlaces places;
   for (int k = 0; k < cell.captures; ++k) {
@@ -333,7 +333,7 @@ Trial try_adjustment(const Cell& cell, Random& random) {
   Room room(cell, kTilt_rad, random);
   AdjustStepInput input;
   input.lamps = room.surveyed_map();
-  input.calibration = camera_alone(room.calibration());
+  input.calibration = extract_camera(room.calibration());
   AdjustSet set{.name = "turns", .frames = {}, .captures = {}};
   for (std::size_t height = 0; height < turn.heights_m.size(); ++height) {
     Capture measured;
@@ -376,7 +376,7 @@ Trial try_fixes(const Cell& cell, Random& random) {
     const auto& fix = result.rows[k].fix;
     if (!fix || !fix->sd) continue;
     const Eigen::Vector3d error_m = fix->pose.position_m - truth[k].position_m;
-    const double yaw_error_rad = wrapped_rad(fix->pose.yaw_rad - truth[k].yaw_rad);
+    const double yaw_error_rad = wrap_rad(fix->pose.yaw_rad - truth[k].yaw_rad);
     trial.errors[0].push_back(error_m.x() / (*fix->sd)[0]);
     trial.errors[0].push_back(error_m.y() / (*fix->sd)[1]);
     trial.errors[1].push_back(error_m.z() / (*fix->sd)[2]);
@@ -499,7 +499,7 @@ const char* mark_cell(const Method& method, const CellResult& cell, int draws, T
 
 void print_row(const Cell& cell, const CellResult& result, const char* mark) {
   fmt::print("{:3.0f} mm  {:8}  {:8}  {:10}  {:7}  {:6}  {:5}", 1e3 * cell.map_sd_m, cell.captures,
-             name_of(cell.heading), name_of(cell.noise), result.results, result.warned,
+             to_string(cell.heading), to_string(cell.noise), result.results, result.warned,
              result.without_sd);
   for (const Consistency& parameter : result.parameters) {
     if (parameter.count == 0) {
@@ -547,8 +547,8 @@ bool run_method(const Method& method, int draws) {
 }  // namespace vlp
 
 int main(int argc, char** argv) {
-  constexpr int usual_draws = 200;
-  const int draws = argc > 1 ? std::atoi(argv[1]) : usual_draws;
+  constexpr int default_draws = 200;
+  const int draws = argc > 1 ? std::atoi(argv[1]) : default_draws;
   if (draws < 1) {
     fmt::print(stderr, "consistency_trials: DRAWS is '{}', not a number above 0\n", argv[1]);
     return 2;

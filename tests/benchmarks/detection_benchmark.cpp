@@ -24,7 +24,7 @@ struct Captures {
     cv::setNumThreads(1);
     scene.lamps.resize(4);
     const FrameRenderer renderer(scene);
-    const LampShot shot = lamp_shot(scene, scene.sets.at(0), 0);
+    const LampShot shot = make_lamp_shot(scene, scene.sets.at(0), 0);
     frame = expose(scene.sensor, renderer.lamp_electrons(shot), 1);
     scene.lamps.clear();
     const cv::Mat dark =
@@ -34,7 +34,7 @@ struct Captures {
     turned = large.t();
   }
   Scene scene = read_scene(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml");
-  const LampMap lamps = lamp_map_of(scene, true);
+  const LampMap lamps = make_lamp_map(scene, true);
   cv::Mat frame, large, turned;
 };
 
@@ -51,7 +51,7 @@ void detect_in(benchmark::State& state, const cv::Mat& image, const DetectorCame
 }
 
 void detect(benchmark::State& state) {
-  detect_in(state, captures().frame, detector_camera(true_calibration(captures().scene)));
+  detect_in(state, captures().frame, make_detector_camera(make_true_calibration(captures().scene)));
 }
 
 /// The image and the rig of tests/python/module_test.py, which times the same in Python.
@@ -60,7 +60,7 @@ void detect_sample(benchmark::State& state) {
   const cv::Mat image = cv::imread(rendered + "sample/0000.png", cv::IMREAD_UNCHANGED);
   const LightDetector detector(
       read_lamp_map(rendered + "lamps.yaml"),
-      detector_camera(read_calibration(rendered + "true_calibration.yaml")));
+      make_detector_camera(read_calibration(rendered + "true_calibration.yaml")));
   cv::setNumThreads(1);
   std::size_t lamps = 0;
   for (auto _ : state) lamps = detector.detect(image_view(image)).size();
@@ -68,7 +68,7 @@ void detect_sample(benchmark::State& state) {
 }
 
 void opencv_components(benchmark::State& state) {
-  const double threshold = background_of(image_view(captures().frame)).threshold;
+  const double threshold = estimate_background(image_view(captures().frame)).threshold;
   cv::Mat binary, labels, statistics, centroids;
   for (auto _ : state) {
     cv::threshold(captures().frame, binary, threshold, 255, cv::THRESH_BINARY);

@@ -16,9 +16,10 @@
 /// tilt of up to 15 and 30 degrees. The chi-square of the pose is its squared error relative to the
 /// bound for pixels of that noise.
 ///
-/// "possible" is the bound of exact centers with the noise of the standing camera (body_limit()),
-/// divided by that of a camera known to stand. For centers, prints the mean error along and across
-/// the motion of the lamps in the image, and the standard deviation per axis.
+/// "possible" is the bound of exact centers with the noise of the standing camera
+/// (compute_body_limit()), divided by that of a camera known to stand. For centers, prints the mean
+/// error along and across the motion of the lamps in the image, and the standard deviation per
+/// axis.
 #include <fmt/core.h>
 
 #include <Eigen/Cholesky>
@@ -47,7 +48,7 @@ struct Errors {
   double along = 0;
   int fixes = 0, refused = 0;
 
-  void add(const Fix& fix, const CarrierMotion& truth) {
+  void add(const Fix& fix, const BaseMotion& truth) {
     if (!fix.ok()) {
       ++refused;
       return;
@@ -56,7 +57,7 @@ struct Errors {
     const Pose pose = truth.pose(0);
     Eigen::Vector4d error;
     error << fix.estimate.pose.position_m - pose.position_m,
-        wrapped_rad(fix.estimate.pose.yaw_rad - pose.yaw_rad);
+        wrap_rad(fix.estimate.pose.yaw_rad - pose.yaw_rad);
     horizontal += error.head<2>().squaredNorm();
     height += error[2] * error[2];
     yaw += error[3] * error[3];
@@ -64,17 +65,17 @@ struct Errors {
     pose_chi_squared += error.dot(covariance.ldlt().solve(error)) / 4;
     if (!fix.body || fix.body->covariance(kBodyVelocity, kBodyVelocity) == 0) return;
     const Eigen::Vector2d off = fix.body->velocity_m_per_s - truth.camera_velocity_m_per_s();
-    const Eigen::Matrix2d of_velocity =
+    const Eigen::Matrix2d velocity_covariance =
         fix.body->covariance.block<2, 2>(kBodyVelocity, kBodyVelocity);
     velocity += off.squaredNorm() / 2;
     along += off.dot(truth.camera_velocity_m_per_s().normalized());
-    chi_squared += off.dot(of_velocity.ldlt().solve(off)) / 2;
+    chi_squared += off.dot(velocity_covariance.ldlt().solve(off)) / 2;
   }
   double rms(double sum) const { return std::sqrt(sum / fixes); }
 };
 
 /// Capture for the computation of a bound.
-struct Seen {
+struct DrivenCapture {
   std::vector<Eigen::Vector3d> lamps_m;
   Pose pose;
   double speed_m_per_s, turn_rate_rad_per_s;
@@ -119,37 +120,37 @@ class Trials {
   /// The room is too low for a larger tilt: lamps would leave the image.
   void run_leaning(int captures) {
     const FrameRenderer renderer(scene_);
-    const Calibration calibration = true_calibration(scene_);
-    const LampMap lamps = lamp_map_of(scene_, false);
-    const LightDetector detector(lamps, detector_camera(calibration));
+    const Calibration calibration = make_true_calibration(scene_);
+    const LampMap lamps = make_lamp_map(scene_, false);
+    const LightDetector detector(lamps, make_detector_camera(calibration));
     const Positioner positioner(lamps, calibration);
     Sensors in_hand;
     in_hand.inclination_sigma_rad = rad_from_deg(90);
-    for (const double most_deg : {15.0, 30.0}) {
+    for (const double max_deg : {15.0, 30.0}) {
       Random random(72);
       Errors errors, again;
       for (int i = 0; i < captures; ++i) {
-        LampShot shot = lamp_shot(scene_, scene_.sets.at(0), static_cast<std::size_t>(i) % 12);
-        CarrierMotion& motion = shot.motion;
+        LampShot shot = make_lamp_shot(scene_, scene_.sets.at(0), static_cast<std::size_t>(i) % 12);
+        BaseMotion& motion = shot.motion;
         motion.axis_m = {random.uniform(-0.5, 0.5), random.uniform(-0.3, 0.3), 0};
         motion.yaw_rad = random.uniform(-3.1, 3.1);
         motion.velocity_m_per_s.setZero();
         motion.turn_rate_rad_per_s = 0;
-        motion.lean = {rad_from_deg(random.uniform(-most_deg, most_deg)),
-                       rad_from_deg(random.uniform(-most_deg, most_deg))};
+        motion.lean = {rad_from_deg(random.uniform(-max_deg, max_deg)),
+                       rad_from_deg(random.uniform(-max_deg, max_deg))};
         const auto detections = detections_in(renderer, detector, shot);
         if (detections.size() < 4) continue;
         const Fix fix = positioner.locate(detections, in_hand);
         errors.add(fix, motion);
         if (!fix.ok()) continue;
         // Discs are circles in the level plane: detected again with the estimated tilt.
-        DetectorCamera leaning = detector_camera(calibration);
+        DetectorCamera leaning = make_detector_camera(calibration);
         leaning.level_from_camera =
             level_from_inclination(fix.body->inclination) * leaning.level_from_camera;
         const auto seen_again = detections_in(renderer, LightDetector(lamps, leaning), shot);
         if (seen_again.size() >= 4) again.add(positioner.locate(seen_again, in_hand), motion);
       }
-      const std::string lean = fmt::format("lean to {:2.0f} deg", most_deg);
+      const std::string lean = fmt::format("lean to {:2.0f} deg", max_deg);
       print(lean, "lean unknown", errors, nullptr);
       print(lean, "looked at again", again, nullptr);
     }
@@ -157,9 +158,9 @@ class Trials {
 
   void run(int captures) {
     const FrameRenderer renderer(scene_);
-    const Calibration calibration = true_calibration(scene_);
-    const LampMap lamps = lamp_map_of(scene_, false);
-    const LightDetector detector(lamps, detector_camera(calibration));
+    const Calibration calibration = make_true_calibration(scene_);
+    const LampMap lamps = make_lamp_map(scene_, false);
+    const LightDetector detector(lamps, make_detector_camera(calibration));
     const Positioner positioner(lamps, calibration);
     Errors standing;
     double noise_px = 0;
@@ -167,10 +168,10 @@ class Trials {
       Random random(71);
       std::array<Errors, 5> errors;
       CenterErrors centers;
-      std::vector<Seen> captures_seen;
+      std::vector<DrivenCapture> captures_seen;
       for (int i = 0; i < captures; ++i) {
-        LampShot shot = lamp_shot(scene_, scene_.sets.at(0), static_cast<std::size_t>(i) % 12);
-        CarrierMotion& motion = shot.motion;
+        LampShot shot = make_lamp_shot(scene_, scene_.sets.at(0), static_cast<std::size_t>(i) % 12);
+        BaseMotion& motion = shot.motion;
         motion.axis_m.x() = random.uniform(-0.3, 0.3);
         motion.axis_m.y() = random.uniform(-0.12, 0.12);
         motion.axis_m.z() = random.uniform(0, 0.3);
@@ -188,12 +189,12 @@ class Trials {
             -(camera_from_world *
               Eigen::Vector3d(std::cos(direction_rad), std::sin(direction_rad), 0))
                  .head<2>();
-        Seen seen{{}, motion.pose(0), speed_m_per_s, std::abs(motion.turn_rate_rad_per_s)};
+        DrivenCapture seen{{}, motion.pose(0), speed_m_per_s, std::abs(motion.turn_rate_rad_per_s)};
         for (const Detection& detection : detections) {
           seen.lamps_m.push_back(find_lamp(lamps.lamps, detection.lamp)->position_m);
         }
         captures_seen.push_back(std::move(seen));
-        for (const TrueLamp& lamp : true_lamps(scene_, renderer, shot)) {
+        for (const TrueLamp& lamp : find_true_lamps(scene_, renderer, shot)) {
           for (const Detection& detection : detections) {
             if (detection.lamp != lamp.id || lamp.in_view < 1) continue;
             centers.add(detection.pixel - lamp.pixel, image_motion);
@@ -218,8 +219,8 @@ class Trials {
         earlier.motion.axis_m.head<2>() -= before_s * motion.velocity_m_per_s;
         earlier.motion.yaw_rad -= before_s * motion.turn_rate_rad_per_s;
         auto before = detections_in(renderer, detector, earlier);
-        std::erase_if(before, [&](const Detection& one) {
-          return one.lamp != two[0].lamp && one.lamp != two[1].lamp;
+        std::erase_if(before, [&](const Detection& detection) {
+          return detection.lamp != two[0].lamp && detection.lamp != two[1].lamp;
         });
         if (before.size() < 2) continue;
         const std::array frames{EarlierFrame{before, before_s}};
@@ -247,21 +248,21 @@ class Trials {
 
  private:
   /// Results with only the maximum speed known, or with odometry.
-  void print_possible(const std::string& speed, const std::vector<Seen>& captures, bool odometry,
-                      double noise_px) const {
+  void print_possible(const std::string& speed, const std::vector<DrivenCapture>& captures,
+                      bool odometry, double noise_px) const {
     const Lens lens(scene_.camera.lens_model, scene_.camera.intrinsics);
     const Eigen::Matrix3d camera_from_level = scene_.mount.level_from_camera.transpose();
-    const auto clock = row_clock_of(scene_.camera);
+    const auto clock = make_row_clock(scene_.camera);
     Possible moving, standing;
     int count = 0;
-    for (const Seen& seen : captures) {
+    for (const DrivenCapture& seen : captures) {
       const KnownMotion known = KnownMotion::up_to(2.5, rad_from_deg(180));
       BodyPrior prior;
       prior.velocity_sd_m_per_s = odometry ? 0.01 * seen.speed_m_per_s : known.velocity_sd_m_per_s;
       prior.yaw_rate_sd_rad_per_s =
           odometry ? 0.01 * seen.turn_rate_rad_per_s : known.yaw_rate_sd_rad_per_s;
-      const auto limit =
-          body_limit(seen.lamps_m, lens, camera_from_level, seen.pose, noise_px, prior, clock);
+      const auto limit = compute_body_limit(seen.lamps_m, lens, camera_from_level, seen.pose,
+                                            noise_px, prior, clock);
       if (!limit) continue;
       moving.add(limit->fix.covariance);
       BodyCovariance still = BodyCovariance::Zero();
@@ -294,9 +295,9 @@ class Trials {
 
   static std::vector<Detection> farthest_two(const std::vector<Detection>& seen,
                                              const LampMap& lamps) {
-    const auto place = [&](const Detection& one) -> Eigen::Vector3d {
+    const auto place = [&](const Detection& detection) -> Eigen::Vector3d {
       for (const Lamp& lamp : lamps.lamps) {
-        if (lamp.id == one.lamp) return lamp.position_m;
+        if (lamp.id == detection.lamp) return lamp.position_m;
       }
       throw std::logic_error("no such lamp");
     };

@@ -23,7 +23,7 @@ struct Scene {
   std::vector<Detection> detections;
 };
 
-Scene scene_of(std::size_t lamps) {
+Scene make_scene(std::size_t lamps) {
   Scene scene{{synthetic_lamps(), {synthetic_camera(), {}, {}, {}, {}}, {{0.2, -0.1, 0}, 0.7}, {}},
               {}};
   scene.rig.map.lamps.resize(lamps);
@@ -33,7 +33,7 @@ Scene scene_of(std::size_t lamps) {
 }
 
 void fix(benchmark::State& state) {
-  const Scene scene = scene_of(static_cast<std::size_t>(state.range(0)));
+  const Scene scene = make_scene(static_cast<std::size_t>(state.range(0)));
   const Positioner positioner(scene.rig.map, scene.rig.calibration);
   if (!positioner.locate(scene.detections).ok()) throw std::logic_error("no fix");
   for (auto _ : state) benchmark::DoNotOptimize(positioner.locate(scene.detections));
@@ -42,7 +42,7 @@ BENCHMARK(fix)->ArgName("lamps")->Arg(2)->Arg(3)->Arg(4)->Arg(8);
 
 /// The same through the C API.
 void fix_in_c(benchmark::State& state) {
-  const Scene scene = scene_of(static_cast<std::size_t>(state.range(0)));
+  const Scene scene = make_scene(static_cast<std::size_t>(state.range(0)));
   const std::string lamps = "fix_benchmark_lamps.yaml", calibration = "fix_benchmark.yaml";
   write_lamp_map(lamps, scene.rig.map);
   write_calibration(calibration, scene.rig.calibration);
@@ -68,7 +68,7 @@ BENCHMARK(fix_in_c)->ArgName("lamps")->Arg(2)->Arg(3)->Arg(4)->Arg(8);
 
 /// The same with the reported uncertainties of calibration and lamp map: lens, zenith, survey.
 void fix_with_the_common_part(benchmark::State& state) {
-  Scene scene = scene_of(static_cast<std::size_t>(state.range(0)));
+  Scene scene = make_scene(static_cast<std::size_t>(state.range(0)));
   SyntheticRig& rig = scene.rig;
   rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.02, 1);
   rig.calibration.rotation_center->covariance = 1e-4 * Eigen::Matrix2d::Identity();
@@ -104,34 +104,34 @@ const BodyMotion kDriving{{0.8, -0.6}, 0, {0, 0}};
 const BodyMotion kTurning{{0.8, -0.6}, 1, {0, 0}};
 const BodyMotion kLeaning{{0.8, -0.6}, 0, {0.06, -0.08}};
 const KnownMotion kOneMeterPerSecond = KnownMotion::up_to(2, 0);
-Sensors sensors_of(double yaw_rate_sd_rad_per_s, double inclination_sigma_rad) {
+Sensors make_sensors(double yaw_rate_sd_rad_per_s, double inclination_sigma_rad) {
   Sensors sensors;
   sensors.motion = kOneMeterPerSecond;
   sensors.motion->yaw_rate_sd_rad_per_s = yaw_rate_sd_rad_per_s;
   sensors.inclination_sigma_rad = inclination_sigma_rad;
   return sensors;
 }
-BENCHMARK_CAPTURE(fix_of_a_body, velocity, sensors_of(0, 0), kDriving)
+BENCHMARK_CAPTURE(fix_of_a_body, velocity, make_sensors(0, 0), kDriving)
     ->ArgName("lamps")
     ->Arg(2)
     ->Arg(4)
     ->Arg(8);
-BENCHMARK_CAPTURE(fix_of_a_body, velocity_and_yaw_rate, sensors_of(1, 0), kTurning)
+BENCHMARK_CAPTURE(fix_of_a_body, velocity_and_yaw_rate, make_sensors(1, 0), kTurning)
     ->ArgName("lamps")
     ->Arg(4)
     ->Arg(8);
-BENCHMARK_CAPTURE(fix_of_a_body, velocity_and_inclination_sensor, sensors_of(0, 0.1), kLeaning)
+BENCHMARK_CAPTURE(fix_of_a_body, velocity_and_inclination_sensor, make_sensors(0, 0.1), kLeaning)
     ->ArgName("lamps")
     ->Arg(4)
     ->Arg(8);
-BENCHMARK_CAPTURE(fix_of_a_body, velocity_and_free_lean, sensors_of(0, 1.6), kLeaning)
+BENCHMARK_CAPTURE(fix_of_a_body, velocity_and_free_lean, make_sensors(0, 1.6), kLeaning)
     ->ArgName("lamps")
     ->Arg(4)
     ->Arg(8);
 
 /// The iterative method of solvePnP requires four points.
 void opencv_undistort_and_solve_pnp(benchmark::State& state) {
-  const Scene scene = scene_of(static_cast<std::size_t>(state.range(0)));
+  const Scene scene = make_scene(static_cast<std::size_t>(state.range(0)));
   const auto& k = scene.rig.calibration.camera.intrinsics;
   const cv::Matx33d camera(k[0], 0, k[2], 0, k[1], k[3], 0, 0, 1);
   const std::vector<double> distortion(k.begin() + 4, k.end());

@@ -51,7 +51,8 @@ cv::Mat render_image(const Scene& scene, const FrameRenderer& renderer, const La
       expose(scene.sensor, renderer.lamp_electrons(shot), shot.noise_seed, scene.picture);
   if (scene.camera.readout == Readout::columns) image = image.t();
   if (!scene.picture) return image;
-  return cv::imdecode(encoded(image, scene.picture), cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
+  return cv::imdecode(encode_image(image, scene.picture),
+                      cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
 }
 
 /// Lamp in a shot.
@@ -63,31 +64,33 @@ struct Extent {
 /// Points of a lamp's face that have at least 2 % of its maximum radiance. For an evenly lit lamp
 /// they are on the contour, for a recessed one on the whole face.
 std::vector<Eigen::Vector3d> bright_points(const Glow& lamp, const Eigen::Vector3d& eye_m) {
-  constexpr double least_fraction = 0.02;
+  constexpr double min_fraction = 0.02;
   constexpr int steps = 60;
   Glow rim = lamp;
   rim.halo.reset();
   if (!lamp.recess) return outline_of(rim);
   const double radius_m = lamp.radius_m();
-  std::vector<std::pair<double, Eigen::Vector3d>> shares;
+  std::vector<std::pair<double, Eigen::Vector3d>> fractions_at_points;
   double greatest = 0;
   for (int i = 0; i < steps * steps; ++i) {
     const Eigen::Vector2d at_m = radius_m * Eigen::Vector2d(2 * (i % steps + 0.5) / steps - 1,
                                                             2 * (i / steps + 0.5) / steps - 1);
     if (at_m.norm() > radius_m) continue;
-    const double share = share_inside(*lamp.recess, radius_m, eye_m - lamp.position_m, at_m);
-    shares.emplace_back(share, lamp.position_m + Eigen::Vector3d(at_m.x(), at_m.y(), 0));
-    greatest = std::max(greatest, share);
+    const double radiance_fraction =
+        compute_radiance_fraction(*lamp.recess, radius_m, eye_m - lamp.position_m, at_m);
+    fractions_at_points.emplace_back(radiance_fraction,
+                                     lamp.position_m + Eigen::Vector3d(at_m.x(), at_m.y(), 0));
+    greatest = std::max(greatest, radiance_fraction);
   }
   std::vector<Eigen::Vector3d> points_m;
-  for (const auto& [share, point_m] : shares) {
-    if (share >= least_fraction * greatest) points_m.push_back(point_m);
+  for (const auto& [radiance_fraction, point_m] : fractions_at_points) {
+    if (radiance_fraction >= min_fraction * greatest) points_m.push_back(point_m);
   }
   return points_m;
 }
 
-Extent extent_of(const Scene& scene, const FrameRenderer& renderer, const LampShot& shot,
-                 const SceneLamp& lamp, const Eigen::Vector2d& center) {
+Extent compute_extent(const Scene& scene, const FrameRenderer& renderer, const LampShot& shot,
+                      const SceneLamp& lamp, const Eigen::Vector2d& center) {
   const Eigen::Isometry3d camera_from_world = shot.motion.world_from_camera(0).inverse();
   const Lens& lens = renderer.rays().lens();
   double radius_px = 0, first_line = INFINITY, last_line = -INFINITY;
@@ -120,11 +123,11 @@ class Score {
   void add(const Scene& scene, const FrameRenderer& renderer, const LampShot& shot,
            const std::vector<Light>& lights) {
     ++images_;
-    const auto truth = true_lamps(scene, renderer, shot);
+    const auto truth = find_true_lamps(scene, renderer, shot);
     std::vector<Extent> extents;
     for (const TrueLamp& lamp : truth) {
       const auto in_scene = std::ranges::find(scene.lamps, lamp.id, &SceneLamp::id);
-      extents.push_back(extent_of(scene, renderer, shot, *in_scene, lamp.pixel));
+      extents.push_back(compute_extent(scene, renderer, shot, *in_scene, lamp.pixel));
     }
     for (std::size_t i = 0; i < truth.size(); ++i) {
       if (truth[i].in_view == 1) add_lamp(truth[i], extents[i], lights);
@@ -178,8 +181,8 @@ class Score {
     }
     ++(is_wrong ? tally.wrong : tally.missed);
     if (is_wrong) return;
-    ++reasons_[nearest ? std::string(name_of(nearest->kind)) + ": " +
-                             std::string(name_of(nearest->reason))
+    ++reasons_[nearest ? std::string(to_string(nearest->kind)) + ": " +
+                             std::string(to_string(nearest->reason))
                        : "no light there"];
   }
 
@@ -193,12 +196,12 @@ class Score {
                                    const LampShot& shot, const Eigen::Vector2d& pixel) {
     const double near_px = 0.08 * scene.camera.imager_px[0];
     std::string name = "elsewhere";
-    double least_px = near_px;
-    for (const TrueOtherLight& other : true_other_lights(scene, renderer, shot)) {
+    double min_px = near_px;
+    for (const TrueOtherLight& other : find_true_other_lights(scene, renderer, shot)) {
       const double distance_px = (other.pixel - pixel).norm();
-      if (distance_px > least_px) continue;
-      least_px = distance_px;
-      name = "at " + std::string(vlp::name_of(other.kind));
+      if (distance_px > min_px) continue;
+      min_px = distance_px;
+      name = "at " + std::string(vlp::to_string(other.kind));
     }
     return name;
   }
@@ -231,11 +234,11 @@ void try_shot(const Scene& scene, const FrameRenderer& renderer, const LightDete
   }
   const Eigen::Matrix3d level_from_camera =
       level_from_inclination(shot.motion.inclination(0)) * scene.mount.level_from_camera;
-  score.add(scene, renderer, shot, detect_lights(detector.leaning(level_from_camera), image));
+  score.add(scene, renderer, shot, detect_lights(detector.with_tilt(level_from_camera), image));
 }
 
 LightDetector detector_for(const Scene& scene) {
-  return {lamp_map_of(scene, false), detector_camera(true_calibration(scene))};
+  return {make_lamp_map(scene, false), make_detector_camera(make_true_calibration(scene))};
 }
 
 /// Images of a scene's folders of lamps. The seed of each round also changes the chips.
@@ -250,13 +253,14 @@ void try_scene(Scene scene, std::uint64_t seed, int images, bool new_seed_in_eac
   for (int i = 0; i < images; ++i) {
     const auto index = static_cast<std::size_t>(i) / sets.size();
     const CaptureSet& set = sets[static_cast<std::size_t>(i) % sets.size()];
-    const auto round = new_seed_in_each ? static_cast<std::size_t>(i) : index / shots_in(set);
+    const auto round = new_seed_in_each ? static_cast<std::size_t>(i) : index / count_shots(set);
     scene.seed = seed + round;
     draw_random_parts(scene);
     // Spread over the whole folder, even for few images.
     const auto wanted = static_cast<std::size_t>(images) / sets.size() + 1;
-    const std::size_t step = std::max<std::size_t>(1, shots_in(set) / wanted);
-    try_shot(scene, renderer, detector, lamp_shot(scene, set, index * step % shots_in(set)), score);
+    const std::size_t step = std::max<std::size_t>(1, count_shots(set) / wanted);
+    try_shot(scene, renderer, detector, make_lamp_shot(scene, set, index * step % count_shots(set)),
+             score);
   }
 }
 
@@ -298,19 +302,19 @@ class ForeignScene {
 
   /// Sets a different duty cycle for each lamp, also in the lamp map.
   void draw_duties(int index) {
-    cv::RNG random = random_of(seed_, "duties", static_cast<std::size_t>(index));
+    cv::RNG random = make_random(seed_, "duties", static_cast<std::size_t>(index));
     for (SceneLamp& lamp : scene_.lamps) lamp.duty = random.uniform(0.3, 0.7);
   }
 
   LampShot draw_shot(int index) {
-    random_ = random_of(seed_, "foreign lights", static_cast<std::size_t>(index));
+    random_ = make_random(seed_, "foreign lights", static_cast<std::size_t>(index));
     set_.lamps->spots_m = {{random_.uniform(-0.7, 0.7), random_.uniform(-0.3, 0.3)}};
     set_.lamps->heights_m = {random_.uniform(0.0, 0.7)};
     set_.lamps->yaws_rad = {random_.uniform(0.0, 2 * std::numbers::pi)};
-    scene_.seed = next_seed(random_);
+    scene_.seed = draw_seed(random_);
     draw_clutter();
     draw_random_parts(scene_);
-    return lamp_shot(scene_, set_, 0);
+    return make_lamp_shot(scene_, set_, 0);
   }
 
   const Scene& scene() const { return scene_; }
@@ -329,19 +333,19 @@ class ForeignScene {
     constexpr double gap_m = 0.02;
     for (int i = 0; i < tries; ++i) {
       const Eigen::Vector2d place_m(random_.uniform(-1.1, 1.1), random_.uniform(-0.8, 0.8));
-      const bool is_free = std::ranges::all_of(taken_, [&](const Circle& circle) {
+      const bool is_free = std::ranges::all_of(occupied_, [&](const Circle& circle) {
         return (circle.center_m - place_m).norm() > circle.radius_m + radius_m + gap_m;
       });
       if (!is_free) continue;
-      taken_.push_back({place_m, radius_m});
+      occupied_.push_back({place_m, radius_m});
       return place_m;
     }
     return std::nullopt;
   }
 
   bool draw_chance(double probability) { return random_.uniform(0.0, 1.0) < probability; }
-  double draw_log(double least, double most) {
-    return std::exp(random_.uniform(std::log(least), std::log(most)));
+  double draw_log(double min, double max) {
+    return std::exp(random_.uniform(std::log(min), std::log(max)));
   }
 
   /// Returns a frequency at least 4 % from those of the lamps.
@@ -408,9 +412,9 @@ class ForeignScene {
 
   void draw_clutter() {
     Clutter& clutter = scene_.clutter = {};
-    taken_.clear();
+    occupied_.clear();
     for (const SceneLamp& lamp : scene_.lamps) {
-      taken_.push_back({lamp.glow.position_m.head<2>(), lamp.glow.radius_m()});
+      occupied_.push_back({lamp.glow.position_m.head<2>(), lamp.glow.radius_m()});
     }
     const int lights = random_.uniform(1, 5);
     for (int i = 0; i < lights; ++i) draw_foreign_light();
@@ -444,7 +448,7 @@ class ForeignScene {
   Scene scene_;
   CaptureSet set_;
   cv::RNG random_;
-  std::vector<Circle> taken_;
+  std::vector<Circle> occupied_;
 };
 
 void try_foreign(std::uint64_t seed, int images, Score& score) {

@@ -25,7 +25,7 @@ namespace {
 
 constexpr std::size_t kPoints = 1000;
 
-constexpr LensModel kSplined = splined_lens({3, 16, 14, 150});
+constexpr LensModel kSplined = lens_model_for({3, 16, 14, 150});
 
 /// Equidistant.
 std::vector<double> splined_parameters(const SplineGrid& grid) {
@@ -36,14 +36,14 @@ std::vector<double> splined_parameters(const SplineGrid& grid) {
     for (int column = 0; column < grid.nx; ++column) {
       const double x = apart * (column - (grid.nx - 1) / 2.0),
                    y = apart * (row - (grid.ny - 1) / 2.0);
-      const double u = std::hypot(x, y), share = 2 * std::atan(u / 2) / u - 1;
-      parameters.insert(parameters.end(), {share * x, share * y});
+      const double u = std::hypot(x, y), scale = 2 * std::atan(u / 2) / u - 1;
+      parameters.insert(parameters.end(), {scale * x, scale * y});
     }
   }
   return parameters;
 }
 
-std::vector<double> parameters_of(LensModel model) {
+std::vector<double> lens_parameters(LensModel model) {
   if (is_splined(model)) return splined_parameters(grid_of(model));
   if (model == LensModel::fisheye) return {400, 401, 399.5, 299.5, 0.03, -0.012, 0.004, -0.0006};
   std::vector<double> parameters{520,   521,  399.5, 299.5, -0.28, 0.09,  1e-4,  -2e-4,
@@ -72,46 +72,46 @@ std::vector<Eigen::Vector3d> points_seen_by(const Lens& lens) {
   return points;
 }
 
-MrcalOracle oracle_of(LensModel model) {
-  return {std::string(name_of(model)), parameters_of(model)};
+MrcalOracle make_oracle(LensModel model) {
+  return {std::string(to_string(model)), lens_parameters(model)};
 }
 
 void count_points(benchmark::State& state) {
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(kPoints));
 }
 
-/// `ray_of` returns the ray found for the i-th pixel.
+/// `get_ray` returns the ray found for the i-th pixel.
 template <typename RayOf>
-void tell_worst(benchmark::State& state, LensModel model, const RayOf& ray_of) {
-  const Lens lens(model, parameters_of(model));
+void report_worst(benchmark::State& state, LensModel model, const RayOf& get_ray) {
+  const Lens lens(model, lens_parameters(model));
   const auto pixels = random_pixels();
   double worst_px = 0;
   for (std::size_t i = 0; i < kPoints; ++i) {
-    worst_px = std::max(worst_px, (lens.project(ray_of(i)).value() - pixels[i]).norm());
+    worst_px = std::max(worst_px, (lens.project(get_ray(i)).value() - pixels[i]).norm());
   }
   state.counters["worst_px"] = worst_px;
 }
 
 void unproject_here(benchmark::State& state, LensModel model) {
-  const Lens lens(model, parameters_of(model));
+  const Lens lens(model, lens_parameters(model));
   const auto pixels = random_pixels();
   for (auto _ : state) {
     for (const auto& pixel : pixels) benchmark::DoNotOptimize(lens.unproject(pixel));
   }
   count_points(state);
-  tell_worst(state, model,
-             [&](std::size_t i) { return lens.unproject(pixels[i]).value().direction; });
+  report_worst(state, model,
+               [&](std::size_t i) { return lens.unproject(pixels[i]).value().direction; });
 }
 
 void unproject_mrcal(benchmark::State& state, LensModel model) {
-  const MrcalOracle oracle = oracle_of(model);
+  const MrcalOracle oracle = make_oracle(model);
   const auto pixels = random_pixels();
   for (auto _ : state) benchmark::DoNotOptimize(oracle.unproject(pixels));
   count_points(state);
 }
 
 void project_here(benchmark::State& state, LensModel model) {
-  const Lens lens(model, parameters_of(model));
+  const Lens lens(model, lens_parameters(model));
   const auto points = points_seen_by(lens);
   for (auto _ : state) {
     for (const auto& point : points) benchmark::DoNotOptimize(lens.project(point));
@@ -120,15 +120,15 @@ void project_here(benchmark::State& state, LensModel model) {
 }
 
 void project_mrcal(benchmark::State& state, LensModel model) {
-  const MrcalOracle oracle = oracle_of(model);
-  const auto points = points_seen_by(Lens(model, parameters_of(model)));
+  const MrcalOracle oracle = make_oracle(model);
+  const auto points = points_seen_by(Lens(model, lens_parameters(model)));
   for (auto _ : state) benchmark::DoNotOptimize(oracle.project(points));
   count_points(state);
 }
 
 struct CvCamera {
   explicit CvCamera(LensModel model) {
-    const std::vector<double> p = parameters_of(model);
+    const std::vector<double> p = lens_parameters(model);
     matrix = {p[0], 0, p[2], 0, p[1], p[3], 0, 0, 1};
     distortions.assign(p.begin() + 4, p.end());
   }
@@ -139,10 +139,11 @@ struct CvCamera {
 
 void unproject_opencv(benchmark::State& state, LensModel model, bool exact) {
   const CvCamera camera(model);
-  constexpr int usual = 5, enough = 200;
+  constexpr int default_iterations = 5, max_iterations = 200;
   const cv::TermCriteria criteria =
-      exact ? cv::TermCriteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, enough, 1e-8)
-            : cv::TermCriteria(cv::TermCriteria::COUNT, usual, 0);
+      exact
+          ? cv::TermCriteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, max_iterations, 1e-8)
+          : cv::TermCriteria(cv::TermCriteria::COUNT, default_iterations, 0);
   std::vector<cv::Point2d> pixels, planes;
   for (const auto& pixel : random_pixels()) pixels.emplace_back(pixel.x(), pixel.y());
   for (auto _ : state) {
@@ -155,14 +156,14 @@ void unproject_opencv(benchmark::State& state, LensModel model, bool exact) {
     benchmark::DoNotOptimize(planes.data());
   }
   count_points(state);
-  tell_worst(state, model,
-             [&](std::size_t i) { return Eigen::Vector3d(planes[i].x, planes[i].y, 1); });
+  report_worst(state, model,
+               [&](std::size_t i) { return Eigen::Vector3d(planes[i].x, planes[i].y, 1); });
 }
 
 void project_opencv(benchmark::State& state, LensModel model) {
   const CvCamera camera(model);
   std::vector<cv::Point3d> points;
-  for (const auto& point : points_seen_by(Lens(model, parameters_of(model)))) {
+  for (const auto& point : points_seen_by(Lens(model, lens_parameters(model)))) {
     points.emplace_back(point.x(), point.y(), point.z());
   }
   const cv::Vec3d none(0, 0, 0);

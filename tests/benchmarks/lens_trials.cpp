@@ -22,8 +22,8 @@ namespace vlp {
 namespace {
 
 struct Counts {
-  int good = 0, wrong = 0, refused = 0, unsolved = 0;
-  double most = 0;
+  int num_accepted = 0, wrong = 0, refused = 0, unsolved = 0;
+  double max_ratio = 0;
 };
 
 Lens random_lens(Random& random) {
@@ -59,21 +59,21 @@ void try_set(int set, Counts& counts) {
     ++counts.unsolved;
     return;
   }
-  const CalibrationReport report = report_on(solution, input);
+  const CalibrationReport report = compute_report(solution, input);
   LensEstimate lens;
   lens.solution = solution;
   lens.report = report;
-  lens.coverage = coverage_of(solution, input);
-  const auto metrics = lens_metrics(lens);
-  if (!words_of_missed(check_gates(lens_gates(), metrics)).empty()) {
+  lens.coverage = compute_view_coverage(solution, input);
+  const auto metrics = collect_lens_metrics(lens);
+  if (!describe_failed_gates(check_gates(default_lens_gates(), metrics)).empty()) {
     ++counts.refused;
     return;
   }
-  ++counts.good;
-  const auto difference = projection_difference(views.lens, solution.lens(), views.imager_px,
-                                                [](const auto&) { return 1; });
+  ++counts.num_accepted;
+  const auto difference = compute_projection_difference(
+      views.lens, solution.lens(), views.imager_px, [](const auto&) { return 1; });
   const double ratio = difference ? difference->rms_px / report.expected_rms_px : INFINITY;
-  counts.most = std::max(counts.most, ratio);
+  counts.max_ratio = std::max(counts.max_ratio, ratio);
   if (!difference || (ratio > apart && difference->rms_px > small_px)) {
     ++counts.wrong;
     fmt::print("set {}: {} views, {:.3f} px apart, expected {:.3f}\n", set, input.views.size(),
@@ -85,12 +85,12 @@ void try_set(int set, Counts& counts) {
 }  // namespace vlp
 
 int main(int argc, char** argv) {
-  constexpr int usual_sets = 200;
-  const int sets = argc > 1 ? std::atoi(argv[1]) : usual_sets;
+  constexpr int default_sets = 200;
+  const int sets = argc > 1 ? std::atoi(argv[1]) : default_sets;
   vlp::Counts counts;
   for (int set = 0; set < sets; ++set) vlp::try_set(set, counts);
   fmt::print("{} sets: {} called good, of which {} wrong; {} refused by a gate, {} not solved\n",
-             sets, counts.good, counts.wrong, counts.refused, counts.unsolved);
-  fmt::print("largest error of a good one over what was expected: {:.2f}\n", counts.most);
-  return counts.wrong == 0 && counts.good > 0 ? 0 : 1;
+             sets, counts.num_accepted, counts.wrong, counts.refused, counts.unsolved);
+  fmt::print("largest error of a good one over what was expected: {:.2f}\n", counts.max_ratio);
+  return counts.wrong == 0 && counts.num_accepted > 0 ? 0 : 1;
 }

@@ -28,18 +28,19 @@ const Rig& rig() {
 }
 
 void lamp_light(benchmark::State& state) {
-  const LampShot shot = lamp_shot(rig().scene, rig().set("check"), 100);
+  const LampShot shot = make_lamp_shot(rig().scene, rig().set("check"), 100);
   for (auto _ : state) benchmark::DoNotOptimize(rig().renderer.lamp_electrons(shot));
 }
 
 void board_light(benchmark::State& state) {
-  const BoardShot shot = board_shot(rig().scene, rig().set("boards"), 3);
+  const BoardShot shot = make_board_shot(rig().scene, rig().set("boards"), 3);
   for (auto _ : state) benchmark::DoNotOptimize(rig().renderer.board_electrons(shot));
 }
 
 cv::Mat1f electrons(bool board) {
-  return board ? rig().renderer.board_electrons(board_shot(rig().scene, rig().set("boards"), 3))
-               : rig().renderer.lamp_electrons(lamp_shot(rig().scene, rig().set("check"), 100));
+  return board
+             ? rig().renderer.board_electrons(make_board_shot(rig().scene, rig().set("boards"), 3))
+             : rig().renderer.lamp_electrons(make_lamp_shot(rig().scene, rig().set("check"), 100));
 }
 
 void sensor(benchmark::State& state, bool board) {

@@ -18,15 +18,15 @@ struct MovingCaptures {
 };
 
 /// Returns eight lamps and a camera tilted by 1.1 degrees with a row time of 55 us.
-inline BodyRig leaning_body() {
+inline BodyRig make_tilted_body() {
   BodyRig rig{synthetic_lamps(), rolling_calibration(), {}, {}};
   rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.02, 0.7);
   return rig;
 }
 
 /// Returns captures with exact motions. Each camera rotates at up to 1.5 rad/s.
-inline MovingCaptures moving_captures(BodyRig rig, int count, double speed_m_per_s, Random& random,
-                                      double sigma_px) {
+inline MovingCaptures make_moving_captures(BodyRig rig, int count, double speed_m_per_s,
+                                           Random& random, double sigma_px) {
   MovingCaptures captures;
   for (int i = 0; i < count; ++i) {
     BodyState& body = rig.body;
@@ -45,9 +45,9 @@ inline MovingCaptures moving_captures(BodyRig rig, int count, double speed_m_per
 }
 
 /// Returns odometry readings of the motions, with errors of the given standard deviations.
-inline std::vector<KnownMotion> odometry_of(const std::vector<KnownMotion>& motions,
-                                            double sd_m_per_s, double sd_rad_per_s,
-                                            Random& random) {
+inline std::vector<KnownMotion> simulate_odometry(const std::vector<KnownMotion>& motions,
+                                                  double sd_m_per_s, double sd_rad_per_s,
+                                                  Random& random) {
   std::vector<KnownMotion> read = motions;
   for (KnownMotion& motion : read) {
     for (double& one : motion.velocity_m_per_s) one += sd_m_per_s * random.normal();

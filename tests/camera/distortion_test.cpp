@@ -138,8 +138,8 @@ TEST(DistortionValidRadius, MatchesFoldInWorstDirection) {
     const Distortion distortion = random_distortion(random);
     const double radius = distortion.valid_radius();
     if (radius == kInfinity) continue;
-    for (const double share : {0.1, 0.5, 0.9, 0.99}) {
-      ASSERT_GT(smallest_determinant(distortion, share * radius), 0) << trial;
+    for (const double fraction : {0.1, 0.5, 0.9, 0.99}) {
+      ASSERT_GT(smallest_determinant(distortion, fraction * radius), 0) << trial;
     }
     const double beyond = smallest_determinant(distortion, 1.01 * radius);
     if (std::abs(beyond) > 10) continue;  // a pole

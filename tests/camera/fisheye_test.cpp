@@ -89,13 +89,13 @@ TEST(FisheyeLens, ProjectInvertsUnprojectUpToValidAngle) {
     const Fisheye fisheye{k};
     const double edge = fisheye.distance(fisheye.valid_angle_rad());
     for (int i = 0; i <= 1000; ++i) {
-      const double share = i < 900 ? i / 900.0 : 1 - std::pow(10.0, -2 - (i - 900) / 7.0);
-      const Eigen::Vector2d pixel(300 * edge * share * 0.6, 301 * edge * share * 0.8);
+      const double fraction = i < 900 ? i / 900.0 : 1 - std::pow(10.0, -2 - (i - 900) / 7.0);
+      const Eigen::Vector2d pixel(300 * edge * fraction * 0.6, 301 * edge * fraction * 0.8);
       const auto ray = lens.unproject(pixel);
-      ASSERT_TRUE(ray) << k[0] << " " << share;
+      ASSERT_TRUE(ray) << k[0] << " " << fraction;
       const auto back = lens.project(ray->direction);
-      ASSERT_TRUE(back) << k[0] << " " << share;
-      ASSERT_LT((*back - pixel).norm(), 1e-8 * std::max(1.0, edge)) << k[0] << " " << share;
+      ASSERT_TRUE(back) << k[0] << " " << fraction;
+      ASSERT_LT((*back - pixel).norm(), 1e-8 * std::max(1.0, edge)) << k[0] << " " << fraction;
     }
   }
 }

@@ -112,11 +112,11 @@ TEST(Unproject, RejectsExactlyPixelsBeyondFoldOfBarrelLens) {
   const double edge_px = 520 * 2 / 3.0 / std::sqrt(1.2);
   for (double around_rad = 0; around_rad < 6.3; around_rad += 0.01) {
     const Vector2d direction(std::cos(around_rad), std::sin(around_rad));
-    for (const double share : {0.1, 0.9, 0.999, 1 - 1e-6, 1 - 1e-9}) {
-      EXPECT_TRUE(lens.unproject(lens.center_px() + share * edge_px * direction)) << share;
+    for (const double fraction : {0.1, 0.9, 0.999, 1 - 1e-6, 1 - 1e-9}) {
+      EXPECT_TRUE(lens.unproject(lens.center_px() + fraction * edge_px * direction)) << fraction;
     }
-    for (const double share : {1 + 1e-9, 1 + 1e-6, 1.001, 1.1, 2.0, 10.0, 1e6}) {
-      EXPECT_FALSE(lens.unproject(lens.center_px() + share * edge_px * direction)) << share;
+    for (const double fraction : {1 + 1e-9, 1 + 1e-6, 1.001, 1.1, 2.0, 10.0, 1e6}) {
+      EXPECT_FALSE(lens.unproject(lens.center_px() + fraction * edge_px * direction)) << fraction;
     }
   }
 }

@@ -49,8 +49,8 @@ TEST_P(LensJacobian, WithRespectToParametersMatchesDifferenceQuotient) {
   for_random_points(model, [&](const std::vector<double>& parameters, const Lens& lens,
                                const Eigen::Vector3d& point) {
     // Hundreds of control points, each of which is a lens to be built.
-    constexpr int enough = 8;
-    if (is_splined(model) && ++points > enough) return;
+    constexpr int max_points = 8;
+    if (is_splined(model) && ++points > max_points) return;
     const Eigen::Matrix2Xd jacobian = parameter_jacobian(lens, point);
     const auto pixel_with = [&](std::size_t i, double step) {
       auto changed = parameters;

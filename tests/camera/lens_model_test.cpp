@@ -10,16 +10,17 @@ namespace vlp {
 namespace {
 
 TEST(LensModelName, MatchesMrcal) {
-  EXPECT_EQ(name_of(LensModel::pinhole), "LENSMODEL_PINHOLE");
-  EXPECT_EQ(name_of(LensModel::stereographic), "LENSMODEL_STEREOGRAPHIC");
-  EXPECT_EQ(name_of(LensModel::opencv4), "LENSMODEL_OPENCV4");
-  EXPECT_EQ(name_of(LensModel::opencv5), "LENSMODEL_OPENCV5");
-  EXPECT_EQ(name_of(LensModel::opencv8), "LENSMODEL_OPENCV8");
-  EXPECT_EQ(name_of(LensModel::opencv12), "LENSMODEL_OPENCV12");
+  EXPECT_EQ(to_string(LensModel::pinhole), "LENSMODEL_PINHOLE");
+  EXPECT_EQ(to_string(LensModel::stereographic), "LENSMODEL_STEREOGRAPHIC");
+  EXPECT_EQ(to_string(LensModel::opencv4), "LENSMODEL_OPENCV4");
+  EXPECT_EQ(to_string(LensModel::opencv5), "LENSMODEL_OPENCV5");
+  EXPECT_EQ(to_string(LensModel::opencv8), "LENSMODEL_OPENCV8");
+  EXPECT_EQ(to_string(LensModel::opencv12), "LENSMODEL_OPENCV12");
 }
 
 TEST(LensModelFromName, InvertsNameOfEachModel) {
-  for (const LensModel model : kEveryModel) EXPECT_EQ(lens_model_from_name(name_of(model)), model);
+  for (const LensModel model : kEveryModel)
+    EXPECT_EQ(lens_model_from_name(to_string(model)), model);
 }
 
 TEST(LensModelFromName, ReturnsNulloptForInexactNames) {
@@ -58,21 +59,21 @@ TEST(LensModelNames, ListsAllModels) {
 TEST(LensModelFromName, ReturnsDistinctModelForEachSplineGrid) {
   for (const SplineGrid& grid : {SplineGrid{2, 3, 3, 1}, SplineGrid{3, 4, 4, 359},
                                  SplineGrid{2, 255, 255, 359}, SplineGrid{3, 30, 20, 170}}) {
-    const LensModel model = splined_lens(grid);
+    const LensModel model = lens_model_for(grid);
     EXPECT_TRUE(is_splined(model));
     EXPECT_EQ(grid_of(model), grid);
-    EXPECT_EQ(lens_model_from_name(name_of(model)), model);
+    EXPECT_EQ(lens_model_from_name(to_string(model)), model);
     EXPECT_EQ(parameter_count(model), 4U + 2U * static_cast<unsigned>(grid.nx * grid.ny));
   }
-  EXPECT_EQ(name_of(splined_lens({3, 30, 20, 170})),
+  EXPECT_EQ(to_string(lens_model_for({3, 30, 20, 170})),
             "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=30_Ny=20_fov_x_deg=170");
 }
 
 TEST(ParameterCount, MatchesMrcal) {
   for (const LensModel model : kMrcalModels) {
     const std::vector<double> parameters(parameter_count(model), 1.0);
-    EXPECT_NO_THROW(oracle_of(model, parameters)) << name_of(model);
-    EXPECT_ANY_THROW(oracle_of(model, std::vector<double>(parameters.size() + 1, 1.0)));
+    EXPECT_NO_THROW(make_oracle(model, parameters)) << to_string(model);
+    EXPECT_ANY_THROW(make_oracle(model, std::vector<double>(parameters.size() + 1, 1.0)));
   }
 }
 

@@ -28,7 +28,7 @@ TEST_P(LensAgainstMrcal, ProjectMatchesPixels) {
     const auto parameters = random_parameters(GetParam(), random_);
     const Lens lens(GetParam(), parameters);
     const auto points = random_points();
-    const auto expected = oracle_of(GetParam(), parameters).project(points);
+    const auto expected = make_oracle(GetParam(), parameters).project(points);
     for (std::size_t i = 0; i < points.size(); ++i) {
       const auto pixel = lens.project(points[i]);
       ASSERT_TRUE(pixel) << points[i].transpose();
@@ -41,7 +41,7 @@ TEST_P(LensAgainstMrcal, JacobiansMatchGradients) {
   for (int camera = 0; camera < kMrcalCameras; ++camera) {
     const auto parameters = random_parameters(GetParam(), random_);
     const Lens lens(GetParam(), parameters);
-    const MrcalOracle oracle = oracle_of(GetParam(), parameters);
+    const MrcalOracle oracle = make_oracle(GetParam(), parameters);
     for (const auto& point : random_points()) {
       const auto projection = lens.project_with_jacobians(point);
       ASSERT_TRUE(projection);
@@ -56,9 +56,9 @@ TEST_P(LensAgainstMrcal, JacobiansMatchGradients) {
       ASSERT_EQ(by_parameters.cols(), expected.d_pixel_d_parameters.cols());
       ASSERT_THAT(by_parameters,
                   IsNear(expected.d_pixel_d_parameters, rounding(expected.d_pixel_d_parameters)));
-      const Eigen::Index own = projection->d_pixel_d_parameters.cols();
-      ASSERT_EQ(own, is_splined(GetParam()) ? 4 : by_parameters.cols());
-      ASSERT_EQ(projection->d_pixel_d_parameters, by_parameters.leftCols(own));
+      const Eigen::Index num_dense = projection->d_pixel_d_parameters.cols();
+      ASSERT_EQ(num_dense, is_splined(GetParam()) ? 4 : by_parameters.cols());
+      ASSERT_EQ(projection->d_pixel_d_parameters, by_parameters.leftCols(num_dense));
     }
   }
 }
@@ -72,7 +72,7 @@ TEST_P(LensAgainstMrcal, UnprojectMatchesRays) {
   for (int camera = 0; camera < kMrcalCameras; ++camera) {
     const auto parameters = random_parameters(GetParam(), random_);
     const Lens lens(GetParam(), parameters);
-    const MrcalOracle oracle = oracle_of(GetParam(), parameters);
+    const MrcalOracle oracle = make_oracle(GetParam(), parameters);
     const auto points = random_points();
     const auto pixels = oracle.project(points);
     const auto rays = oracle.unproject(pixels);

@@ -91,10 +91,10 @@ TEST(Lens, ProjectsPointsBehindCameraForWideModelsOnly) {
     if (is_splined(model)) continue;  // as far as their control points go
     const bool all_round = model == LensModel::stereographic || model == LensModel::fisheye;
     for (const Vector3d& point : {Vector3d(0.1, 0.2, -1), Vector3d(1, 0, 0), Vector3d(1, 2, -1)}) {
-      EXPECT_EQ(lens.project(point).has_value(), all_round) << name_of(model);
-      EXPECT_EQ(lens.project_with_jacobians(point).has_value(), all_round) << name_of(model);
+      EXPECT_EQ(lens.project(point).has_value(), all_round) << to_string(model);
+      EXPECT_EQ(lens.project_with_jacobians(point).has_value(), all_round) << to_string(model);
     }
-    EXPECT_FALSE(lens.project({0, 0, -1})) << name_of(model);
+    EXPECT_FALSE(lens.project({0, 0, -1})) << to_string(model);
   }
 }
 

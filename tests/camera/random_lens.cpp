@@ -30,9 +30,9 @@ std::vector<double> splined_parameters(const SplineGrid& grid, double error, Ran
     for (int column = 0; column < grid.nx; ++column) {
       const Eigen::Vector2d u =
           apart * Eigen::Vector2d(column - (grid.nx - 1) / 2.0, row - (grid.ny - 1) / 2.0);
-      const double norm = u.norm(), share = norm > 0 ? 2 * std::atan(norm / 2) / norm - 1 : 0;
+      const double norm = u.norm(), fraction = norm > 0 ? 2 * std::atan(norm / 2) / norm - 1 : 0;
       const double y = random.uniform(-error, error), x = random.uniform(-error, error);
-      parameters.insert(parameters.end(), {share * u.x() + x, share * u.y() + y});
+      parameters.insert(parameters.end(), {fraction * u.x() + x, fraction * u.y() + y});
     }
   }
   return parameters;
@@ -84,7 +84,7 @@ std::vector<double> parameters_with(LensModel model, const std::vector<double>& 
 }
 
 Eigen::Matrix2Xd parameter_jacobian(const Lens& lens, const Eigen::Vector3d& x_in_camera) {
-  const auto [parameters, d_pixel] = lens.by_parameters(x_in_camera).value();
+  const auto [parameters, d_pixel] = lens.compute_parameter_jacobian(x_in_camera).value();
   const auto count = static_cast<Eigen::Index>(parameter_count(lens.model()));
   Eigen::Matrix2Xd jacobian = Eigen::Matrix2Xd::Zero(2, count);
   for (std::size_t i = 0; i < parameters.size(); ++i) {

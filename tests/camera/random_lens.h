@@ -19,13 +19,13 @@ inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // For GoogleTest, which looks for it next to the type; names of tests have no equals sign.
 inline void PrintTo(LensModel model, std::ostream* out) {
-  for (const char letter : name_of(model)) {
+  for (const char letter : to_string(model)) {
     if (letter != '=') *out << letter;
   }
 }
 
-inline constexpr LensModel kCubic = splined_lens({3, 16, 14, 190}),
-                           kQuadratic = splined_lens({2, 12, 11, 160});
+inline constexpr LensModel kCubic = lens_model_for({3, 16, 14, 190}),
+                           kQuadratic = lens_model_for({2, 12, 11, 160});
 inline constexpr LensModel kMrcalModels[] = {LensModel::pinhole,
                                              LensModel::stereographic,
                                              LensModel::opencv4,
@@ -51,8 +51,8 @@ std::vector<double> random_parameters(LensModel model, Random& random);
 /// A random point one to ten units away, up to 60 degrees off axis.
 Eigen::Vector3d random_point(Random& random);
 
-inline MrcalOracle oracle_of(LensModel model, const std::vector<double>& parameters) {
-  return {std::string(name_of(model)), parameters};
+inline MrcalOracle make_oracle(LensModel model, const std::vector<double>& parameters) {
+  return {std::string(to_string(model)), parameters};
 }
 
 /// A lens of 520 px focal length for an imager of 800 x 600 with these distortions.

@@ -25,18 +25,18 @@ class SplinedLens : public testing::TestWithParam<LensModel> {
   const Lens lens_{GetParam(), parameters_};
   const Vector2d reach_ = SplineSurface(grid_, std::span(parameters_).subspan(4)).reach();
 
-  Vector2d somewhere() {
+  Vector2d random_position() {
     const double y = random_.uniform(-1, 1), x = random_.uniform(-1, 1);
     return reach_.cwiseProduct(Vector2d(x, y));
   }
 };
 
 TEST_P(SplinedLens, MatchesMrcalOverAllControlPoints) {
-  const MrcalOracle oracle = oracle_of(GetParam(), parameters_);
+  const MrcalOracle oracle = make_oracle(GetParam(), parameters_);
   std::vector<Vector3d> rays;
   std::vector<Vector2d> pixels;
   for (int trial = 0; trial < 3000; ++trial) {
-    rays.emplace_back(random_.uniform(1, 5) * ray_of(somewhere()));
+    rays.emplace_back(random_.uniform(1, 5) * ray_of(random_position()));
     pixels.push_back(lens_.project(rays.back()).value());
   }
   const auto expected = oracle.project(rays);
@@ -62,17 +62,17 @@ TEST_P(SplinedLens, ProjectsUpToEndOfPiecesOnly) {
   EXPECT_NEAR(reach_.x(), 2 * std::tan(edge_rad / 2), 1e-12);
   EXPECT_NEAR(reach_.y() / reach_.x(), double(grid_.ny - grid_.order) / (grid_.nx - grid_.order),
               1e-12);
-  for (const double share : {-1.0, -0.3, 0.0, 0.7, 1.0}) {
+  for (const double fraction : {-1.0, -0.3, 0.0, 0.7, 1.0}) {
     for (const double sign : {-1.0, 1.0}) {
-      const Vector2d at_side(sign * reach_.x(), share * reach_.y() * (1 - 1e-9));
-      const Vector2d at_top(share * reach_.x() * (1 - 1e-9), sign * reach_.y());
+      const Vector2d at_side(sign * reach_.x(), fraction * reach_.y() * (1 - 1e-9));
+      const Vector2d at_top(fraction * reach_.x() * (1 - 1e-9), sign * reach_.y());
       for (const Vector2d& edge : {at_side, at_top}) {
         const auto pixel = lens_.project(ray_of((1 - 1e-9) * edge));
         ASSERT_TRUE(pixel) << edge.transpose();
         EXPECT_TRUE(lens_.unproject(*pixel)) << edge.transpose();
         EXPECT_FALSE(lens_.project(ray_of((1 + 1e-9) * edge)));
         EXPECT_FALSE(lens_.project_with_jacobians(ray_of((1 + 1e-9) * edge)));
-        EXPECT_FALSE(lens_.by_parameters(ray_of((1 + 1e-9) * edge)));
+        EXPECT_FALSE(lens_.compute_parameter_jacobian(ray_of((1 + 1e-9) * edge)));
       }
     }
   }
@@ -99,7 +99,7 @@ TEST_P(SplinedLens, UnprojectReturnsNulloptForPixelsOutside) {
 
 TEST_P(SplinedLens, CopyProjectsToSamePixels) {
   const Lens copy = lens_;
-  const Vector3d ray = ray_of(somewhere());
+  const Vector3d ray = ray_of(random_position());
   EXPECT_EQ(copy.project(ray), lens_.project(ray));
   EXPECT_EQ(copy.model(), GetParam());
 }
@@ -113,7 +113,7 @@ TEST(SplinedLensWithRandomControlPoints, UnprojectReturnsRaysOnlyWithoutFold) {
   Random random(62);
   int rays = 0;
   for (int trial = 0; trial < 20; ++trial) {
-    const LensModel model = splined_lens({3, 12, 10, 120});
+    const LensModel model = lens_model_for({3, 12, 10, 120});
     const Lens lens(model, splined_parameters(grid_of(model), 0.4, random));
     for (double v = -300; v <= 900; v += 37) {
       for (double x = -300; x <= 1100; x += 37) {
@@ -131,7 +131,7 @@ TEST(SplinedLensWithRandomControlPoints, UnprojectReturnsRaysOnlyWithoutFold) {
 }
 
 TEST(SplinedLensWithRandomControlPoints, ReturnsOnlyFiniteResults) {
-  const LensModel model = splined_lens({3, 5, 4, 90});
+  const LensModel model = lens_model_for({3, 5, 4, 90});
   for (const double all : {0.0, -1.0, 1e150, -1e300}) {
     std::vector<double> parameters(parameter_count(model), all);
     std::fill_n(parameters.begin(), 4, 500);

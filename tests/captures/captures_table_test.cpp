@@ -60,7 +60,7 @@ TEST(ReadCaptures, ReadsOdometry) {
 TEST(ReadCaptures, RejectsContradictions) {
   const TemporaryFolder folder;
   const auto refusal = [&](const std::string& content) {
-    return refusal_of([&] { read_captures(folder.file("c.csv", content)); });
+    return rejection_message([&] { read_captures(folder.file("c.csv", content)); });
   };
   EXPECT_THAT(refusal("z_m\n1\n"), HasSubstr("c.csv:1: image: this column is missing"));
   EXPECT_THAT(refusal("image\na\na\n"), HasSubstr("c.csv:3: image: 'a' stands twice"));

@@ -17,7 +17,7 @@ class CsvTableTest : public testing::Test {
   TemporaryFolder folder;
   CsvTable read(const std::string& content) { return CsvTable(folder.file("a.csv", content)); }
   std::string refusal(const std::string& content) {
-    return refusal_of([&] { read(content); });
+    return rejection_message([&] { read(content); });
   }
 };
 
@@ -52,7 +52,7 @@ TEST_F(CsvTableTest, ReadsHeaderWithoutRows) { EXPECT_EQ(read("a,b\n").rows(), 0
 
 TEST_F(CsvTableTest, ReportsMissingColumn) {
   const CsvTable table = read("image,lamp\nx,1\n");
-  EXPECT_THAT(refusal_of([&] { (void)table.required("u_px"); }),
+  EXPECT_THAT(rejection_message([&] { (void)table.required("u_px"); }),
               HasSubstr("a.csv:1: u_px: this column is missing; the columns are: image, lamp"));
 }
 
@@ -77,11 +77,11 @@ TEST_F(CsvTableTest, RejectsInvalidCsv) {
 TEST_F(CsvTableTest, ReportsLineAndColumnOfInvalidNumber) {
   for (const std::string bad : {"", "x", "1.5 m", "nan", "inf", "-inf", "1e999", "0x10", "1,5"}) {
     const CsvTable table = read("image,u_px\nok,1\nbad,\"" + bad + "\"\n");
-    EXPECT_THAT(refusal_of([&] { (void)table.number(1, table.required("u_px")); }),
+    EXPECT_THAT(rejection_message([&] { (void)table.number(1, table.required("u_px")); }),
                 HasSubstr("a.csv:3: u_px: should be a finite number, not '" + bad + "'"));
   }
   const CsvTable table = read("lamp\n1.5\n");
-  EXPECT_THAT(refusal_of([&] { (void)table.integer(0, table.required("lamp")); }),
+  EXPECT_THAT(rejection_message([&] { (void)table.integer(0, table.required("lamp")); }),
               HasSubstr("a.csv:2: lamp: should be a whole number, not '1.5'"));
 }
 
@@ -103,7 +103,7 @@ TEST_F(CsvTableTest, ReadsFormulasEscapedByCsvWriter) {
   CsvWriter writer(folder / "b.csv", {"one", "=two"});
   for (const std::string& formula : formulas) writer.row({formula, "x"});
   writer.save();
-  const std::string content = folder.content_of(folder / "b.csv");
+  const std::string content = folder.read_content(folder / "b.csv");
   EXPECT_THAT(content, HasSubstr("\n\"'=1+1\",x\n"));
   const CsvTable table(folder / "b.csv");
   ASSERT_EQ(table.rows(), formulas.size());
@@ -117,7 +117,8 @@ TEST_F(CsvTableTest, ReadsNumbersUnescapedByCsvWriter) {
   CsvWriter writer(folder / "b.csv", {"a", "b", "c", "d", "e", "f"});
   writer.row({"-0.5", "+1.5e-3", "-", "'quoted'", "a=b", "-inf"});
   writer.save();
-  EXPECT_EQ(folder.content_of(folder / "b.csv"), "a,b,c,d,e,f\n-0.5,+1.5e-3,-,'quoted',a=b,-inf\n");
+  EXPECT_EQ(folder.read_content(folder / "b.csv"),
+            "a,b,c,d,e,f\n-0.5,+1.5e-3,-,'quoted',a=b,-inf\n");
 }
 
 TEST_F(CsvTableTest, ReportsDuplicateColumnAmongMany) {
@@ -130,7 +131,7 @@ TEST_F(CsvTableTest, ReportsDuplicateColumnAmongMany) {
   EXPECT_THAT(refusal(header + ",twice\n" + row + ",0\n"),
               HasSubstr("a.csv:1: twice: this column stands twice"));
   const CsvTable table = read(header + "\n" + row + "\n");
-  EXPECT_LT(refusal_of([&] { (void)table.required("u_px"); }).size(), 1000);
+  EXPECT_LT(rejection_message([&] { (void)table.required("u_px"); }).size(), 1000);
 }
 
 }  // namespace

@@ -19,7 +19,7 @@ class ReadDetections : public testing::Test {
     return read_detections(folder.file("d.csv", content));
   }
   std::string refusal(const std::string& content) {
-    return refusal_of([&] { read(content); });
+    return rejection_message([&] { read(content); });
   }
 };
 

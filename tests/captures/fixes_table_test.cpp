@@ -19,7 +19,7 @@ TEST(WriteFixes, WritesDocumentedColumns) {
               {{"a.png", "ok", FixRow::Fix{pose, Eigen::Vector4d(0.1, 0.2, 0.3, 0.4), 0.05}, 4},
                {"b.png", "ok", FixRow::Fix{pose, {}, 0}, 2},
                {"c,d.png", "too_few_lamps", {}, 0}});
-  EXPECT_EQ(TemporaryFolder::content_of(folder / "fixes.csv"),
+  EXPECT_EQ(TemporaryFolder::read_content(folder / "fixes.csv"),
             "image,status,x_m,y_m,z_m,yaw_rad,sd_x_m,sd_y_m,sd_z_m,sd_yaw_rad,lamps,residual_px\n"
             "a.png,ok,1.500000000,-0.250000000,0.123456789,3.000000000,0.1,0.2,0.3,0.4,4,0.05\n"
             "b.png,ok,1.500000000,-0.250000000,0.123456789,3.000000000,,,,,2,0\n"
@@ -57,7 +57,7 @@ TEST(WriteFixes, WritesMotionLeanAndTimeWhenGiven) {
   FixRow lost{"b.png", "too_few_lamps", {}, 1};
   lost.time_s = 0.75;
   write_fixes(folder / "fixes.csv", {moving, lost});
-  EXPECT_EQ(TemporaryFolder::content_of(folder / "fixes.csv"),
+  EXPECT_EQ(TemporaryFolder::read_content(folder / "fixes.csv"),
             "image,status,x_m,y_m,z_m,yaw_rad,sd_x_m,sd_y_m,sd_z_m,sd_yaw_rad,lamps,residual_px,"
             "time_s,vx_m_per_s,vy_m_per_s,roll_rad,pitch_rad\n"
             "a.png,ok,1.500000000,-0.250000000,0.125000000,3.000000000,,,,,4,0.05,0.500000000,"
@@ -72,7 +72,7 @@ TEST(WriteFixes, WritesMotionLeanAndTimeWhenGiven) {
   moving.time_s.reset();
   moving.fix->inclination.reset();
   write_fixes(folder / "fixes.csv", {moving});
-  EXPECT_THAT(TemporaryFolder::content_of(folder / "fixes.csv"),
+  EXPECT_THAT(TemporaryFolder::read_content(folder / "fixes.csv"),
               testing::HasSubstr("residual_px,vx_m_per_s,vy_m_per_s\n"));
 }
 
@@ -80,7 +80,7 @@ TEST(ReadFixes, ReportsLineOfInvalidRow) {
   const TemporaryFolder folder;
   const auto refusal = [&](const std::string& rows) {
     const std::string header = "image,status,x_m,y_m,z_m,yaw_rad,sd_x_m,sd_y_m,sd_z_m,sd_yaw_rad\n";
-    return refusal_of([&] { read_fixes(folder.file("fixes.csv", header + rows)); });
+    return rejection_message([&] { read_fixes(folder.file("fixes.csv", header + rows)); });
   };
   using testing::HasSubstr;
   EXPECT_EQ(refusal("a,ok,0,0,0,0,,,,\nb,bad,x,,,,,,,\n"), "");
@@ -107,13 +107,13 @@ TEST(WriteFixes, WritesNoisePartAndRejectedLampsWhenGiven) {
   whole.rejected = {7, 12};
   whole.outside_region = {3, 5};
   write_fixes(folder / "plain.csv", {plain});
-  EXPECT_THAT(folder.content_of(folder / "plain.csv"),
+  EXPECT_THAT(folder.read_content(folder / "plain.csv"),
               testing::Not(testing::HasSubstr("noise_sd_x_m")));
   write_fixes(folder / "whole.csv", {plain, whole});
-  EXPECT_THAT(folder.content_of(folder / "whole.csv"),
+  EXPECT_THAT(folder.read_content(folder / "whole.csv"),
               HasSubstr("residual_px,noise_sd_x_m,noise_sd_y_m,noise_sd_z_m,noise_sd_yaw_rad,"
                         "rejected,outside_region\n"));
-  EXPECT_THAT(folder.content_of(folder / "whole.csv"), HasSubstr("7 12"));
+  EXPECT_THAT(folder.read_content(folder / "whole.csv"), HasSubstr("7 12"));
   const auto read = read_fixes(folder / "whole.csv");
   EXPECT_FALSE(read[0].fix->noise_sd);
   EXPECT_EQ(read[1].fix->noise_sd, whole.fix->noise_sd);
@@ -130,7 +130,7 @@ TEST(ReadFixes, RejectsInvalidIdsOfRejectedLamps) {
         folder.file("fixes.csv", std::string("image,status,x_m,y_m,z_m,yaw_rad,rejected\n"
                                              "a,ok,0,0,0,0,") +
                                      ids + "\n");
-    EXPECT_THAT(refusal_of([&] { read_fixes(file); }),
+    EXPECT_THAT(rejection_message([&] { read_fixes(file); }),
                 HasSubstr("fixes.csv:2: rejected: should be ids of lamps, separated by blanks"))
         << ids;
   }

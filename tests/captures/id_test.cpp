@@ -27,7 +27,7 @@ TEST(Id, RejectsPathsAndControlCharacters) {
         std::string(201, 'a')}) {
     EXPECT_FALSE(Id::accepts(text)) << text;
   }
-  EXPECT_EQ(refusal_of([] { Id("../x\n", "spool/a.json", "run"); }),
+  EXPECT_EQ(rejection_message([] { Id("../x\n", "spool/a.json", "run"); }),
             "spool/a.json: '../x\\x0a' is no id of a run: 1 to 200 bytes of UTF-8 are one, without "
             "'/', without control characters, and without a '.' at the beginning");
 }

@@ -25,10 +25,10 @@ TEST(ReadPath, ReadsOptionalHeights) {
 TEST(ReadPath, RejectsPathWithoutLength) {
   const TemporaryFolder folder;
   for (const char* text : {"x_m,y_m\n", "x_m,y_m\n1,2\n", "x_m,y_m\n1,2\n1,2\n"}) {
-    EXPECT_THAT(refusal_of([&] { read_path(folder.file("p.csv", text)); }),
+    EXPECT_THAT(rejection_message([&] { read_path(folder.file("p.csv", text)); }),
                 HasSubstr("two waypoints or more at different places"));
   }
-  EXPECT_THAT(refusal_of([&] { read_path(folder.file("p.csv", "x_m,y_m\n1,nan\n1,2\n")); }),
+  EXPECT_THAT(rejection_message([&] { read_path(folder.file("p.csv", "x_m,y_m\n1,nan\n1,2\n")); }),
               HasSubstr("p.csv:2: y_m"));
 }
 
@@ -41,23 +41,25 @@ TEST(FindNearestOnPath, ReturnsNearestPoint) {
   }
   for (int i = 0; i < 100; ++i) {
     const Eigen::Vector2d place(random.uniform(-2, 2), random.uniform(-2, 2));
-    double least = 1e9;  // brute force: a thousand points for each segment
+    double min_squared_distance = 1e9;  // brute force: a thousand points for each segment
     for (std::size_t leg = 1; leg < path.waypoints_m.size(); ++leg) {
       for (int step = 0; step <= 1000; ++step) {
         const Eigen::Vector2d point =
             path.waypoints_m[leg - 1] +
             step / 1000.0 * (path.waypoints_m[leg] - path.waypoints_m[leg - 1]);
-        least = std::min(least, (point - place).norm());
+        min_squared_distance = std::min(min_squared_distance, (point - place).norm());
       }
     }
-    EXPECT_NEAR((nearest_on(path, place).xy_m - place).norm(), least, 2e-3);
+    EXPECT_NEAR((find_nearest_on_path(path, place).xy_m - place).norm(), min_squared_distance,
+                2e-3);
   }
 }
 
 TEST(ReadPath, RejectsDistantWaypoint) {
   const TemporaryFolder folder;
   const auto refusal = [&](const std::string& row) {
-    return refusal_of([&] { read_path(folder.file("p.csv", "x_m,y_m,z_m\n1,2,3\n" + row)); });
+    return rejection_message(
+        [&] { read_path(folder.file("p.csv", "x_m,y_m,z_m\n1,2,3\n" + row)); });
   };
   EXPECT_EQ(refusal("1e6,-1e6,0\n"), "");
   EXPECT_THAT(refusal("1e308,0,0\n"), HasSubstr("p.csv:3: x_m: should be within 1,000 km"));
@@ -67,9 +69,9 @@ TEST(ReadPath, RejectsDistantWaypoint) {
 
 TEST(FindNearestOnPath, InterpolatesHeight) {
   const Path path{{{0, 0}, {2, 0}, {2, 2}}, {0, 1, 5}};
-  EXPECT_DOUBLE_EQ(*nearest_on(path, {1, 1e-3}).z_m, 0.5);
-  EXPECT_DOUBLE_EQ(*nearest_on(path, {3, 1.5}).z_m, 4);
-  EXPECT_DOUBLE_EQ(*nearest_on(path, {9, 9}).z_m, 5);
+  EXPECT_DOUBLE_EQ(*find_nearest_on_path(path, {1, 1e-3}).z_m, 0.5);
+  EXPECT_DOUBLE_EQ(*find_nearest_on_path(path, {3, 1.5}).z_m, 4);
+  EXPECT_DOUBLE_EQ(*find_nearest_on_path(path, {9, 9}).z_m, 5);
 }
 
 }  // namespace

@@ -59,14 +59,14 @@ TEST(PrintableLine, EscapesLineEnds) {
 }
 
 TEST(TruncateUtf8, KeepsWholeCharacters) {
-  EXPECT_EQ(first_characters("abc", 3), "abc");
-  EXPECT_EQ(first_characters("abc", 2), "ab");
-  EXPECT_EQ(first_characters("a\xc3\xb6", 2), "a");
-  EXPECT_EQ(first_characters("a\xe2\x82\xac"
-                             "b",
-                             4),
+  EXPECT_EQ(truncate_utf8("abc", 3), "abc");
+  EXPECT_EQ(truncate_utf8("abc", 2), "ab");
+  EXPECT_EQ(truncate_utf8("a\xc3\xb6", 2), "a");
+  EXPECT_EQ(truncate_utf8("a\xe2\x82\xac"
+                          "b",
+                          4),
             "a\xe2\x82\xac");
-  EXPECT_EQ(first_characters("\xc3\xb6", 1), "");
+  EXPECT_EQ(truncate_utf8("\xc3\xb6", 1), "");
 }
 
 }  // namespace

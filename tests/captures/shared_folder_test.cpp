@@ -34,7 +34,8 @@ TEST_F(SharedFolderTest, WritesReadsRenamesAndRemovesFiles) {
   shared.replace("a", "first");
   shared.replace("a", "second");
   EXPECT_EQ(shared.read("a", 6), "second");
-  EXPECT_THAT(refusal_of([&] { shared.read("a", 5); }), HasSubstr("a: is longer than 5 bytes"));
+  EXPECT_THAT(rejection_message([&] { shared.read("a", 5); }),
+              HasSubstr("a: is longer than 5 bytes"));
   EXPECT_TRUE(shared.rename("a", "b"));
   EXPECT_FALSE(shared.rename("a", "b"));
   EXPECT_EQ(shared.read("b", 10), "second");
@@ -53,8 +54,10 @@ TEST_F(SharedFolderTest, CreatesAndFindsFolders) {
   EXPECT_EQ(found->path(), path / "0001");
   EXPECT_EQ(found->read("a", 1), "a");
   shared.replace("file", "");
-  EXPECT_THAT(refusal_of([&] { shared.make_folder(id("file")); }), HasSubstr("file: cannot be"));
-  EXPECT_THAT(refusal_of([&] { SharedFolder(path / "file"); }), HasSubstr("cannot be opened"));
+  EXPECT_THAT(rejection_message([&] { shared.make_folder(id("file")); }),
+              HasSubstr("file: cannot be"));
+  EXPECT_THAT(rejection_message([&] { SharedFolder(path / "file"); }),
+              HasSubstr("cannot be opened"));
 }
 
 TEST_F(SharedFolderTest, RejectsLinksInFolder) {
@@ -62,7 +65,7 @@ TEST_F(SharedFolderTest, RejectsLinksInFolder) {
   fs::create_directory_symlink(folder / "", path / "folder");
   const SharedFolder shared(path);
   const auto expect_refused = [](const auto& action) {
-    EXPECT_THAT(refusal_of(action), HasSubstr("is a symbolic link, which is not followed"));
+    EXPECT_THAT(rejection_message(action), HasSubstr("is a symbolic link, which is not followed"));
   };
   expect_refused([&] { shared.read("link", 100); });
   expect_refused([&] { shared.open("link", O_CREAT | O_RDWR); });
@@ -74,7 +77,7 @@ TEST_F(SharedFolderTest, RejectsLinksInFolder) {
   fs::remove(path / "link");
   fs::create_symlink(outside, path / "link");
   shared.remove("link");
-  EXPECT_EQ(TemporaryFolder::content_of(outside), "mine");
+  EXPECT_EQ(TemporaryFolder::read_content(outside), "mine");
 }
 
 TEST_F(SharedFolderTest, RejectsNamesOutsideFolder) {
@@ -83,7 +86,7 @@ TEST_F(SharedFolderTest, RejectsNamesOutsideFolder) {
        {std::string(), std::string("."), std::string(".."), std::string("../outside.txt"),
         outside.string(), std::string("a\0b", 3)}) {
     const auto expect_refused = [&](const auto& action) {
-      EXPECT_THAT(refusal_of(action), HasSubstr("is no name of a file in it")) << name;
+      EXPECT_THAT(rejection_message(action), HasSubstr("is no name of a file in it")) << name;
     };
     expect_refused([&] { shared.has(name); });
     expect_refused([&] { shared.read(name, 100); });
@@ -93,7 +96,7 @@ TEST_F(SharedFolderTest, RejectsNamesOutsideFolder) {
     expect_refused([&] { shared.rename("a", name); });
     expect_refused([&] { shared.remove(name); });
   }
-  EXPECT_EQ(TemporaryFolder::content_of(outside), "mine");
+  EXPECT_EQ(TemporaryFolder::read_content(outside), "mine");
 }
 
 TEST_F(SharedFolderTest, RemovesContentOfOpenedFolderAfterRename) {
@@ -113,10 +116,12 @@ TEST_F(SharedFolderTest, ReadsRegularFilesOnly) {
   ASSERT_EQ(::mkfifo((path / "pipe").c_str(), 0600), 0);
   const SharedFolder shared(path);
   for (const int flags : {O_RDONLY, O_WRONLY, O_RDWR}) {
-    EXPECT_THAT(refusal_of([&] { shared.open("pipe", flags); }), HasSubstr("is no regular file"));
+    EXPECT_THAT(rejection_message([&] { shared.open("pipe", flags); }),
+                HasSubstr("is no regular file"));
   }
   fs::create_directory(path / "folder");
-  EXPECT_THAT(refusal_of([&] { shared.read("folder", 10); }), HasSubstr("is no regular file"));
+  EXPECT_THAT(rejection_message([&] { shared.read("folder", 10); }),
+              HasSubstr("is no regular file"));
 }
 
 TEST_F(SharedFolderTest, KeepsModeAndOwnerOfReplacedFile) {

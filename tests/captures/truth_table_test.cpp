@@ -27,7 +27,8 @@ TEST(ReadTruth, AcceptsMissingHeightAndYaw) {
 TEST(ReadTruth, ReportsLineOfInvalidRow) {
   const TemporaryFolder folder;
   const auto refusal = [&](const std::string& rows) {
-    return refusal_of([&] { read_truth(folder.file("t.csv", "image,x_m,y_m,z_m\n" + rows)); });
+    return rejection_message(
+        [&] { read_truth(folder.file("t.csv", "image,x_m,y_m,z_m\n" + rows)); });
   };
   EXPECT_THAT(refusal("a,0,0,\na,1,1,\n"), HasSubstr("t.csv:3: image: 'a' stands twice"));
   EXPECT_THAT(refusal("a,0,0,\n,1,1,\n"), HasSubstr("t.csv:3: image: is empty"));

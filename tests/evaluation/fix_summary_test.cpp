@@ -27,8 +27,8 @@ TEST(Summarize, CountsFixesStatusesAndLamps) {
   EXPECT_EQ(summary.refused.at("degenerate"), 2);
   EXPECT_EQ(summary.refused.at("too_few_lamps"), 1);
   ASSERT_TRUE(summary.typical);
-  EXPECT_EQ(summary.typical->fewest_lamps, 2);
-  EXPECT_EQ(summary.typical->most_lamps, 5);
+  EXPECT_EQ(summary.typical->min_lamps, 2);
+  EXPECT_EQ(summary.typical->max_lamps, 5);
   EXPECT_DOUBLE_EQ(summary.typical->mean_lamps, 10.0 / 3);
   EXPECT_EQ(summary.typical->median_residual_px, 1);  // of 3 and 1, the lower
   ASSERT_TRUE(summary.median_sd);

@@ -40,24 +40,24 @@ TEST(CheckGates, PassesIfValueDoesNotExceedLimit) {
                                     {"missing", 0.25},
                                     {"missing", 0.249},
                                     {"height_rms_mm", 2.9}},
-                                   metrics_of(evaluation()));
+                                   collect_metrics(evaluation()));
   std::vector<bool> passed;
-  for (const CheckedMetric& result : results) passed.push_back(result.met());
+  for (const CheckedMetric& result : results) passed.push_back(result.passed());
   EXPECT_EQ(passed, (std::vector<bool>{true, false, true, true, false, false}));
   EXPECT_NEAR(results[5].value.value(), 3, 1e-9);
   EXPECT_EQ(results[5].unit, "mm");
-  EXPECT_EQ(words_of(results[5]), "height_rms_mm is 3 mm, at most 2.9 mm is asked for");
+  EXPECT_EQ(describe(results[5]), "height_rms_mm is 3 mm, at most 2.9 mm is asked for");
 }
 
 TEST(CheckGates, IncludesLimitInBothDirections) {
-  EXPECT_TRUE(check_gates({{"rms_px", 0.3}}, {{"rms_px", 0.3}})[0].met());
-  EXPECT_FALSE(check_gates({{"rms_px", 0.3}}, {{"rms_px", 0.31}})[0].met());
+  EXPECT_TRUE(check_gates({{"rms_px", 0.3}}, {{"rms_px", 0.3}})[0].passed());
+  EXPECT_FALSE(check_gates({{"rms_px", 0.3}}, {{"rms_px", 0.31}})[0].passed());
   const auto coverage = check_gates({{"coverage", 0.7}}, {{"coverage", 0.69}});
-  EXPECT_FALSE(coverage[0].met());
-  EXPECT_EQ(words_of(coverage[0]), "coverage is 0.69, at least 0.7 is asked for");
-  EXPECT_EQ(cause_of(coverage[0]),
-            "the board was not shown all over the image (" + words_of(coverage[0]) + ")");
-  EXPECT_TRUE(check_gates({{"coverage", 0.7}}, {{"coverage", 0.7}})[0].met());
+  EXPECT_FALSE(coverage[0].passed());
+  EXPECT_EQ(describe(coverage[0]), "coverage is 0.69, at least 0.7 is asked for");
+  EXPECT_EQ(describe_failure(coverage[0]),
+            "the board was not shown all over the image (" + describe(coverage[0]) + ")");
+  EXPECT_TRUE(check_gates({{"coverage", 0.7}}, {{"coverage", 0.7}})[0].passed());
 }
 
 TEST(CheckGates, TightensLimitByGuardBand) {
@@ -65,16 +65,17 @@ TEST(CheckGates, TightensLimitByGuardBand) {
     return check_all({{metric, limit, GuardBand{0.01, 1.5}}}, {{metric, value}},
                      {*metric_kind(metric)})[0];
   };
-  EXPECT_TRUE(of("rms_px", 0.3, 0.2849).met());
+  EXPECT_TRUE(of("rms_px", 0.3, 0.2849).passed());
   const CheckedMetric within = of("rms_px", 0.3, 0.286);
-  EXPECT_FALSE(within.met());
-  EXPECT_EQ(words_of(within),
+  EXPECT_FALSE(within.passed());
+  EXPECT_EQ(describe(within),
             "rms_px is 0.286 px, at most 0.3 px less a guard band of 0.015 px is asked for");
-  EXPECT_FALSE(check_gates({{"rms_px", 0.3, GuardBand{0.01, 1.5}}}, {{"rms_px", 0.286}})[0].met());
-  EXPECT_TRUE(of("coverage", 0.7, 0.7151).met());
+  EXPECT_FALSE(
+      check_gates({{"rms_px", 0.3, GuardBand{0.01, 1.5}}}, {{"rms_px", 0.286}})[0].passed());
+  EXPECT_TRUE(of("coverage", 0.7, 0.7151).passed());
   const CheckedMetric below = of("coverage", 0.7, 0.714);
-  EXPECT_FALSE(below.met());
-  EXPECT_EQ(words_of(below),
+  EXPECT_FALSE(below.passed());
+  EXPECT_EQ(describe(below),
             "coverage is 0.714, at least 0.7 and a guard band of 0.015 is asked for");
   // Tables of the normal distribution.
   EXPECT_NEAR(*of("rms_px", 0.3, 0.286).conformance_probability(), 0.91924, 5e-6);
@@ -90,14 +91,14 @@ TEST(ConformanceProbability, MatchesSimulatedDecisionErrors) {
   constexpr double limit = 1, u = 0.05, k = 1.645;
   CheckedMetric unit = check_gates({{"rms_px", limit, GuardBand{u, k}}}, {})[0];
   Random random(11);
-  constexpr int units = 300'000;
+  constexpr int clusters = 300'000;
   double passed_falsely = 0, stated_passed = 0, failed_falsely = 0, stated_failed = 0;
   int passed_at_limit = 0;
-  for (int i = 0; i < units; ++i) {
+  for (int i = 0; i < clusters; ++i) {
     const double truth = random.uniform(limit - 5 * u, limit + 5 * u);
     unit.value = truth + u * random.normal();
     const double conforms = unit.conformance_probability().value();
-    if (unit.met()) {
+    if (unit.passed()) {
       passed_falsely += truth > limit ? 1 : 0;
       stated_passed += 1 - conforms;
     } else {
@@ -105,12 +106,12 @@ TEST(ConformanceProbability, MatchesSimulatedDecisionErrors) {
       stated_failed += conforms;
     }
     unit.value = limit + u * random.normal();
-    passed_at_limit += unit.met() ? 1 : 0;
+    passed_at_limit += unit.passed() ? 1 : 0;
   }
   // 630 units pass falsely: their number has a standard error of 4 %.
   EXPECT_NEAR(passed_falsely / stated_passed, 1, 0.1);
   EXPECT_NEAR(failed_falsely / stated_failed, 1, 0.1);
-  EXPECT_NEAR(double(passed_at_limit) / units, 0.05, 0.005);
+  EXPECT_NEAR(double(passed_at_limit) / clusters, 0.05, 0.005);
 }
 
 TEST(CheckAll, IncludesMetricsWithoutGateAndGatesWithoutValue) {
@@ -120,11 +121,11 @@ TEST(CheckAll, IncludesMetricsWithoutGateAndGatesWithoutValue) {
   ASSERT_EQ(all.size(), 2);
   EXPECT_EQ(all[0].name, "rms_px");
   EXPECT_FALSE(all[0].value);
-  EXPECT_FALSE(all[0].met());
-  EXPECT_EQ(words_of_missed(all), "rms_px is not known, at most 0.3 px is asked for");
+  EXPECT_FALSE(all[0].passed());
+  EXPECT_EQ(describe_failed_gates(all), "rms_px is not known, at most 0.3 px is asked for");
   EXPECT_EQ(all[1].value, 1);
   EXPECT_FALSE(all[1].limit);
-  EXPECT_TRUE(all[1].met());
+  EXPECT_TRUE(all[1].passed());
 }
 
 TEST(WithChanges, ReplacesLimitsAndAppendsNewGates) {
@@ -139,14 +140,16 @@ TEST(WithChanges, ReplacesLimitsAndAppendsNewGates) {
 TEST(CheckGates, ComparisonOfTooFewUnitsPasses) {
   Evaluation compared = evaluation();
   compared.comparison = Comparison{};
-  const auto passed = [&] { return check_gates({{"worse_mm", 0}}, metrics_of(compared))[0].met(); };
-  EXPECT_FALSE(value_of(metrics_of(compared), "worse_mm")) << "no pair";
-  compared.comparison->pairs = compared.comparison->units = 19;
+  const auto passed = [&] {
+    return check_gates({{"worse_mm", 0}}, collect_metrics(compared))[0].passed();
+  };
+  EXPECT_FALSE(find_metric_value(collect_metrics(compared), "worse_mm")) << "no pair";
+  compared.comparison->pairs = compared.comparison->clusters = 19;
   compared.comparison->interval_m = {0.1, 1};
   EXPECT_TRUE(passed());
   compared.comparison->interval_m = {};
   EXPECT_TRUE(passed());
-  compared.comparison->units = 20;
+  compared.comparison->clusters = 20;
   compared.comparison->interval_m = {0.1, 1};
   EXPECT_FALSE(passed());
   compared.comparison->interval_m = {1e-7, 2.4e-7};  // of no matter
@@ -157,7 +160,7 @@ TEST(ParseGate, RejectsUnreachableLimits) {
   const auto known = metric_kinds({MetricSource::lens, MetricSource::evaluation});
   const auto words = [&](const char* text) -> std::string {
     try {
-      return gate_of(text, known).metric;
+      return parse_gate(text, known).metric;
     } catch (const std::invalid_argument& problem) {
       return problem.what();
     }
@@ -168,11 +171,11 @@ TEST(ParseGate, RejectsUnreachableLimits) {
             "gate 'coverage' should be a share from 0 to 1, not 7: for 7 % say 0.07");
   EXPECT_EQ(words("yaw_rms_deg=200"), "gate 'yaw_rms_deg' should be at most 180 deg, not 200");
   EXPECT_THAT(words("mean_mm=-1"), HasSubstr("gate 'mean_mm' should not be negative"));
-  EXPECT_EQ(gate_of("missing=1", known).limit, 1);
-  EXPECT_EQ(gate_of("stated_ratio=50", known).limit, 50);
+  EXPECT_EQ(parse_gate("missing=1", known).limit, 1);
+  EXPECT_EQ(parse_gate("stated_ratio=50", known).limit, 50);
   const TemporaryFolder folder;
   const auto refusal = [&](const std::string& text) {
-    return refusal_of(
+    return rejection_message(
         [&] { read_gates(folder.file("g.yaml", "format: vlp-gates/1\ngates:\n" + text), known); });
   };
   EXPECT_THAT(refusal("  mean_mm: 1\n  missing: 1.5\n"),
@@ -183,8 +186,8 @@ TEST(ParseGate, RejectsUnreachableLimits) {
 
 TEST(CheckGates, FailsGateWithoutValue) {
   const CheckedMetric gate = check_gates({{"halves_px", 1}}, {{"rms_px", 0.1}})[0];
-  EXPECT_EQ(words_of(gate), "halves_px is not known, at most 1 px is asked for");
-  const auto json = nlohmann::json::parse(json_of(evaluation(), {gate}));
+  EXPECT_EQ(describe(gate), "halves_px is not known, at most 1 px is asked for");
+  const auto json = nlohmann::json::parse(to_json(evaluation(), {gate}));
   EXPECT_TRUE(json["gates"][0]["value"].is_null());
   EXPECT_EQ(json["passed"], false);
   const auto tests = make_junit_tests(std::vector{gate});
@@ -194,12 +197,12 @@ TEST(CheckGates, FailsGateWithoutValue) {
 
 TEST(ParseGate, ParsesNameAndLimit) {
   const auto known = metric_kinds({MetricSource::evaluation});
-  const Gate gate = gate_of("p90_mm=2.5", known);
+  const Gate gate = parse_gate("p90_mm=2.5", known);
   EXPECT_EQ(gate.metric, "p90_mm");
   EXPECT_EQ(gate.limit, 2.5);
   for (const char* bad : {"mean=1", "mean_mm", "mean_mm=", "mean_mm=x", "mean_mm=1mm",
                           "mean_mm=nan", "mean_mm=inf", "rms_px=1", "=1", ""}) {
-    EXPECT_THROW(gate_of(bad, known), std::invalid_argument) << bad;
+    EXPECT_THROW(parse_gate(bad, known), std::invalid_argument) << bad;
   }
 }
 
@@ -212,7 +215,7 @@ TEST(ReadGates, ReadsFileAndRejectsInvalidOnes) {
   EXPECT_EQ(gates[0].metric, "mean_mm");
   EXPECT_EQ(gates[0].limit, 1.5);
   const auto refusal = [&](const std::string& text) {
-    return refusal_of(
+    return rejection_message(
         [&] { read_gates(folder.file("g.yaml", "format: vlp-gates/1\n" + text), known); });
   };
   EXPECT_THAT(refusal("gates:\n  mean_mm: 1\n  mean_cm: 1\n"),
@@ -223,8 +226,8 @@ TEST(ReadGates, ReadsFileAndRejectsInvalidOnes) {
 }
 
 TEST(EvaluationJson, HasUnitsInKeys) {
-  const auto json = nlohmann::json::parse(json_of(
-      evaluation(), check_gates({{"max_mm", 5}, {"missing", 1}}, metrics_of(evaluation()))));
+  const auto json = nlohmann::json::parse(to_json(
+      evaluation(), check_gates({{"max_mm", 5}, {"missing", 1}}, collect_metrics(evaluation()))));
   EXPECT_EQ(json["format"], "vlp-evaluation/1");
   EXPECT_EQ(json["captures"], 4);
   EXPECT_EQ(json["missing"]["degenerate"], 1);
@@ -241,15 +244,15 @@ TEST(EvaluationJson, OmitsP90IntervalForFewUnits) {
   const Interval interval{0.001, 0.002};
   few.intervals_m = {interval, interval, {}, interval, 19};
   few.comparison = Comparison{};
-  const auto json = nlohmann::json::parse(json_of(few, {}));
+  const auto json = nlohmann::json::parse(to_json(few, {}));
   EXPECT_FALSE(json["horizontal"]["intervals_95"].contains("p90_mm"));
   EXPECT_NEAR(json["horizontal"]["intervals_95"]["rms_mm"][1].get<double>(), 2, 1e-9);
   EXPECT_EQ(json["comparison"]["why"], "too few");
   few.intervals_m->p90 = interval;
-  few.comparison->units = 20;
-  const auto enough = nlohmann::json::parse(json_of(few, {}));
-  EXPECT_NEAR(enough["horizontal"]["intervals_95"]["p90_mm"][0].get<double>(), 1, 1e-9);
-  EXPECT_FALSE(enough["comparison"].contains("why"));
+  few.comparison->clusters = 20;
+  const auto sufficient = nlohmann::json::parse(to_json(few, {}));
+  EXPECT_NEAR(sufficient["horizontal"]["intervals_95"]["p90_mm"][0].get<double>(), 1, 1e-9);
+  EXPECT_FALSE(sufficient["comparison"].contains("why"));
 }
 
 }  // namespace

@@ -18,7 +18,7 @@ TEST(WriteLimits, HasColumnForEachSourceAndEmptyCellsWithoutFix) {
   const TemporaryFolder folder;
   write_limits(folder / "limits.csv", limits);
   EXPECT_EQ(
-      TemporaryFolder::content_of(folder / "limits.csv"),
+      TemporaryFolder::read_content(folder / "limits.csv"),
       "x_m,y_m,z_m,yaw_rad,lamps,sd_x_m,sd_y_m,sd_z_m,sd_yaw_rad,noise_m,tilt_m,horizontal_m\n"
       "0.5,1,0,0.25,3,0.003,0.004,0.002,0.001,0.003,0.004,0.005\n"
       "1,1,0,0.25,1,,,,,,,\n");

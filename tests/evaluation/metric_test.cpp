@@ -29,9 +29,9 @@ TEST(MetricKinds, HaveUniqueNamesAndDescriptions) {
 
 TEST(FindMetricValue, ReturnsNulloptForMissingOrNonFiniteMetric) {
   const std::vector<Metric> metrics{{"a", 1}, {"b", std::numeric_limits<double>::quiet_NaN()}};
-  EXPECT_EQ(value_of(metrics, "a"), 1);
-  EXPECT_FALSE(value_of(metrics, "b"));
-  EXPECT_FALSE(value_of(metrics, "c"));
+  EXPECT_EQ(find_metric_value(metrics, "a"), 1);
+  EXPECT_FALSE(find_metric_value(metrics, "b"));
+  EXPECT_FALSE(find_metric_value(metrics, "c"));
 }
 
 }  // namespace

@@ -40,10 +40,10 @@ TEST(ProposeGates, RunsOfSameAccuracyPass) {
     const EvaluationInput first = draw_run(40, 2 * seed), second = draw_run(40, 2 * seed + 1);
     const auto gates = propose_gates(first, evaluate(first));
     ASSERT_EQ(gates.size(), 5);
-    for (const auto& gate : check_gates(gates, metrics_of(evaluate(second)))) {
+    for (const auto& gate : check_gates(gates, collect_metrics(evaluate(second)))) {
       if (gate.name == "missing") continue;
       ++checked;
-      if (!gate.met()) ++exceeded;
+      if (!gate.passed()) ++exceeded;
     }
   }
   ASSERT_EQ(checked, 800);
@@ -55,7 +55,7 @@ TEST(ProposeGates, RunWithScaledHeightErrorsFails) {
   const EvaluationInput good = draw_run(40, 1), wrong = draw_run(40, 2, 3);
   const auto gates = propose_gates(good, evaluate(good));
   ASSERT_FALSE(gates.empty());
-  EXPECT_THAT(words_of_missed(check_gates(gates, metrics_of(evaluate(wrong)))),
+  EXPECT_THAT(describe_failed_gates(check_gates(gates, collect_metrics(evaluate(wrong)))),
               HasSubstr("height_rms_mm is"));
 }
 
@@ -83,12 +83,12 @@ TEST(FormatGates, OwnRunWithMissingCapturesPasses) {
   EvaluationInput input = draw_run(21, 1);
   for (std::size_t i = 0; i < 7; ++i) input.fixes.rows[3 * i].fix.reset();
   const Evaluation evaluation = evaluate(input);
-  ASSERT_NEAR(evaluation.missing_share(), 1.0 / 3, 1e-12);
+  ASSERT_NEAR(evaluation.missing_fraction(), 1.0 / 3, 1e-12);
   const TemporaryFolder folder;
   const auto gates = read_gates(
       folder.file("gates.yaml", format_gates(propose_gates(input, evaluation), evaluation)),
       metric_kinds({MetricSource::evaluation}));
-  EXPECT_EQ(words_of_missed(check_gates(gates, metrics_of(evaluation))), "");
+  EXPECT_EQ(describe_failed_gates(check_gates(gates, collect_metrics(evaluation))), "");
 }
 
 TEST(FormatGates, RoundTripsThroughReadGates) {

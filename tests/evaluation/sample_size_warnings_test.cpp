@@ -15,15 +15,15 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
 
-Evaluation evaluation(std::size_t units) {
+Evaluation evaluation(std::size_t clusters) {
   Evaluation evaluation;
   evaluation.captures = 432;
   evaluation.fixes = 39;
-  evaluation.against = "truth";
-  evaluation.drawn = "stations";
+  evaluation.reference = "truth";
+  evaluation.resampling_unit = "stations";
   const Interval interval{0, 1};
-  evaluation.intervals_m = {interval, interval, {}, interval, units};
-  if (units >= kFewestUnitsOfP90) evaluation.intervals_m->p90 = interval;
+  evaluation.intervals_m = {interval, interval, {}, interval, clusters};
+  if (clusters >= kMinClustersForP90) evaluation.intervals_m->p90 = interval;
   return evaluation;
 }
 
@@ -31,56 +31,56 @@ TEST(MissingFixesWarning, WarnsIfNoGateLimitsMissingFixes) {
   const auto gates =
       check_gates({{"mean_mm", 2}, {"missing", 1}}, {{"mean_mm", 1}, {"missing", 0.9}});
   const CheckedMetric &mean = gates[0], &missing = gates[1];
-  EXPECT_EQ(unasked_missing(evaluation(50), {mean}),
+  EXPECT_EQ(make_missing_fixes_warning(evaluation(50), {mean}),
             "393 of 432 captures have no fix, and no gate 'missing' asks");
-  EXPECT_EQ(unasked_missing(evaluation(50), {mean, missing}), "");
-  EXPECT_EQ(unasked_missing(evaluation(50), {}), "");
+  EXPECT_EQ(make_missing_fixes_warning(evaluation(50), {mean, missing}), "");
+  EXPECT_EQ(make_missing_fixes_warning(evaluation(50), {}), "");
   Evaluation all = evaluation(50);
   all.fixes = all.captures - 1;
-  EXPECT_THAT(unasked_missing(all, {mean}), HasSubstr("1 of 432 captures has no fix"));
+  EXPECT_THAT(make_missing_fixes_warning(all, {mean}), HasSubstr("1 of 432 captures has no fix"));
   all.fixes = all.captures;
-  EXPECT_EQ(unasked_missing(all, {mean}), "");
+  EXPECT_EQ(make_missing_fixes_warning(all, {mean}), "");
 }
 
 TEST(SampleSizeWarnings, WarnsForFewUnits) {
-  EXPECT_THAT(sample_size_warnings(evaluation(50)), IsEmpty());
-  EXPECT_THAT(sample_size_warnings(evaluation(49)),
+  EXPECT_THAT(make_sample_size_warnings(evaluation(50)), IsEmpty());
+  EXPECT_THAT(make_sample_size_warnings(evaluation(49)),
               ElementsAre("of so few as 49 stations intervals are somewhat too narrow, that of p90 "
                           "most"));
-  EXPECT_THAT(sample_size_warnings(evaluation(19)), ElementsAre(HasSubstr("p90 has none")));
+  EXPECT_THAT(make_sample_size_warnings(evaluation(19)), ElementsAre(HasSubstr("p90 has none")));
   Evaluation path = evaluation(30);  // as many runs as a path ever has
-  path.against = "path";
-  EXPECT_THAT(sample_size_warnings(path), IsEmpty());
+  path.reference = "path";
+  EXPECT_THAT(make_sample_size_warnings(path), IsEmpty());
   Evaluation none = evaluation(4);
   none.intervals_m = {};
-  EXPECT_THAT(sample_size_warnings(none),
+  EXPECT_THAT(make_sample_size_warnings(none),
               ElementsAre("there are too few stations with a fix for intervals"));
 }
 
 TEST(LimitWarning, WarnsIfErrorsAreBelowLimit) {
   Evaluation limited = evaluation(1000);
-  EXPECT_EQ(warning_of_limit(limited), "");
-  limited.limit = LimitRatio{0.609, 1e-3, 36, 1.0 / 12};
-  EXPECT_THAT(warning_of_limit(limited),
+  EXPECT_EQ(make_limit_warning(limited), "");
+  limited.limit = CrlbRatio{0.609, 1e-3, 36, 1.0 / 12};
+  EXPECT_THAT(make_limit_warning(limited),
               AllOf(HasSubstr("0.609 times the theoretical limit: either the noise of a lamp's "
                               "pixel is stated too large, or the fixes use more than one image"),
                     Not(HasSubstr("nothing beats"))));
   limited.limit->horizontal = 0.9;
-  EXPECT_EQ(warning_of_limit(limited), "");
+  EXPECT_EQ(make_limit_warning(limited), "");
 }
 
 TEST(SampleSizeWarnings, CountsUnitsOfPairs) {
   Evaluation compared = evaluation(1000);
   compared.comparison = Comparison{};
-  compared.comparison->units = 8;
-  EXPECT_THAT(sample_size_warnings(compared),
+  compared.comparison->clusters = 8;
+  EXPECT_THAT(make_sample_size_warnings(compared),
               ElementsAre("of so few as 8 stations with a fix in both files a comparison is no "
                           "evidence, which takes 20"));
-  compared.comparison->units = 49;
-  EXPECT_THAT(sample_size_warnings(compared),
+  compared.comparison->clusters = 49;
+  EXPECT_THAT(make_sample_size_warnings(compared),
               ElementsAre(HasSubstr("49 stations with a fix in both")));
-  compared.comparison->units = 50;
-  EXPECT_THAT(sample_size_warnings(compared), IsEmpty());
+  compared.comparison->clusters = 50;
+  EXPECT_THAT(make_sample_size_warnings(compared), IsEmpty());
 }
 
 }  // namespace

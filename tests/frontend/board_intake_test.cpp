@@ -47,7 +47,7 @@ struct BoardIntakeOfFolder : testing::Test {
   }
 };
 
-RejectionReason reason_of(const Observation& image) {
+RejectionReason rejection_reason(const Observation& image) {
   EXPECT_TRUE(image.rejection) << image.name() << " is not rejected";
   return image.rejection ? image.rejection->reason : RejectionReason::not_needed;
 }
@@ -72,19 +72,20 @@ TEST_F(BoardIntakeOfFolder, RejectsPoorImagesWithMeasuredValues) {
   cv::Mat blurred;
   cv::GaussianBlur(good, blurred, {}, 3);
   const Observation blur = observe(blurred);
-  EXPECT_EQ(reason_of(blur), RejectionReason::blurred);
+  EXPECT_EQ(rejection_reason(blur), RejectionReason::blurred);
   EXPECT_THAT(blur.rejection->message, testing::MatchesRegex("blurred: [23]\\.[0-9] px, 2\\.0 .*"));
 
   const Observation dark = observe(scaled(good, 0.012));
-  EXPECT_EQ(reason_of(dark), RejectionReason::too_dark);
+  EXPECT_EQ(rejection_reason(dark), RejectionReason::too_dark);
   EXPECT_THAT(dark.rejection->message, HasSubstr("of the full scale, 10 % at least"));
 
   const Observation white = observe(scaled(good, 8));
-  EXPECT_EQ(reason_of(white), RejectionReason::overexposed);
+  EXPECT_EQ(rejection_reason(white), RejectionReason::overexposed);
   EXPECT_THAT(white.rejection->message, HasSubstr("is at full scale, 25 % at most"));
 
-  EXPECT_EQ(reason_of(observe(cv::Mat1b(600, 800, uchar(128)))), RejectionReason::no_contrast);
-  EXPECT_EQ(reason_of(observe(good(cv::Rect(0, 0, 400, 300)))), RejectionReason::wrong_size);
+  EXPECT_EQ(rejection_reason(observe(cv::Mat1b(600, 800, uchar(128)))),
+            RejectionReason::no_contrast);
+  EXPECT_EQ(rejection_reason(observe(good(cv::Rect(0, 0, 400, 300)))), RejectionReason::wrong_size);
 }
 
 TEST_F(BoardIntakeOfFolder, AppliesLimitsOfOptions) {
@@ -92,15 +93,15 @@ TEST_F(BoardIntakeOfFolder, AppliesLimitsOfOptions) {
   cv::GaussianBlur(good, blurred, {}, 1.5);
   ASSERT_TRUE(observe(blurred).is_kept());
   options.max_blur_px = 1;
-  EXPECT_EQ(reason_of(observe(blurred)), RejectionReason::blurred);
+  EXPECT_EQ(rejection_reason(observe(blurred)), RejectionReason::blurred);
 }
 
 TEST_F(BoardIntakeOfFolder, RejectsImagesWithTooFewTags) {
   // Some tags are left, then none.
   cv::Mat few = good.clone(), none = good.clone();
-  const SeenBoard seen = BoardDetector(board).detect(good);
+  const BoardDetection seen = BoardDetector(board).detect(good);
   ASSERT_GE(seen.tags.size(), 6U);
-  const auto hide = [](const SeenTag& tag, cv::Mat& image) {
+  const auto hide = [](const TagDetection& tag, cv::Mat& image) {
     std::vector<cv::Point> corners;
     for (const auto& corner : tag.corners_px) corners.emplace_back(corner.x(), corner.y());
     cv::fillConvexPoly(image, corners, cv::Scalar(255));
@@ -110,10 +111,10 @@ TEST_F(BoardIntakeOfFolder, RejectsImagesWithTooFewTags) {
     hide(seen.tags[i], none);
   }
   const Observation image = observe(few);
-  EXPECT_EQ(reason_of(image), RejectionReason::too_few_corners);
+  EXPECT_EQ(rejection_reason(image), RejectionReason::too_few_corners);
   EXPECT_THAT(image.rejection->message, StartsWith("only 2 tags of the board can be used"));
   cv::rectangle(none, {100, 100, 80, 80}, cv::Scalar(0), -1);  // sharp edges
-  EXPECT_EQ(reason_of(observe(none)), RejectionReason::no_board);
+  EXPECT_EQ(rejection_reason(observe(none)), RejectionReason::no_board);
 }
 
 TEST_F(BoardIntakeOfFolder, RejectsTagsOfOtherBoard) {
@@ -121,7 +122,7 @@ TEST_F(BoardIntakeOfFolder, RejectsTagsOfOtherBoard) {
   ASSERT_TRUE(before.is_kept());
   board.first_id += 100;
   const Observation image = observe(good);
-  EXPECT_EQ(reason_of(image), RejectionReason::other_board);
+  EXPECT_EQ(rejection_reason(image), RejectionReason::other_board);
 }
 
 TEST_F(BoardIntakeOfFolder, ReturnsSameResultForAnyNumberOfThreads) {
@@ -163,13 +164,13 @@ TEST_F(BoardIntakeOfFolder, RejectsRepeatedImagesAndViews) {
   const Observations seen = observe_all();
   ASSERT_EQ(seen.images.size(), 4U);
   EXPECT_TRUE(seen.images[0].is_kept());
-  EXPECT_EQ(reason_of(seen.images[1]), RejectionReason::same_image);
+  EXPECT_EQ(rejection_reason(seen.images[1]), RejectionReason::same_image);
   EXPECT_EQ(seen.images[1].rejection->message, "is the same image as a.png");
-  EXPECT_EQ(reason_of(seen.images[2]), RejectionReason::same_view);
+  EXPECT_EQ(rejection_reason(seen.images[2]), RejectionReason::same_view);
   EXPECT_EQ(seen.images[2].rejection->message, "shows the same view as a.png: views count once");
   EXPECT_TRUE(seen.images[3].is_kept());
   EXPECT_FALSE(seen.failure);
-  EXPECT_EQ(kept_views(seen.images).size(), 2U);
+  EXPECT_EQ(collect_kept_views(seen.images).size(), 2U);
 }
 
 TEST_F(BoardIntakeOfFolder, RejectsImagesOfMinoritySize) {
@@ -178,7 +179,7 @@ TEST_F(BoardIntakeOfFolder, RejectsImagesOfMinoritySize) {
   write("c.png", other);
   const Observations seen = observe_all();
   ASSERT_EQ(seen.images.size(), 3U);
-  EXPECT_EQ(reason_of(seen.images[0]), RejectionReason::wrong_size);
+  EXPECT_EQ(rejection_reason(seen.images[0]), RejectionReason::wrong_size);
   EXPECT_THAT(seen.images[0].rejection->message,
               StartsWith("is 700 x 600 px, the camera's images are 800 x 600"));
   EXPECT_TRUE(seen.images[1].is_kept());
@@ -186,7 +187,7 @@ TEST_F(BoardIntakeOfFolder, RejectsImagesOfMinoritySize) {
 
 TEST_F(BoardIntakeOfFolder, ThrowsIfNoImageIsReadable) {
   folder.file("a.png", "no image");
-  EXPECT_THAT(refusal_of([&] { observe_all(); }),
+  EXPECT_THAT(rejection_message([&] { observe_all(); }),
               AllOf(HasSubstr("none of its 1 images can be used; the first, a.png: "),
                     HasSubstr("cannot be read as an image")));
 }
@@ -219,7 +220,7 @@ TEST_F(BoardIntakeOfFolder, ReturnsCachedDetection) {
   EXPECT_EQ(intake.observe(SourceImage(file)).blur_px, 1.25);
   // Limits are no part of the cache.
   options.max_blur_px = 0.1;
-  EXPECT_EQ(reason_of(BoardIntake(board, options).observe(SourceImage(file))),
+  EXPECT_EQ(rejection_reason(BoardIntake(board, options).observe(SourceImage(file))),
             RejectionReason::blurred);
 }
 

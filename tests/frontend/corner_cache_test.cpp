@@ -35,7 +35,7 @@ TEST(CornerCache, IgnoresTruncatedFiles) {
   const BoardView whole = view();
   ASSERT_GE(whole.seen.tags.size(), 20U);
   const fs::path kept = fs::directory_iterator(folder / "cache")->path();
-  const std::string text = TemporaryFolder::content_of(kept);
+  const std::string text = TemporaryFolder::read_content(kept);
   std::size_t ends = 0;
   for (std::size_t end = text.find('\n'); end != std::string::npos;
        end = text.find('\n', end + 1)) {
@@ -44,7 +44,7 @@ TEST(CornerCache, IgnoresTruncatedFiles) {
     const BoardView again = view();
     ASSERT_EQ(again.seen.tags.size(), whole.seen.tags.size()) << ends << " lines";
     EXPECT_EQ(again.seen.tags.back().corners_px, whole.seen.tags.back().corners_px);
-    EXPECT_EQ(TemporaryFolder::content_of(kept), text);
+    EXPECT_EQ(TemporaryFolder::read_content(kept), text);
   }
 }
 
@@ -60,19 +60,20 @@ TEST(CornerCache, RestoresFitsForAllToneCurves) {
   }
   cv::LUT(coded, table, coded);
   // One tag, of which an edge looks otherwise, keeps libapriltag's corners.
-  const SeenTag whole = BoardDetector(board).detect(coded).tags.at(7);
+  const TagDetection whole = BoardDetector(board).detect(coded).tags.at(7);
   const Eigen::Vector2d from = whole.corners_px[0], to = whole.corners_px[1];
   const Eigen::Vector2d outwards = 4 * (from - whole.corners_px[3]).normalized();
-  for (const double share : {0.1, 0.25, 0.4, 0.55, 0.7, 0.85}) {
-    const Eigen::Vector2d at = from + share * (to - from) + outwards;
+  for (const double fraction : {0.1, 0.25, 0.4, 0.55, 0.7, 0.85}) {
+    const Eigen::Vector2d at = from + fraction * (to - from) + outwards;
     cv::circle(coded, cv::Point2d(at.x(), at.y()), 1, cv::Scalar(0), -1);
   }
   const BoardView view{"coded.png", {coded.cols, coded.rows}, BoardDetector(board).detect(coded)};
   ASSERT_EQ(view.seen.curve_costs.size(), 5U);
-  const auto spoilt = std::ranges::find(view.seen.tags, whole.id, &SeenTag::id);
+  const auto spoilt = std::ranges::find(view.seen.tags, whole.id, &TagDetection::id);
   ASSERT_NE(spoilt, view.seen.tags.end());
-  ASSERT_EQ(spoilt->behind_curves,
-            std::vector<SeenTag::Outline>(4, {spoilt->corners_px, spoilt->bows, spoilt->sds_px}));
+  ASSERT_EQ(spoilt->tone_curve_fits,
+            std::vector<TagDetection::Outline>(
+                4, {spoilt->corners_px, spoilt->curvatures, spoilt->corner_sds_px}));
   cv::imwrite(folder / "coded.png", coded);
   const SourceImage image(folder / "coded.png");
   const BoardCache cache = corner_cache(folder / "cache", board);
@@ -86,9 +87,9 @@ TEST(CornerCache, RestoresFitsForAllToneCurves) {
   ASSERT_EQ(kept->view.seen.tags.size(), view.seen.tags.size());
   for (std::size_t i = 0; i < view.seen.tags.size(); ++i) {
     EXPECT_EQ(kept->view.seen.tags[i].corners_px, view.seen.tags[i].corners_px);
-    EXPECT_EQ(kept->view.seen.tags[i].bows, view.seen.tags[i].bows);
-    EXPECT_EQ(kept->view.seen.tags[i].sds_px, view.seen.tags[i].sds_px);
-    EXPECT_EQ(kept->view.seen.tags[i].behind_curves, view.seen.tags[i].behind_curves);
+    EXPECT_EQ(kept->view.seen.tags[i].curvatures, view.seen.tags[i].curvatures);
+    EXPECT_EQ(kept->view.seen.tags[i].corner_sds_px, view.seen.tags[i].corner_sds_px);
+    EXPECT_EQ(kept->view.seen.tags[i].tone_curve_fits, view.seen.tags[i].tone_curve_fits);
     EXPECT_EQ(kept->view.seen.tags[i].steps, view.seen.tags[i].steps);
   }
 }

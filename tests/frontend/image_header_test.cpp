@@ -29,14 +29,14 @@ TEST_P(ReadHeaderSizeOfFormat, ReturnsSizeOfImage) {
   for (const Size size : {Size{1, 1}, Size{2, 100}, Size{641, 3}, Size{300, 517}}) {
     const std::string bytes =
         encoded_as(GetParam(), static_cast<int>(size[0]), static_cast<int>(size[1]));
-    EXPECT_EQ(size_in_header(bytes), size);
+    EXPECT_EQ(read_header_size(bytes), size);
   }
 }
 
 TEST_P(ReadHeaderSizeOfFormat, ReturnsSizeOrNulloptForTruncatedFile) {
   const std::string bytes = encoded_as(GetParam(), 33, 21);
   for (std::size_t length = 0; length < bytes.size(); ++length) {
-    const auto size = size_in_header(std::string_view(bytes).substr(0, length));
+    const auto size = read_header_size(std::string_view(bytes).substr(0, length));
     EXPECT_TRUE(!size || *size == (Size{33, 21})) << length;
   }
 }
@@ -50,22 +50,22 @@ TEST(ReadHeaderSize, ReadsDirectoryOfBigTiff) {
   bytes += std::string("\x02\0\0\0\0\0\0\0", 8);
   bytes += std::string("\0\x01\x04\0\x01\0\0\0\0\0\0\0\x20\x4e\0\0\0\0\0\0", 20);
   bytes += std::string("\x01\x01\x03\0\x01\0\0\0\0\0\0\0\x2c\x01\0\0\0\0\0\0", 20);
-  EXPECT_EQ(size_in_header(bytes), (Size{20000, 300}));
+  EXPECT_EQ(read_header_size(bytes), (Size{20000, 300}));
   for (std::size_t length = 0; length < 58; ++length) {
-    EXPECT_FALSE(size_in_header(std::string_view(bytes).substr(0, length))) << length;
+    EXPECT_FALSE(read_header_size(std::string_view(bytes).substr(0, length))) << length;
   }
 }
 
 TEST(ReadHeaderSize, ReturnsNulloptForOtherFiles) {
-  EXPECT_FALSE(size_in_header(""));
-  EXPECT_FALSE(size_in_header("no image"));
-  EXPECT_FALSE(size_in_header("P5 # never ends"));
+  EXPECT_FALSE(read_header_size(""));
+  EXPECT_FALSE(read_header_size("no image"));
+  EXPECT_FALSE(read_header_size("P5 # never ends"));
 }
 
 TEST(ReadHeaderSize, SkipsNonMarkerBytesInJpeg) {
   std::string bytes = encoded_as(".jpg", 33, 21);
   bytes.insert(2, std::string("\x01\xff\x00\x02", 4));
-  EXPECT_EQ(size_in_header(bytes), (Size{33, 21}));
+  EXPECT_EQ(read_header_size(bytes), (Size{33, 21}));
 }
 
 TEST(ReadHeaderSize, SkipsJpegMarkersWithoutLength) {
@@ -78,17 +78,17 @@ TEST(ReadHeaderSize, SkipsJpegMarkersWithoutLength) {
   for (const std::string marker : {"\xff\xd0", "\xff\xd7", "\xff\x01"}) {
     std::string bytes = encoded_as(".jpg", 33, 21);
     bytes.insert(2, marker + comment);
-    EXPECT_EQ(size_in_header(bytes), (Size{33, 21}));
+    EXPECT_EQ(read_header_size(bytes), (Size{33, 21}));
   }
   for (const std::string marker : {"\xff\xd8", "\xff\xd9"}) {
     std::string bytes = encoded_as(".jpg", 33, 21);
     bytes.insert(2, marker);
-    EXPECT_FALSE(size_in_header(bytes));
+    EXPECT_FALSE(read_header_size(bytes));
   }
 }
 
 /// Returns a TIFF file that ends with its directory.
-std::string tiff_of(const std::vector<std::string>& entries) {
+std::string make_tiff(const std::vector<std::string>& entries) {
   std::string bytes("II*\0\x08\0\0\0", 8);
   bytes += {static_cast<char>(entries.size()), '\0'};
   for (const std::string& entry : entries) bytes += entry;
@@ -100,15 +100,15 @@ TEST(ReadHeaderSize, UsesFirstTagsOfTiff) {
       height("\x01\x01\x04\0\x01\0\0\0\x2c\x01\0\0", 12),
       small_width("\0\x01\x04\0\x01\0\0\0\x02\0\0\0", 12),
       elsewhere("\0\x01\x10\0\x01\0\0\0\x08\0\0\0", 12);  // a LONG8 at byte 8
-  EXPECT_EQ(size_in_header(tiff_of({width, height, small_width})), (Size{30000, 300}));
-  EXPECT_FALSE(size_in_header(tiff_of({elsewhere, height})));
+  EXPECT_EQ(read_header_size(make_tiff({width, height, small_width})), (Size{30000, 300}));
+  EXPECT_FALSE(read_header_size(make_tiff({elsewhere, height})));
 }
 
 TEST(ReadImage, ReportsTruncatedFiles) {
   const TemporaryFolder folder;
   const std::string tiff = encoded_as(".tif", 33, 21), jpeg("\xff\xd8\xff\xda\xff\xd9");
-  for (const std::string& content : {tiff.substr(0, 8), jpeg, std::string("BM12"), tiff_of({})}) {
-    EXPECT_THAT(refusal_of([&] { read_image(folder.file("a.png", content)); }),
+  for (const std::string& content : {tiff.substr(0, 8), jpeg, std::string("BM12"), make_tiff({})}) {
+    EXPECT_THAT(rejection_message([&] { read_image(folder.file("a.png", content)); }),
                 HasSubstr("cannot be read as an image: it is cut short or damaged"));
   }
 }

@@ -20,7 +20,7 @@ std::vector<Observation> sample_lights() {
 TEST(AddLabelled, AddsLightsNamedByTable) {
   const auto images = sample_lights();
   ASSERT_EQ(images.size(), 2);
-  Labelled labelled;
+  LabelledLights labelled;
   const auto labels = read_detections(kSample + "/true_detections.csv");
   add_labelled(images, labels, labelled);
   EXPECT_EQ(labelled.labels, 12);
@@ -40,7 +40,7 @@ TEST(AddLabelled, AddsLightsNamedByTable) {
 TEST(AddLabelled, CountsLabelsWithoutLight) {
   auto labels = read_detections(kSample + "/true_detections.csv");
   labels[0].detections[0].pixel.x() += 30;
-  Labelled labelled;
+  LabelledLights labelled;
   add_labelled(sample_lights(), labels, labelled);
   EXPECT_EQ(labelled.without_light, 1);
   EXPECT_EQ(labelled.lights.size(), 11);
@@ -50,19 +50,19 @@ TEST(AddLabelled, RejectsTruncatedLights) {
   auto images = sample_lights();
   const auto labels = read_detections(kSample + "/true_detections.csv");
   images[0].size_px = {int(labels[0].detections[0].pixel.x()), 600};
-  Labelled labelled;
+  LabelledLights labelled;
   add_labelled(images, labels, labelled);
   EXPECT_GT(labelled.without_light, 0);
 }
 
 TEST(MeasuredPeriods, ReturnsPeriodsOfAllOrLabelledLights) {
   const auto images = sample_lights();
-  const auto all = measured_periods(images, {});
+  const auto all = collect_periods(images, {});
   EXPECT_GE(all.size(), 8);
   EXPECT_FALSE(all[0].lamp);
   auto labels = read_detections(kSample + "/true_detections.csv");
   labels.pop_back();
-  const auto some = measured_periods(images, labels);
+  const auto some = collect_periods(images, labels);
   EXPECT_LE(some.size(), 6);
   EXPECT_GE(some.size(), 4);
   for (const MeasuredPeriod& period : some) EXPECT_TRUE(period.lamp);

@@ -24,7 +24,7 @@ struct LampIntakeOfImage : testing::Test {
   Observation observe(const cv::Mat& image, ImageUse use = ImageUse::places) const {
     const auto file = folder / "0.png";
     cv::imwrite(file.string(), image);
-    return LampIntake(LightDetector(lamps, detector_camera(calibration)), use, {},
+    return LampIntake(LightDetector(lamps, make_detector_camera(calibration)), use, {},
                       calibration.camera.imager_px)
         .observe(SourceImage(file));
   }
@@ -70,8 +70,9 @@ TEST_F(LampIntakeOfImage, RejectsImageOfOtherSize) {
 TEST_F(LampIntakeOfImage, KeepsImageWithLamps) {
   const Observation image = observe(read_image(kRig + "/sample/0000.png"));
   EXPECT_TRUE(image.is_kept());
-  EXPECT_GE(lamps_in(image).size(), 4U);
-  EXPECT_EQ(kept_frames(std::vector{image}).at(0).detections.size(), lamps_in(image).size());
+  EXPECT_GE(collect_lamps(image).size(), 4U);
+  EXPECT_EQ(collect_kept_frames(std::vector{image}).at(0).detections.size(),
+            collect_lamps(image).size());
   for (const Light& light : image.lights) EXPECT_TRUE(light.outline.empty());
 }
 
@@ -79,7 +80,7 @@ TEST_F(LampIntakeOfImage, KeepsImageWithLamps) {
 TEST_F(LampIntakeOfImage, KeepsDarkImageForFixes) {
   const Observation image = observe(ceiling(2, 0.5, 2), ImageUse::fixes);
   EXPECT_TRUE(image.is_kept());
-  EXPECT_TRUE(lamps_in(image).empty());
+  EXPECT_TRUE(collect_lamps(image).empty());
 }
 
 TEST(ObserveLamps, RejectsImagesByUse) {
@@ -99,8 +100,8 @@ TEST(ObserveLamps, RejectsImagesByUse) {
   EXPECT_TRUE(turn.images[2].is_kept());
   ASSERT_FALSE(turn.images[3].is_kept());
   EXPECT_EQ(turn.images[3].rejection->reason, RejectionReason::unreadable);
-  EXPECT_EQ(kept_frames(turn.images).size(), 2U);
-  EXPECT_EQ(kept_frames(observe_lamps(images, ImageUse::fixes, {}).images).size(), 3U);
+  EXPECT_EQ(collect_kept_frames(turn.images).size(), 2U);
+  EXPECT_EQ(collect_kept_frames(observe_lamps(images, ImageUse::fixes, {}).images).size(), 3U);
 }
 
 }  // namespace

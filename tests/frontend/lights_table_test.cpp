@@ -84,7 +84,7 @@ TEST(CountReasons, SortsByFrequencyWithFormlessLightsLast) {
   const Light small = light_of_kind(LightKind::formless, LightReason::incomplete);
   const std::vector images{image_with("a.png", {small, small, lamp, soft, even}),
                            image_with("b.png", {small, even, lamp})};
-  const auto reasons = reasons_of(images);
+  const auto reasons = count_reasons(images);
   ASSERT_EQ(reasons.size(), 3U);
   EXPECT_EQ(reasons[0].reason, LightReason::steady);
   EXPECT_EQ(reasons[0].lights, 2);
@@ -92,21 +92,21 @@ TEST(CountReasons, SortsByFrequencyWithFormlessLightsLast) {
   EXPECT_EQ(reasons[1].kind, LightKind::unknown);
   EXPECT_EQ(reasons[2].reason, LightReason::incomplete) << "though it is the most frequent";
   EXPECT_EQ(reasons[2].lights, 3);
-  EXPECT_EQ(count_of(images, LightKind::lamp), 2);
-  EXPECT_EQ(count_of(images, LightKind::cut), 0);
+  EXPECT_EQ(count_lights(images, LightKind::lamp), 2);
+  EXPECT_EQ(count_lights(images, LightKind::cut), 0);
 }
 
 TEST(LightReasonText, IsUniqueForEachReason) {
   std::set<std::string> names, explanations;
   int reasons = 0;
   for (int i = 0; i <= static_cast<int>(LightReason::incomplete); ++i, ++reasons) {
-    names.emplace(name_of(static_cast<LightReason>(i)));
-    explanations.insert(explanation_of(static_cast<LightReason>(i)));
+    names.emplace(to_string(static_cast<LightReason>(i)));
+    explanations.insert(describe(static_cast<LightReason>(i)));
   }
   EXPECT_EQ(names.size(), std::size_t(reasons));
   EXPECT_EQ(explanations.size(), std::size_t(reasons));
   EXPECT_FALSE(names.contains("") || explanations.contains(""));
-  EXPECT_THAT(line_of(light_of_kind(LightKind::unknown, LightReason::too_few_periods)),
+  EXPECT_THAT(describe_light(light_of_kind(LightKind::unknown, LightReason::too_few_periods)),
               HasSubstr("(101.2, 79.5) unknown: it shows less than 1.3 periods"));
 }
 
@@ -121,8 +121,9 @@ std::vector<Light> lights_in_drawing(const cv::Mat& image) {
 
 cv::Mat drawn_lamp_at(const Eigen::Vector2d& center, double radius_px, double level = 0.7,
                       DrawnStripes stripes = {.period_lines = kReasonPeriod_lines}) {
-  return drawn({{.center = center, .radius_px = radius_px, .level = level, .stripes = stripes}},
-               kReasonSize, CV_8U, 0.5);
+  return render_lamps(
+      {{.center = center, .radius_px = radius_px, .level = level, .stripes = stripes}}, kReasonSize,
+      CV_8U, 0.5);
 }
 
 TEST(LightReasons, DistinguishClippedFromUnmodulatedLamp) {
@@ -146,11 +147,11 @@ TEST(LightReasons, ReportReasonForLightsWithoutOutline) {
         {drawn_lamp_at({150.3, -30.6}, 38), LightReason::incomplete},
         {cross, LightReason::wrong_shape}}) {
     const auto lights = lights_in_drawing(image);
-    ASSERT_EQ(lights.size(), 1U) << name_of(reason);
+    ASSERT_EQ(lights.size(), 1U) << to_string(reason);
     EXPECT_EQ(lights[0].kind, LightKind::formless);
-    EXPECT_EQ(name_of(lights[0].reason), name_of(reason));
+    EXPECT_EQ(to_string(lights[0].reason), to_string(reason));
     EXPECT_FALSE(lights[0].lamp);
-    EXPECT_FALSE(flickers(lights[0]));
+    EXPECT_FALSE(is_modulated(lights[0]));
   }
 }
 

@@ -81,8 +81,8 @@ TEST(RejectionReasonName, IsUniqueForEachReason) {
   int count = 0;
   for (auto reason = RejectionReason::unreadable; reason <= RejectionReason::used_elsewhere;
        reason = static_cast<RejectionReason>(static_cast<int>(reason) + 1)) {
-    EXPECT_FALSE(name_of(reason).empty());
-    names.insert(name_of(reason));
+    EXPECT_FALSE(to_string(reason).empty());
+    names.insert(to_string(reason));
     ++count;
   }
   EXPECT_EQ(std::ssize(names), count);
@@ -92,7 +92,7 @@ TEST(CheckAnyReadable, ThrowsWithReasonOfFirstImage) {
   auto images = rejected({RejectionReason::unreadable, RejectionReason::wrong_size});
   EXPECT_NO_THROW(check_any_readable("folder", images));
   images.erase(images.begin());
-  EXPECT_EQ(refusal_of([&] { check_any_readable("folder", images); }),
+  EXPECT_EQ(rejection_message([&] { check_any_readable("folder", images); }),
             "folder: none of its 2 images can be used; the first, bad.png: why");
 }
 

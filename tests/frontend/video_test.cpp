@@ -28,7 +28,7 @@ using testing::IsEmpty;
 constexpr int kFrames = 40;
 
 /// Creates a frame with smooth noise, which all codecs can encode.
-cv::Mat frame_of(int number) {
+cv::Mat make_frame(int number) {
   cv::Mat1b image(240, 320);
   cv::RNG random(static_cast<std::uint64_t>(number) + 1);
   random.fill(image, cv::RNG::UNIFORM, 0, 256);
@@ -40,7 +40,7 @@ cv::Mat frame_of(int number) {
 class VideoOfFrames : public testing::Test {
  protected:
   void SetUp() override {
-    for (int i = 0; i < kFrames; ++i) frames.push_back(frame_of(i));
+    for (int i = 0; i < kFrames; ++i) frames.push_back(make_frame(i));
     if (!write_video(film, frames)) GTEST_SKIP() << "OpenCV writes no FFV1";
   }
   std::vector<std::string> names(ImageSource& source) const {
@@ -49,9 +49,9 @@ class VideoOfFrames : public testing::Test {
     return all;
   }
   /// Writes a file with the first part of the video.
-  fs::path cut(const std::string& name, double share) const {
-    const std::string bytes = TemporaryFolder::content_of(film);
-    return folder.file(name, bytes.substr(0, std::size_t(share * double(bytes.size()))));
+  fs::path cut(const std::string& name, double fraction) const {
+    const std::string bytes = TemporaryFolder::read_content(film);
+    return folder.file(name, bytes.substr(0, std::size_t(fraction * double(bytes.size()))));
   }
 
   const TemporaryFolder folder;
@@ -64,15 +64,15 @@ TEST(VideoNames, MatchFilesAndFrames) {
   EXPECT_FALSE(is_video_name("a/drive.png"));
   EXPECT_EQ(frame_name("drive.mp4", 123), "drive.mp4#000123");
   EXPECT_EQ(frame_name("drive.mp4", 1234567), "drive.mp4#1234567");
-  EXPECT_EQ(video_of_frame("drive.mp4#000123"), "drive.mp4");
+  EXPECT_EQ(parse_video_name("drive.mp4#000123"), "drive.mp4");
   for (const char* other : {"drive.mp4", "drive.mp4#", "drive.mp4#12a", "a.png#000123"}) {
-    EXPECT_EQ(video_of_frame(other), std::nullopt) << other;
+    EXPECT_EQ(parse_video_name(other), std::nullopt) << other;
   }
 }
 
 TEST_F(VideoOfFrames, ReturnsAllFramesWithTimes) {
   Video video(film.string());
-  EXPECT_EQ(video.frames_stated(), std::size_t{kFrames});
+  EXPECT_EQ(video.reported_frames(), std::size_t{kFrames});
   EXPECT_EQ(video.size_px(), (std::array{320, 240}));
   for (int i = 0; i < kFrames; ++i) {
     const auto frame = video.next();
@@ -116,7 +116,7 @@ TEST_F(VideoOfFrames, SourceWarnsOfTruncatedVideo) {
 /// The frames after the damage exist, with their own times.
 TEST_F(VideoOfFrames, ReadingContinuesAfterDamagedFrames) {
   if (!write_video(film, frames, "PNG ")) GTEST_SKIP() << "OpenCV writes no PNG";
-  std::string bytes = TemporaryFolder::content_of(film);
+  std::string bytes = TemporaryFolder::read_content(film);
   bytes.replace(bytes.find("PNG", bytes.size() * 4 / 10), 3, "bad");
   bytes.replace(bytes.find("PNG", bytes.size() * 7 / 10), 3, "bad");
   Video video(folder.file("bad.avi", bytes).string());
@@ -136,7 +136,7 @@ TEST_F(VideoOfFrames, ReadingContinuesAfterDamagedFrames) {
 TEST_F(VideoOfFrames, SourceThrowsForInvalidVideos) {
   const auto refusal = [&](const fs::path& file, const FrontendOptions& options = {},
                            const std::optional<std::array<int, 2>>& imager_px = {}) {
-    return refusal_of([&] { ImageSource({file}, options, imager_px); });
+    return rejection_message([&] { ImageSource({file}, options, imager_px); });
   };
   const std::string none = ": cannot be opened as a video: is it cut short, or none?";
   const auto text = folder.file("text.mp4", "no video"), empty = folder.file("empty.avi", "");
@@ -159,8 +159,9 @@ TEST_F(VideoOfFrames, YieldsSameLampsAsImages) {
   std::vector<cv::Mat> images;
   for (const auto& file : files) images.push_back(read_image(file));
   ASSERT_TRUE(write_video(film, images));
-  const LightDetector detector(read_lamp_map(kRig + "/lamps.yaml"),
-                               detector_camera(read_calibration(kRig + "/true_calibration.yaml")));
+  const LightDetector detector(
+      read_lamp_map(kRig + "/lamps.yaml"),
+      make_detector_camera(read_calibration(kRig + "/true_calibration.yaml")));
   const auto seen = [&](const std::vector<fs::path>& sources, int threads) {
     FrontendOptions options;
     options.threads = threads;
@@ -173,7 +174,7 @@ TEST_F(VideoOfFrames, YieldsSameLampsAsImages) {
   EXPECT_EQ(of_film[1].name(), "film.avi#000001");
   EXPECT_NEAR(of_film[1].time_s.value(), 0.05, 1e-9);
   for (std::size_t i = 0; i < files.size(); ++i) {
-    const auto one = lamps_in(of_images[i]), other = lamps_in(of_film[i]);
+    const auto one = collect_lamps(of_images[i]), other = collect_lamps(of_film[i]);
     EXPECT_EQ(of_film[i].name(), frame_name("film.avi", i));
     ASSERT_EQ(one.size(), other.size());
     EXPECT_GE(one.size(), 4U);
@@ -191,7 +192,7 @@ TEST_F(VideoOfFrames, YieldsSameBoardsAsImages) {
   ASSERT_TRUE(write_video(film, {image, image / 2}));
   const Board board = read_board(kRig + "/board.yaml");
   const BoardDetector detector(board);
-  const SeenBoard of_image = detector.detect(image);
+  const BoardDetection of_image = detector.detect(image);
   for (int run = 0; run < 2; ++run) {
     FrontendOptions options;
     options.threads = 2;

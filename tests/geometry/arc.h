@@ -17,8 +17,8 @@ using Points = std::vector<Eigen::Vector2d>;
 inline Points arc(const Circle& circle, double from_rad, double to_rad, std::size_t count) {
   Points points;
   for (std::size_t i = 0; i < count; ++i) {
-    const double share = static_cast<double>(i) / static_cast<double>(count);
-    const double angle_rad = from_rad + (to_rad - from_rad) * share;
+    const double fraction = static_cast<double>(i) / static_cast<double>(count);
+    const double angle_rad = from_rad + (to_rad - from_rad) * fraction;
     points.push_back(circle.center +
                      circle.radius * Eigen::Vector2d(std::cos(angle_rad), std::sin(angle_rad)));
   }

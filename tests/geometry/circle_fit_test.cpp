@@ -72,12 +72,12 @@ TEST(FitCircle, MinimizesSquaredDistances) {
     }
     return sum;
   };
-  const double least = cost(fit->circle);
-  EXPECT_NEAR(fit->rms, std::sqrt(least / 4), 1e-15);
+  const double min_cost = cost(fit->circle);
+  EXPECT_NEAR(fit->rms, std::sqrt(min_cost / 4), 1e-15);
   for (const double step : {-1e-4, 1e-4}) {
-    EXPECT_GT(cost({fit->circle.center + Vector2d(step, 0), fit->circle.radius}), least);
-    EXPECT_GT(cost({fit->circle.center + Vector2d(0, step), fit->circle.radius}), least);
-    EXPECT_GT(cost({fit->circle.center, fit->circle.radius + step}), least);
+    EXPECT_GT(cost({fit->circle.center + Vector2d(step, 0), fit->circle.radius}), min_cost);
+    EXPECT_GT(cost({fit->circle.center + Vector2d(0, step), fit->circle.radius}), min_cost);
+    EXPECT_GT(cost({fit->circle.center, fit->circle.radius + step}), min_cost);
   }
 }
 

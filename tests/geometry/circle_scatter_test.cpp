@@ -25,7 +25,7 @@ struct Scatter {
   double mahalanobis_squared = 0;                   // mean of e^T C^-1 e, with the C reported
 };
 
-Scatter scatter_of(double arc_rad, double sigma, std::uint64_t seed) {
+Scatter simulate_scatter(double arc_rad, double sigma, std::uint64_t seed) {
   Random random(seed);
   const Circle truth{{0.3, -0.1}, 2};
   const Points points = arc(truth, 0.4, 0.4 + arc_rad, kPoints);
@@ -49,7 +49,7 @@ class FitCircleMonteCarlo : public testing::TestWithParam<double> {
   // The noise is a thousandth of the arc's sagitta, so that the bias of the geometric fit, which
   // goes with the square of the noise, is far below the scatter of the mean.
   const double arc_rad_ = GetParam();
-  const Scatter scatter_ = scatter_of(arc_rad_, 1e-3 * arc_rad_ * arc_rad_ / 8, 7);
+  const Scatter scatter_ = simulate_scatter(arc_rad_, 1e-3 * arc_rad_ * arc_rad_ / 8, 7);
 };
 
 TEST_P(FitCircleMonteCarlo, CenterIsUnbiased) {

@@ -15,15 +15,15 @@ namespace {
 using Points = std::vector<Eigen::Vector2d>;
 
 TEST(EnclosingCircle, IsExactForFewPoints) {
-  EXPECT_EQ(enclosing_circle(Points{{3, 4}}).radius, 0);
-  const Circle pair = enclosing_circle(Points{{0, 0}, {0, 2}});
+  EXPECT_EQ(compute_enclosing_circle(Points{{3, 4}}).radius, 0);
+  const Circle pair = compute_enclosing_circle(Points{{0, 0}, {0, 2}});
   EXPECT_THAT(pair.center, IsNear(Eigen::Vector2d(0, 1), 1e-15));
   EXPECT_NEAR(pair.radius, 1, 1e-15);
-  EXPECT_EQ(enclosing_circle(Points(5, {3, 4})).radius, 0);
+  EXPECT_EQ(compute_enclosing_circle(Points(5, {3, 4})).radius, 0);
 }
 
 TEST(EnclosingCircle, SpansPointsOnOneLine) {
-  const Circle circle = enclosing_circle(Points{{1, 1}, {0, 0}, {3, 3}, {2, 2}});
+  const Circle circle = compute_enclosing_circle(Points{{1, 1}, {0, 0}, {3, 3}, {2, 2}});
   EXPECT_THAT(circle.center, IsNear(Eigen::Vector2d(1.5, 1.5), 1e-12));
   EXPECT_NEAR(circle.radius, 1.5 * std::sqrt(2), 1e-12);
 }
@@ -38,7 +38,7 @@ TEST(EnclosingCircle, IsSmallestCircleContainingAllPoints) {
     for (std::size_t i = 0; i < count; ++i) {
       points.emplace_back(1000 + random.normal(), 2 * random.normal());
     }
-    const Circle circle = enclosing_circle(points);
+    const Circle circle = compute_enclosing_circle(points);
     Points rim;
     for (const auto& point : points) {
       const double distance = (point - circle.center).norm();
@@ -46,11 +46,12 @@ TEST(EnclosingCircle, IsSmallestCircleContainingAllPoints) {
       if (distance > circle.radius - 1e-9) rim.push_back(point - circle.center);
     }
     for (double angle = 0; angle < 6.3; angle += 0.01) {
-      double most = -1;
+      double max_projection = -1;
       for (const auto& point : rim) {
-        most = std::max(most, point.x() * std::cos(angle) + point.y() * std::sin(angle));
+        max_projection =
+            std::max(max_projection, point.x() * std::cos(angle) + point.y() * std::sin(angle));
       }
-      EXPECT_GE(most, -1e-6 * circle.radius) << "it could move that way and shrink";
+      EXPECT_GE(max_projection, -1e-6 * circle.radius) << "it could move that way and shrink";
     }
   }
 }

@@ -24,7 +24,7 @@ TEST(EstimateHomography, IsExactForExactPairs) {
       const Eigen::Vector2d from(random.uniform(-1, 1), random.uniform(-1, 1));
       pairs.push_back({from, (truth * from.homogeneous()).hnormalized()});
     }
-    const Eigen::Matrix3d found = homography(pairs);
+    const Eigen::Matrix3d found = estimate_homography(pairs);
     EXPECT_THAT(found / found(2, 2), IsNear(truth, 1e-8)) << count;
   }
 }

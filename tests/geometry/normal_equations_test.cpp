@@ -31,7 +31,7 @@ TEST(NormalEquations, SolutionMatchesWeightedLeastSquares) {
     gradient += weight * residual * row;
   }
   const Cholesky<kUnknowns> factor(normal);
-  ASSERT_TRUE(factor.determines(1e-3));
+  ASSERT_TRUE(factor.has_full_rank(1e-3));
   const auto step = factor.solve(normal.gradient);
   EXPECT_THAT(Vector(Vector::Map(step.data())),
               IsNear(Vector(information.inverse() * gradient), 1e-12));
@@ -45,11 +45,11 @@ TEST(NormalEquations, SolutionMatchesWeightedLeastSquares) {
 TEST(Cholesky, DetectsRankDeficiency) {
   Normal<2> normal;
   normal.add_row(std::array{1.0, 1.0}, 0);
-  EXPECT_FALSE(Cholesky<2>(normal).determines(1e-12));  // only the sum is determined
+  EXPECT_FALSE(Cholesky<2>(normal).has_full_rank(1e-12));  // only the sum is determined
   normal.add_row(std::array{1e-7, 0.0}, 0);
-  EXPECT_FALSE(Cholesky<2>(normal).determines(1e-12));
+  EXPECT_FALSE(Cholesky<2>(normal).has_full_rank(1e-12));
   normal.add_row(std::array{1e-3, 0.0}, 0);
-  EXPECT_TRUE(Cholesky<2>(normal).determines(1e-12));
+  EXPECT_TRUE(Cholesky<2>(normal).has_full_rank(1e-12));
 }
 
 }  // namespace

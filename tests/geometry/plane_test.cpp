@@ -14,8 +14,8 @@ namespace {
 
 using Complex = std::complex<double>;
 
-Complex complex_of(const Eigen::Vector2d& a) { return {a.x(), a.y()}; }
-Eigen::Vector2d vector_of(const Complex& a) { return {a.real(), a.imag()}; }
+Complex to_complex(const Eigen::Vector2d& a) { return {a.x(), a.y()}; }
+Eigen::Vector2d to_vector(const Complex& a) { return {a.real(), a.imag()}; }
 
 struct Pair {
   Eigen::Vector2d a, b;
@@ -34,8 +34,8 @@ TEST(ComplexProduct, MatchesStdComplex) {
   Random random(1);
   for (int trial = 0; trial < 100; ++trial) {
     const auto [a, b] = random_pair(random);
-    const Complex expected = complex_of(a) * complex_of(b);
-    EXPECT_THAT(complex_product(a, b), IsNear(vector_of(expected), kRounding));
+    const Complex expected = to_complex(a) * to_complex(b);
+    EXPECT_THAT(complex_product(a, b), IsNear(to_vector(expected), kRounding));
   }
 }
 
@@ -43,8 +43,8 @@ TEST(ConjProduct, ConjugatesFirstFactor) {
   Random random(2);
   for (int trial = 0; trial < 100; ++trial) {
     const auto [a, b] = random_pair(random);
-    const Complex expected = std::conj(complex_of(a)) * complex_of(b);
-    EXPECT_THAT(conj_product(a, b), IsNear(vector_of(expected), kRounding));
+    const Complex expected = std::conj(to_complex(a)) * to_complex(b);
+    EXPECT_THAT(conj_product(a, b), IsNear(to_vector(expected), kRounding));
   }
 }
 

@@ -9,7 +9,7 @@
 namespace vlp {
 namespace {
 
-std::vector<double> drawn_squares(Random& random, std::size_t count, double sigma) {
+std::vector<double> draw_squares(Random& random, std::size_t count, double sigma) {
   std::vector<double> squares;
   for (std::size_t i = 0; i < count; ++i) {
     const double x = sigma * random.normal(), y = sigma * random.normal();
@@ -20,7 +20,7 @@ std::vector<double> drawn_squares(Random& random, std::size_t count, double sigm
 
 TEST(RobustPlanarVariance, ReturnsVariancePerAxis) {
   Random random(1);
-  const double variance = robust_planar_variance(drawn_squares(random, 20000, 3), 2 * 20000);
+  const double variance = robust_planar_variance(draw_squares(random, 20000, 3), 2 * 20000);
   EXPECT_NEAR(variance / 9, 1, 0.03);
 }
 
@@ -47,8 +47,8 @@ TEST(PlanarOutlierBound, LimitsFalseAlarmsOfSmallSamples) {
     for (int run = 0; run < runs; ++run) {
       // The residual is not one of those that the variance is from.
       const double freedom = 2 * static_cast<double>(count);
-      const double variance = robust_planar_variance(drawn_squares(random, count, 1), freedom);
-      const double square = drawn_squares(random, 1, 1).front();
+      const double variance = robust_planar_variance(draw_squares(random, count, 1), freedom);
+      const double square = draw_squares(random, 1, 1).front();
       beyond += square > planar_outlier_bound(sigmas, freedom) * variance ? 1 : 0;
     }
     EXPECT_GT(beyond / expected / runs, 0.5) << count;

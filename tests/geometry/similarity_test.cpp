@@ -75,12 +75,12 @@ TEST(FitSimilarity, MinimizesSquaredDistances) {
     const Points from = random_points(random, 5), to = random_points(random, 5);
     const auto best = fit(from, to);
     ASSERT_TRUE(best);
-    const double least = sum_of_squares(*best, from, to);
+    const double min_cost = sum_of_squares(*best, from, to);
     for (int parameter = 0; parameter < 4; ++parameter) {
       for (const double step : {-1e-4, 1e-4}) {
         Similarity other = *best;
         (parameter < 2 ? other.offset : other.factor)(parameter % 2) += step;
-        EXPECT_GT(sum_of_squares(other, from, to), least);
+        EXPECT_GT(sum_of_squares(other, from, to), min_cost);
       }
     }
   }

@@ -29,7 +29,7 @@ double integrate_tail(double from, const Density& density) {
 double normal_upper_tail(double sigmas) { return std::erfc(sigmas / std::numbers::sqrt2) / 2; }
 
 /// Returns the sigmas whose normal_upper_tail() this is.
-double sigmas_of(double tail) {
+double find_sigmas(double tail) {
   double low = 0, high = 10;
   for (int i = 0; i < 60; ++i) {
     const double middle = (low + high) / 2;
@@ -59,8 +59,8 @@ TEST(StudentBound, IsExceededAsRarelyAsSigmas) {
   for (const double sigmas : kSigmas) {
     for (const double m : kDegreesOfFreedom) {
       const double tail = student_upper_tail(std::sqrt(student_bound(sigmas, m)), m);
-      EXPECT_GT(sigmas_of(tail), sigmas - 0.01) << m;
-      EXPECT_LT(sigmas_of(tail), sigmas + (m < 8 ? 0.3 : 0.03)) << m;
+      EXPECT_GT(find_sigmas(tail), sigmas - 0.01) << m;
+      EXPECT_LT(find_sigmas(tail), sigmas + (m < 8 ? 0.3 : 0.03)) << m;
     }
   }
 }
@@ -69,8 +69,8 @@ TEST(ChiSquaredBound, IsExceededAsRarelyAsSigmas) {
   for (const double sigmas : kSigmas) {
     for (const double m : kDegreesOfFreedom) {
       const double tail = chi_squared_upper_tail(chi_squared_bound(sigmas, m), m);
-      EXPECT_GT(sigmas_of(tail), sigmas - 0.01) << m;
-      EXPECT_LT(sigmas_of(tail), sigmas + 0.25) << m;
+      EXPECT_GT(find_sigmas(tail), sigmas - 0.01) << m;
+      EXPECT_LT(find_sigmas(tail), sigmas + 0.25) << m;
     }
   }
 }

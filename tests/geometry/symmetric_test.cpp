@@ -25,30 +25,30 @@ TEST(SymmetricEigen, ReconstructsMatrixFromAscendingValues) {
         Eigen::MatrixXd(eigen.vectors * eigen.values.asDiagonal() * eigen.vectors.transpose()),
         IsNear(Eigen::MatrixXd(matrix), 1e-14));
   };
-  expect_same(symmetric_eigen(two), two);
-  expect_same(symmetric_eigen(four), four);
+  expect_same(decompose_symmetric(two), two);
+  expect_same(decompose_symmetric(four), four);
 }
 
 TEST(SymmetricEigen, ReturnsNanForNanMatrix) {
   const Eigen::MatrixXd none =
       Eigen::MatrixXd::Constant(3, 3, std::numeric_limits<double>::quiet_NaN());
-  EXPECT_FALSE(symmetric_eigen(none).values.minCoeff() > 0);
-  EXPECT_EQ(symmetric_eigen(none).vectors.cols(), 3);
+  EXPECT_FALSE(decompose_symmetric(none).values.minCoeff() > 0);
+  EXPECT_EQ(decompose_symmetric(none).vectors.cols(), 3);
 }
 
 TEST(InvertPositiveDefinite, ReturnsInverseOrNullopt) {
   Eigen::Matrix4d positive;
   positive << 4, 1, 0, -1, 1, 3, 2, 0, 0, 2, 5, 1, -1, 0, 1, 2;
-  const auto inverse = inverse_of_positive(positive);
+  const auto inverse = invert_positive_definite(positive);
   ASSERT_TRUE(inverse);
   EXPECT_THAT(Eigen::Matrix4d(*inverse * positive),
               IsNear(Eigen::Matrix4d(Eigen::Matrix4d::Identity()), 1e-14));
 
   Eigen::Matrix4d indefinite = positive;
   indefinite(2, 2) = -1;
-  EXPECT_FALSE(inverse_of_positive(indefinite));
-  EXPECT_FALSE(inverse_of_positive(Eigen::Matrix4d::Zero()));
-  EXPECT_FALSE(inverse_of_positive(1e-310 * Eigen::Matrix4d::Identity()));  // 1 / it overflows
+  EXPECT_FALSE(invert_positive_definite(indefinite));
+  EXPECT_FALSE(invert_positive_definite(Eigen::Matrix4d::Zero()));
+  EXPECT_FALSE(invert_positive_definite(1e-310 * Eigen::Matrix4d::Identity()));  // 1 / it overflows
 }
 
 }  // namespace

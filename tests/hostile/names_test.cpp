@@ -180,7 +180,7 @@ TEST_F(HostileNames, IdAcceptsOnlySinglePathComponents) {
   for (int i = 0; i < kNames; ++i) {
     const std::string name = random_name(random);
     if (!Id::accepts(name)) {
-      const std::string refusal = refusal_of([&] { Id(name, "spool/a.json", "camera"); });
+      const std::string refusal = rejection_message([&] { Id(name, "spool/a.json", "camera"); });
       ASSERT_NE(refusal, "");
       ASSERT_LT(refusal.size(), 300U);
       ASSERT_TRUE(is_harmless(refusal));
@@ -221,7 +221,7 @@ TEST_F(HostileNames, SharedFolderOpensNoFileOutsideIt) {
     outside.push_back(entry.path().filename().string());
   }
   EXPECT_THAT(outside, testing::UnorderedElementsAre("shared", "canary"));
-  EXPECT_EQ(TemporaryFolder::content_of(canary), "mine");
+  EXPECT_EQ(TemporaryFolder::read_content(canary), "mine");
 }
 
 TEST_F(HostileNames, SharedFolderFollowsNoLinkOutOfIt) {
@@ -238,8 +238,9 @@ TEST_F(HostileNames, SharedFolderFollowsNoLinkOutOfIt) {
     const std::string link = (folder / "shared").string() + "/" + name;
     if (!is_one_part || ::symlink(canary.c_str(), link.c_str()) != 0) continue;
     ++files;
-    ASSERT_NE(refusal_of([&] { ::close(shared.open(name, O_WRONLY | O_TRUNC)); }), "") << name;
-    ASSERT_NE(refusal_of([&] { (void)shared.read(name, kMaxBytes); }), "") << name;
+    ASSERT_NE(rejection_message([&] { ::close(shared.open(name, O_WRONLY | O_TRUNC)); }), "")
+        << name;
+    ASSERT_NE(rejection_message([&] { (void)shared.read(name, kMaxBytes); }), "") << name;
     shared.replace(name, name);
     ASSERT_FALSE(fs::is_symlink(link)) << name;
     shared.remove(name);
@@ -247,14 +248,14 @@ TEST_F(HostileNames, SharedFolderFollowsNoLinkOutOfIt) {
     ++folders;
     ASSERT_EQ(::symlink((folder / "outside").c_str(), link.c_str()), 0);
     const Id id{name, "test", "camera"};
-    ASSERT_NE(refusal_of([&] { (void)shared.make_folder(id); }), "") << name;
-    ASSERT_NE(refusal_of([&] { (void)shared.find_folder(id); }), "") << name;
+    ASSERT_NE(rejection_message([&] { (void)shared.make_folder(id); }), "") << name;
+    ASSERT_NE(rejection_message([&] { (void)shared.find_folder(id); }), "") << name;
     shared.remove(name);
-    ASSERT_EQ(TemporaryFolder::content_of(canary), "mine") << name;
+    ASSERT_EQ(TemporaryFolder::read_content(canary), "mine") << name;
   }
   EXPECT_GT(files, kNames / every / 10);
   EXPECT_GT(folders, kNames / every / 100);
-  EXPECT_EQ(TemporaryFolder::content_of(canary), "mine");
+  EXPECT_EQ(TemporaryFolder::read_content(canary), "mine");
   EXPECT_EQ(std::distance(fs::directory_iterator(folder / "outside"), {}), 1);
 }
 
@@ -263,14 +264,14 @@ TEST_F(HostileNames, ReadRunReturnsWrittenNames) {
   constexpr int every = 20;  // parsing takes long without optimisation
   for (int i = 0; i < kNames; ++i) {
     const std::string name = random_name(random);
-    const std::string text = text_of_run({run_with(name, i), name});
+    const std::string text = format_run({run_with(name, i), name});
     if (i % every != 0) continue;
     const auto json = nlohmann::json::parse(text);
     ASSERT_EQ(json.at("station"), printable_line(name));
     ASSERT_EQ(json.at("images")[0].at("image"), printable_line(name));
     const fs::path file = folder.file("run.json", text);
     if (!Id::accepts(printable_line(name))) {
-      ASSERT_NE(refusal_of([&] { read_run(file); }), "");
+      ASSERT_NE(rejection_message([&] { read_run(file); }), "");
       ++refused;
     } else {
       ASSERT_EQ(read_run(file).run.operator_name, printable_line(name));
@@ -280,7 +281,7 @@ TEST_F(HostileNames, ReadRunReturnsWrittenNames) {
 }
 
 TEST_F(HostileNames, ReportsEscapeNames) {
-  const auto tags_of = [](const std::string& page) {
+  const auto extract_tags = [](const std::string& page) {
     std::string tags;
     bool is_tag = false;
     for (const char c : page) {
@@ -293,16 +294,16 @@ TEST_F(HostileNames, ReportsEscapeNames) {
   const auto report = [](const std::string& name) {
     RunRecord run = run_with(name, 0);
     run.events.clear();
-    return unit_report(printable_run(std::move(run)), {}, {});
+    return make_unit_report(printable_run(std::move(run)), {}, {});
   };
-  const std::string plain = tags_of(report("a"));
+  const std::string plain = extract_tags(report("a"));
   ASSERT_GT(plain.size(), 100U);
   constexpr int every = 10;
   for (int i = 0; i < kNames / every; ++i) {
     const std::string name = random_name(random) + "x";  // an empty fact has no row
     const std::string page = report(name);
     ASSERT_TRUE(is_utf8(page));
-    ASSERT_EQ(tags_of(page), plain) << printable_line(name);
+    ASSERT_EQ(extract_tags(page), plain) << printable_line(name);
   }
 }
 
@@ -312,7 +313,7 @@ TEST_F(HostileNames, WriteRunsAddsNoRows) {
   runs.reserve(kNames / every);
   for (int i = 0; i < kNames / every; ++i) runs.push_back(run_with(random_name(random), i));
   write_runs(folder / "runs.json", runs);
-  const auto json = nlohmann::json::parse(TemporaryFolder::content_of(folder / "runs.json"));
+  const auto json = nlohmann::json::parse(TemporaryFolder::read_content(folder / "runs.json"));
   ASSERT_EQ(json.size(), runs.size());
   for (RunRecord& run : runs) run = printable_run(std::move(run));  // as in records
   write_runs(folder / "runs.csv", runs);

@@ -52,14 +52,14 @@ Ending run_in(const TemporaryFolder& folder, const std::string& command) {
   ending.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
   std::ifstream(folder / ".peak") >> ending.max_mib;
   EXPECT_GT(ending.max_mib, 0);
-  ending.output = TemporaryFolder::content_of(folder / "stdout");
-  ending.errors = TemporaryFolder::content_of(folder / "stderr");
+  ending.output = TemporaryFolder::read_content(folder / "stdout");
+  ending.errors = TemporaryFolder::read_content(folder / "stderr");
   return ending;
 }
 
 void add_example(const TemporaryFolder& folder) {
   for (const char* name : {"lamps.yaml", "calibration.yaml", "detections.csv", "truth.csv"}) {
-    folder.file(name, TemporaryFolder::content_of(kExample + name));
+    folder.file(name, TemporaryFolder::read_content(kExample + name));
   }
   fs::copy_file(kRig + "/board.yaml", folder / "board.yaml");
 }

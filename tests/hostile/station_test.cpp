@@ -65,7 +65,7 @@ class HostileStation : public SmallStation {
     folder.file(in_folder(name).string(), text);
   }
   std::string content(const fs::path& name) const {
-    return TemporaryFolder::content_of(home / name);
+    return TemporaryFolder::read_content(home / name);
   }
   /// Runs Python with the station's folder as its first argument.
   void python(const std::string& script) const {
@@ -101,7 +101,7 @@ class HostileStation : public SmallStation {
     run.verdict = "INVALID";
     run.causes = "no images\n";
     run.calibration = "format: vlp-calibration/1\n";
-    std::string text = text_of_run({run, identity_of_database((home / "records.db").string())});
+    std::string text = format_run({run, make_database_identity((home / "records.db").string())});
     const auto at = text.find(from);
     ASSERT_NE(at, std::string::npos) << from;
     write("spool/a.json", text.replace(at, from.size(), to));
@@ -113,7 +113,7 @@ class HostileStation : public SmallStation {
       names.insert(entry.path().filename().string());
     }
     EXPECT_THAT(names, testing::ElementsAre("elsewhere", "mine.txt", "station"));
-    EXPECT_EQ(TemporaryFolder::content_of(mine), kMine);
+    EXPECT_EQ(TemporaryFolder::read_content(mine), kMine);
     EXPECT_TRUE(fs::is_empty(elsewhere));
   }
 
@@ -146,12 +146,12 @@ void expect_empty_records(const HostileStation& station, const ProgramResult&) {
 /// Expects that each line of a list is the header, a run by its id, empty or the count.
 void expect_no_forged_line(const HostileStation&, const ProgramResult& result) {
   std::istringstream lines(result.output);
-  std::size_t of_runs = 0;
+  std::size_t num_run_lines = 0;
   for (std::string line; std::getline(lines, line);) {
-    if (line.starts_with("20")) ++of_runs;
+    if (line.starts_with("20")) ++num_run_lines;
     EXPECT_FALSE(line.starts_with("FORGED")) << line;
   }
-  EXPECT_EQ(of_runs, 1U) << result.output;
+  EXPECT_EQ(num_run_lines, 1U) << result.output;
 }
 
 const std::vector<StationTrial> kFolderTrials{
@@ -386,8 +386,8 @@ const std::vector<StationTrial> kTextTrials{
      }},
     {"CameraOfACalibrationHasLines",
      [](const HostileStation& s) {
-       std::string text = TemporaryFolder::content_of(fs::path(VLP_SOURCE_DIR) /
-                                                      "datasets/example/calibration.yaml");
+       std::string text = TemporaryFolder::read_content(fs::path(VLP_SOURCE_DIR) /
+                                                        "datasets/example/calibration.yaml");
        const std::string id = "id: \"example\"";
        s.write("calibration.yaml",
                text.replace(text.find(id), id.size(), R"(id: "a\nFORGED\e[2J")"));
@@ -402,7 +402,7 @@ const std::vector<StationTrial> kTextTrials{
     {"ImagesOfATableHaveLines",
      [](const HostileStation& s) {
        const std::string example = VLP_SOURCE_DIR "/datasets/example/";
-       std::string text = TemporaryFolder::content_of(example + "turning.csv");
+       std::string text = TemporaryFolder::read_content(example + "turning.csv");
        const std::string image = "turn_00.png";
        for (auto at = text.find(image); at != std::string::npos; at = text.find(image)) {
          text.replace(at, image.size(), "\"a\nFORGED.png\"");
@@ -537,8 +537,8 @@ TEST_F(HostileStation, LimitsSizeOfSpoolFiles) {
   long_text.calibration.assign(limit_bytes - 1000, 'x');
   // Runs of other records, so that they are read but not delivered.
   const std::vector<std::pair<std::string, std::string>> files{
-      {"a million values", text_of_run({large, "elsewhere"})},
-      {"a text of 64 MiB", text_of_run({long_text, "elsewhere"})},
+      {"a million values", format_run({large, "elsewhere"})},
+      {"a text of 64 MiB", format_run({long_text, "elsewhere"})},
       {"64 MiB of levels", std::string(limit_bytes - 1, '[') + "\n"},
       {"more than 64 MiB", std::string(limit_bytes + 1, 'x')}};
   const auto script =
@@ -568,11 +568,11 @@ TEST_P(HostileFolder, IsRejectedOrHasNoEffect) {
   const StationTrial& trial = GetParam();
   const auto begun = std::chrono::steady_clock::now();
   const ProgramResult result = trial.run(*this);
-  const auto taken = std::chrono::steady_clock::now() - begun;
+  const auto duration = std::chrono::steady_clock::now() - begun;
   EXPECT_EQ(result.exit_code, trial.exit_code) << result.output << result.errors;
   EXPECT_THAT(result.errors, HasSubstr(trial.message));
   constexpr std::chrono::seconds long_enough(20);
-  EXPECT_LT(taken, long_enough);
+  EXPECT_LT(duration, long_enough);
   if (trial.check) trial.check(*this, result);
   expect_nothing_outside();
 }

@@ -9,17 +9,17 @@
 namespace vlp {
 namespace {
 
-Score behind_filters(const std::string& name, std::size_t step) {
+Score score_behind_filters(const std::string& name, std::size_t step) {
   Scene scene = read_scene(VLP_SOURCE_DIR "/datasets/" + name + "/scene.yaml");
-  scene.picture = Picture{1, {}, {}, Bayer{0.6, 0.55}};
+  scene.picture = ImageProcessing{1, {}, {}, Bayer{0.6, 0.55}};
   return Captures(std::move(scene), "check").score(step);
 }
 
 TEST(LightDetector, DetectsDiscsWithoutBiasBehindColorFilters) {
-  for (const auto& [scene, step, most_missed] : {std::tuple("paper-rig", 12, 0), {"wide", 16, 4}}) {
-    const Score score = behind_filters(scene, std::size_t(step));
+  for (const auto& [scene, step, max_missed] : {std::tuple("paper-rig", 12, 0), {"wide", 16, 4}}) {
+    const Score score = score_behind_filters(scene, std::size_t(step));
     EXPECT_GT(score.lamps, 90) << scene;
-    EXPECT_LE(score.missed, most_missed) << scene;
+    EXPECT_LE(score.missed, max_missed) << scene;
     EXPECT_EQ(score.wrong, 0) << scene;
     EXPECT_LT(score.rms_px(), 0.06) << scene;
     EXPECT_LT(score.chi_square / score.lamps, 1.5) << scene;
@@ -27,7 +27,7 @@ TEST(LightDetector, DetectsDiscsWithoutBiasBehindColorFilters) {
 }
 
 TEST(LightDetector, DetectsPanelsAndTubesWithoutBiasBehindColorFilters) {
-  const Score score = behind_filters("panels", 11);
+  const Score score = score_behind_filters("panels", 11);
   EXPECT_GT(score.lamps, 85);
   EXPECT_EQ(score.wrong, 0);
   EXPECT_LT(score.rms_px(), 0.3);

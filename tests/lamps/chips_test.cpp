@@ -17,7 +17,7 @@ Score score_with(const std::optional<Chips>& chips, const std::optional<Halo>& h
   return Captures(std::move(scene), "check").score(12);
 }
 
-void expect_good(const Score& score) {
+void expect_accurate(const Score& score) {
   testing::Test::RecordProperty("rms_px", testing::PrintToString(score.rms_px()));
   testing::Test::RecordProperty("worst_px", testing::PrintToString(score.worst_px));
   testing::Test::RecordProperty("chi_square",
@@ -32,11 +32,11 @@ void expect_good(const Score& score) {
 }
 
 TEST(LightDetector, CenterIsUnbiasedForChipsBehindDiffuser) {
-  expect_good(score_with(Chips{0.3, 0.03, 0.02}, std::nullopt));
+  expect_accurate(score_with(Chips{0.3, 0.03, 0.02}, std::nullopt));
 }
 
 TEST(LightDetector, CenterIsUnbiasedForChipsBehindDiffuserWithHalo) {
-  expect_good(score_with(Chips{0.3, 0.03, 0.02}, Halo{0.03, 0.02}));
+  expect_accurate(score_with(Chips{0.3, 0.03, 0.02}, Halo{0.03, 0.02}));
 }
 
 }  // namespace

@@ -95,16 +95,16 @@ struct DrawnLamp {
 };
 
 /// Renders lamps on a dark image with normal noise of `noise_of_255` of 255 grey levels.
-inline cv::Mat drawn(const std::vector<DrawnLamp>& lamps, const cv::Size& size, int depth,
-                     double noise_of_255 = 0, std::uint64_t seed = 1) {
+inline cv::Mat render_lamps(const std::vector<DrawnLamp>& lamps, const cv::Size& size, int depth,
+                            double noise_of_255 = 0, std::uint64_t seed = 1) {
   const double white = depth == CV_8U ? 255 : 65535;
   Random random(seed);
   cv::Mat1d light(size);
   for (int row = 0; row < light.rows; ++row) {
     for (int column = 0; column < light.cols; ++column) {
-      double share = kDark + noise_of_255 / 255 * random.normal();
-      for (const DrawnLamp& lamp : lamps) share += lamp.light(Eigen::Vector2d(column, row));
-      light(row, column) = white * share;
+      double fraction = kDark + noise_of_255 / 255 * random.normal();
+      for (const DrawnLamp& lamp : lamps) fraction += lamp.light(Eigen::Vector2d(column, row));
+      light(row, column) = white * fraction;
     }
   }
   cv::Mat image;

@@ -55,7 +55,7 @@ TEST(LampDetector, MatchesLightDetector) {
   const auto lamps = LampDetector(lamp_map(), calibration()).detect(image_view(image));
   ASSERT_EQ(lamps.size(), 6U);
   std::size_t i = 0;
-  const LightDetector lights(lamp_map(), detector_camera(calibration()));
+  const LightDetector lights(lamp_map(), make_detector_camera(calibration()));
   for (const Light& light : lights.detect(image_view(image))) {
     if (light.kind != LightKind::lamp) continue;
     ASSERT_LT(i, lamps.size());
@@ -106,14 +106,15 @@ TEST(VlpDetect, MatchesLampDetector) {
   without_gap.stride = 0;
   for (const vlp_image& given :
        {without_gap, c_image(image_view(wide(cv::Rect(0, 0, image.cols, image.rows))))}) {
-    Detections seen;
+    Detections detections;
     std::size_t count = 0;
-    ASSERT_EQ(vlp_detect(positioner.get(), &given, seen.data(), seen.size(), &count), VLP_OK);
+    ASSERT_EQ(vlp_detect(positioner.get(), &given, detections.data(), detections.size(), &count),
+              VLP_OK);
     ASSERT_EQ(count, expected.size());
     for (std::size_t i = 0; i < count; ++i) {
-      EXPECT_EQ(seen[i].lamp, expected[i].lamp);
-      EXPECT_EQ(Eigen::Vector2d(seen[i].u_px, seen[i].v_px), expected[i].pixel);
-      EXPECT_EQ(seen[i].sigma_px, expected[i].sigma_px);
+      EXPECT_EQ(detections[i].lamp, expected[i].lamp);
+      EXPECT_EQ(Eigen::Vector2d(detections[i].u_px, detections[i].v_px), expected[i].pixel);
+      EXPECT_EQ(detections[i].sigma_px, expected[i].sigma_px);
     }
   }
 }
@@ -123,12 +124,12 @@ TEST(VlpDetect, ReturnsRequiredCountWhenArrayIsTooSmall) {
   const Handle positioner = open(calibration());
   const vlp_image given = c_image(image_view(image));
   for (const std::size_t capacity : {0U, 1U, 5U, 6U}) {
-    std::vector<vlp_detection> seen(capacity);  // of exactly this size, for the sanitizers
+    std::vector<vlp_detection> detections(capacity);  // of exactly this size, for the sanitizers
     std::size_t count = 99;
-    EXPECT_EQ(vlp_detect(positioner.get(), &given, seen.data(), capacity, &count),
+    EXPECT_EQ(vlp_detect(positioner.get(), &given, detections.data(), capacity, &count),
               capacity < 6 ? VLP_TOO_SMALL : VLP_OK);
     EXPECT_EQ(count, 6U);
-    for (const vlp_detection& one : seen) EXPECT_GT(one.sigma_px, 0);
+    for (const vlp_detection& detection : detections) EXPECT_GT(detection.sigma_px, 0);
   }
   EXPECT_NE(vlp_explanation(VLP_TOO_SMALL), std::string(vlp_explanation(-99)));
 }
@@ -136,24 +137,25 @@ TEST(VlpDetect, ReturnsRequiredCountWhenArrayIsTooSmall) {
 TEST(VlpDetect, RejectsInvalidArguments) {
   const cv::Mat image = sample();
   const Handle positioner = open(calibration());
-  const vlp_image good = c_image(image_view(image));
-  Detections seen;
+  const vlp_image valid_image = c_image(image_view(image));
+  Detections detections;
   std::size_t count = 99;
   const auto detect = [&](const vlp_positioner* with, const vlp_image* given, vlp_detection* to) {
     count = 99;
-    return vlp_detect(with, given, to, seen.size(), &count);
+    return vlp_detect(with, given, to, detections.size(), &count);
   };
-  EXPECT_EQ(detect(positioner.get(), &good, seen.data()), VLP_OK);
-  EXPECT_EQ(detect(nullptr, &good, seen.data()), VLP_BAD_ARGUMENT);
+  EXPECT_EQ(detect(positioner.get(), &valid_image, detections.data()), VLP_OK);
+  EXPECT_EQ(detect(nullptr, &valid_image, detections.data()), VLP_BAD_ARGUMENT);
   EXPECT_EQ(count, 0U);
-  EXPECT_EQ(detect(positioner.get(), nullptr, seen.data()), VLP_BAD_ARGUMENT);
-  EXPECT_EQ(detect(positioner.get(), &good, nullptr), VLP_BAD_ARGUMENT);
-  EXPECT_EQ(vlp_detect(positioner.get(), &good, seen.data(), seen.size(), nullptr),
-            VLP_BAD_ARGUMENT);
+  EXPECT_EQ(detect(positioner.get(), nullptr, detections.data()), VLP_BAD_ARGUMENT);
+  EXPECT_EQ(detect(positioner.get(), &valid_image, nullptr), VLP_BAD_ARGUMENT);
+  EXPECT_EQ(
+      vlp_detect(positioner.get(), &valid_image, detections.data(), detections.size(), nullptr),
+      VLP_BAD_ARGUMENT);
   const auto refused = [&](auto change) {
-    vlp_image bad = good;
+    vlp_image bad = valid_image;
     change(bad);
-    const int code = detect(positioner.get(), &bad, seen.data());
+    const int code = detect(positioner.get(), &bad, detections.data());
     return code == VLP_BAD_ARGUMENT && count == 0 && std::strlen(vlp_last_error()) > 0;
   };
   EXPECT_TRUE(refused([](vlp_image& bad) { bad = {}; }));
@@ -179,9 +181,9 @@ TEST(VlpDetect, ReturnsErrorWithoutRowTime) {
   const vlp_image given = c_image(image_view(image));
   Calibration without = calibration();
   without.camera.row_time_s.reset();
-  Detections seen;
+  Detections detections;
   std::size_t count = 99;
-  EXPECT_EQ(vlp_detect(open(without).get(), &given, seen.data(), seen.size(), &count),
+  EXPECT_EQ(vlp_detect(open(without).get(), &given, detections.data(), detections.size(), &count),
             VLP_ROW_TIME_UNKNOWN);
   EXPECT_EQ(count, 0U);
   EXPECT_THAT(vlp_last_error(), HasSubstr("row_time_s"));
@@ -189,7 +191,7 @@ TEST(VlpDetect, ReturnsErrorWithoutRowTime) {
 
 /// Lamps of the sample in the room hall, and lamps with the same frequencies in the room office.
 std::string two_rooms() {
-  std::string text = TemporaryFolder::content_of(kRendered + "lamps.yaml");
+  std::string text = TemporaryFolder::read_content(kRendered + "lamps.yaml");
   std::string office = text.substr(text.find("  - "));
   for (std::size_t at = 0; (at = text.find("{id: ", at)) != text.npos;) {
     text.insert(++at, "room: hall, ");
@@ -211,21 +213,21 @@ TEST(VlpOpenRoom, IdentifiesLampsOfTheChosenRoom) {
   const std::string camera = kRendered + "true_calibration.yaml";
   const cv::Mat image = sample();
   const vlp_image given = c_image(image_view(image));
-  Detections seen;
+  Detections detections;
   const auto detect_in = [&](const char* room, std::size_t& count) {
     vlp_positioner* opened = nullptr;
     EXPECT_EQ(vlp_open_room(lamps.c_str(), room, camera.c_str(), nullptr, &opened), VLP_OK)
         << vlp_last_error();
     const Handle positioner{opened, &vlp_close};
-    return vlp_detect(opened, &given, seen.data(), seen.size(), &count);
+    return vlp_detect(opened, &given, detections.data(), detections.size(), &count);
   };
   std::size_t count = 0;
   for (const auto& [room, first_id] : {std::pair{"hall", 1}, {"office", 11}}) {
     ASSERT_EQ(detect_in(room, count), VLP_OK) << vlp_last_error();
     ASSERT_EQ(count, 6U);
     for (std::size_t i = 0; i < count; ++i) {
-      EXPECT_GE(seen[i].lamp, first_id);
-      EXPECT_LT(seen[i].lamp, first_id + 6);
+      EXPECT_GE(detections[i].lamp, first_id);
+      EXPECT_LT(detections[i].lamp, first_id + 6);
     }
   }
   for (const char* no_room : {static_cast<const char*>(nullptr), ""}) {
@@ -274,9 +276,11 @@ TEST(VlpDetect, ReturnsOkForRandomImagesOfAnySize) {
         const auto all = pixels<Level>(w, h, row, next);
         const vlp_image given{all.data(), w, h, std::ptrdiff_t(sizeof(Level)) * row,
                               8 * int(sizeof(Level))};
-        Detections seen;
+        Detections detections;
         std::size_t count = 99;
-        EXPECT_EQ(vlp_detect(positioner.get(), &given, seen.data(), seen.size(), &count), VLP_OK)
+        EXPECT_EQ(
+            vlp_detect(positioner.get(), &given, detections.data(), detections.size(), &count),
+            VLP_OK)
             << vlp_last_error();
         if (is_even) {
           EXPECT_EQ(count, 0U);

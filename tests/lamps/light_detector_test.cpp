@@ -106,18 +106,18 @@ TEST(LightDetector, AcceptsFewPeriodsOnlyWithReliableLampInImage) {
   const LightDetector detector(LampMap{{drawn_lamp(1, 36), drawn_lamp(2, 11)}}, drawn_camera(size));
   const DrawnLamp few{.center = {81.3, 79.6}, .stripes = {.period_lines = 36}};
   const DrawnLamp more{.center = {210.3, 79.6}, .stripes = {.period_lines = 11}};
-  const auto alone = detector.detect(image_view(drawn({few}, size, CV_8U, 0.5)));
+  const auto alone = detector.detect(image_view(render_lamps({few}, size, CV_8U, 0.5)));
   ASSERT_EQ(alone.size(), 1U);
-  EXPECT_LT(alone[0].stripes.periods, kEnoughPeriods);
+  EXPECT_LT(alone[0].stripes.periods, kMinReliablePeriods);
   EXPECT_EQ(alone[0].kind, LightKind::unknown);
   EXPECT_EQ(alone[0].reason, LightReason::too_few_periods);
-  const auto both = detector.detect(image_view(drawn({few, more}, size, CV_8U, 0.5)));
-  ASSERT_EQ(both.size(), 2U);
-  for (const Light& light : both) EXPECT_EQ(light.kind, LightKind::lamp);
+  const auto two_lights = detector.detect(image_view(render_lamps({few, more}, size, CV_8U, 0.5)));
+  ASSERT_EQ(two_lights.size(), 2U);
+  for (const Light& light : two_lights) EXPECT_EQ(light.kind, LightKind::lamp);
 }
 
 /// Returns the kinds of the lights of an image, from left to right.
-std::vector<std::pair<LightKind, LightReason>> kinds_of(std::vector<Light> lights) {
+std::vector<std::pair<LightKind, LightReason>> list_kinds(std::vector<Light> lights) {
   std::sort(lights.begin(), lights.end(),
             [](const Light& a, const Light& b) { return a.pixel.x() < b.pixel.x(); });
   std::vector<std::pair<LightKind, LightReason>> kinds;
@@ -132,7 +132,8 @@ TEST(LightDetector, KeepsBrighterOneOfLampAndMirrorImage) {
   DrawnLamp mirror_image{.center = {210.3, 79.6}};
   const auto kinds_beside = [&](double fraction) {
     mirror_image.level = fraction * lamp.level;
-    return kinds_of(detector.detect(image_view(drawn({lamp, mirror_image}, size, CV_8U, 0.5))));
+    return list_kinds(
+        detector.detect(image_view(render_lamps({lamp, mirror_image}, size, CV_8U, 0.5))));
   };
   const std::pair lamp_kind(LightKind::lamp, LightReason::identified);
   const std::pair reflection(LightKind::unknown, LightReason::reflection);
@@ -151,7 +152,7 @@ TEST(LightDetector, RejectsPeriodThatContradictsOtherLights) {
       lamps.push_back({.center = {70.3 + 120 * double(lamps.size()), 79.6},
                        .stripes = {.period_lines = period}});
     }
-    return kinds_of(detector.detect(image_view(drawn(lamps, size, CV_8U, 0.5))));
+    return list_kinds(detector.detect(image_view(render_lamps(lamps, size, CV_8U, 0.5))));
   };
   const std::pair lamp(LightKind::lamp, LightReason::identified);
   const std::pair other_period(LightKind::unknown, LightReason::unknown_period);
@@ -173,7 +174,7 @@ TEST(LightDetector, IgnoresMapFrequenciesWithClassifier) {
       lamps.push_back({.center = {70.3 + 120 * double(lamps.size()), 79.6},
                        .stripes = {.period_lines = period, .phase = phase}});
     }
-    return drawn(lamps, size, CV_8U, 0.5);
+    return render_lamps(lamps, size, CV_8U, 0.5);
   };
   std::vector<LabelledLight> training;
   const LightDetector by_map(map, drawn_camera(size));
@@ -186,7 +187,7 @@ TEST(LightDetector, IgnoresMapFrequenciesWithClassifier) {
   *map.lamps[0].frequency_hz *= 1.05;
   const LightDetector by_classifier(map, drawn_camera(size), train_classifier(training));
   const std::pair lamp(LightKind::lamp, LightReason::identified);
-  EXPECT_EQ(kinds_of(by_classifier.detect(image_view(draw(0.33)))), std::vector(4, lamp));
+  EXPECT_EQ(list_kinds(by_classifier.detect(image_view(draw(0.33)))), std::vector(4, lamp));
 }
 
 TEST(LightDetector, ReturnsNoLightsForUniformImages) {

@@ -28,7 +28,7 @@ TEST(FitRectangle, FindsPanelsAndTubesByTheirEdges) {
 
 TEST(FitRectangle, FindsPanelsAndTubesWithUnknownTilt) {
   const Captures captures("panels", "check");
-  DetectorCamera camera = detector_camera(captures.calibration());
+  DetectorCamera camera = make_detector_camera(captures.calibration());
   camera.level_from_camera.setIdentity();
   const Score score =
       captures.score(kStep, LightDetector(captures.lamps(), camera), is_panel_or_tube);
@@ -46,7 +46,7 @@ TEST(FitRectangle, DoesNotChangeDiscs) {
   for (Lamp& lamp : discs.lamps) {
     if (lamp.shape.kind == ShapeKind::rectangle) lamp.shape = {};
   }
-  const LightDetector without(discs, detector_camera(captures.calibration()));
+  const LightDetector without(discs, make_detector_camera(captures.calibration()));
   int compared = 0;
   for (std::size_t i = 0; i < captures.size(); i += 4 * kStep) {
     const cv::Mat image = captures.image(captures.shot(i));
@@ -71,7 +71,7 @@ TEST(LightDetector, RejectsPanelsWithWrongAspectRatio) {
   for (Lamp& lamp : swapped.lamps) {
     if (lamp.shape.kind == ShapeKind::rectangle) lamp.shape.size_m = Eigen::Vector2d(0.6, 0.2);
   }
-  const LightDetector detector(swapped, detector_camera(captures.calibration()));
+  const LightDetector detector(swapped, make_detector_camera(captures.calibration()));
   int refused = 0;
   for (std::size_t i = 0; i < captures.size(); i += 4 * kStep) {
     for (const Light& light : detector.detect(image_view(captures.image(captures.shot(i))))) {
@@ -94,8 +94,9 @@ TEST(FitRectangle, CorrectsCenterOfPanelsByEdgeCurvatureWithoutLens) {
     const auto truth = captures.truth(shot);
     for (const Light& light : detector.detect(image_view(captures.image(shot)))) {
       if (light.kind != LightKind::lamp || is_disc(light)) continue;
-      const auto lamp = std::find_if(truth.begin(), truth.end(),
-                                     [&](const TrueLamp& one) { return one.id == light.lamp; });
+      const auto lamp = std::find_if(truth.begin(), truth.end(), [&](const TrueLamp& candidate) {
+        return candidate.id == light.lamp;
+      });
       ASSERT_NE(lamp, truth.end());
       const double error_px = (light.pixel - lamp->pixel).norm();
       EXPECT_LT(error_px, 4 * light.sigma_px) << "lamp " << lamp->id;
@@ -143,8 +144,9 @@ TEST(FitRectangle, SigmaCoversErrorsOfPartlyHiddenPanels) {
     const auto truth = captures.truth(shot);
     for (const Light& light : captures.detector().detect(image_view(captures.image(shot)))) {
       if (light.kind != LightKind::lamp || is_disc(light)) continue;
-      const auto lamp = std::find_if(truth.begin(), truth.end(),
-                                     [&](const TrueLamp& one) { return one.id == light.lamp; });
+      const auto lamp = std::find_if(truth.begin(), truth.end(), [&](const TrueLamp& candidate) {
+        return candidate.id == light.lamp;
+      });
       ASSERT_NE(lamp, truth.end());
       const double off_px = (light.pixel - lamp->pixel).norm();
       // For a tube of 20 px width, less than 3 px of hidden end are not detectable.

@@ -34,7 +34,7 @@ std::map<int, Light> lamps_in(const LightDetector& detector, const cv::Mat& imag
   return lamps;
 }
 
-cv::Mat encoded(const cv::Mat& image, const char* ending, int quality = -1) {
+cv::Mat encode_image(const cv::Mat& image, const char* ending, int quality = -1) {
   std::vector<unsigned char> bytes;
   const std::vector<int> options =
       quality < 0 ? std::vector<int>() : std::vector<int>{cv::IMWRITE_JPEG_QUALITY, quality};
@@ -59,8 +59,8 @@ struct Identified {
   int lamps = 0, wrong = 0;
 };
 
-template <typename Picture>
-Identified identified(const fs::path& data, const Picture& picture) {
+template <typename ImageProcessing>
+Identified identified(const fs::path& data, const ImageProcessing& picture) {
   const LightDetector detector(read_lamp_map(data / "lamps.yaml"), {Readout::columns, 15.1e-6, {}});
   const CsvTable table(data / "expected.csv");
   const auto image_column = table.required("image"), lamp_column = table.required("lamp");
@@ -93,8 +93,8 @@ TEST_F(LightDetectorOnRealDownlights, IdentifiesAllLampsInEachImageFormat) {
   for (const auto& [ending, quality] :
        {std::pair(".png", -1), {".jpg", 100}, {".jpg", 90}, {".jpg", 80}}) {
     const Identified found = identified(data, [&, &e = ending, &q = quality](const fs::path& file) {
-      return encoded(cv::imread(file.string(), cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION), e,
-                     q);
+      return encode_image(
+          cv::imread(file.string(), cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION), e, q);
     });
     EXPECT_EQ(found.wrong, 0) << ending << quality;
     EXPECT_EQ(found.lamps, 25) << ending << quality;
@@ -106,7 +106,7 @@ TEST_F(LightDetectorOnRealDownlights, IdentifiesLampsAtTwiceTheBrightness) {
     cv::Mat brighter;
     cv::imread(file.string(), cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION)
         .convertTo(brighter, -1, 2);
-    return encoded(brighter, ".png");
+    return encode_image(brighter, ".png");
   });
   EXPECT_EQ(found.wrong, 0);
   EXPECT_GE(found.lamps, 22);  // measured: 23
@@ -117,7 +117,7 @@ TEST_F(LightDetectorOnRealDownlights, YieldsRowTime) {
   std::vector<MeasuredPeriod> periods;
   for (int number = 1; number <= 5; ++number) {
     for (const Light& light : detector.detect(image_view(read_image(image(number))))) {
-      if (trustworthy(light.stripes)) periods.push_back({light.stripes.period_lines, {}});
+      if (is_reliable(light.stripes)) periods.push_back({light.stripes.period_lines, {}});
     }
   }
   const RowTimeResult result = choose_row_time(estimate_row_time(periods, map()));
@@ -145,7 +145,7 @@ TEST(DetectWithEitherReadout, FindsReadoutOfRealGlows) {
           std::tuple("2014-02-27--18-15-03-62.jpg", Readout::columns, 3),
           std::tuple("small_blob.jpg", Readout::rows, 5)}) {
       const cv::Mat image = read_image(data / name);
-      const LightsByReadout found = detect_either_way(detector, image_view(image));
+      const LightsWithReadout found = detect_with_either_readout(detector, image_view(image));
       EXPECT_EQ(found.readout, readout) << name;
       EXPECT_EQ(std::count_if(found.lights.begin(), found.lights.end(),
                               [](const Light& light) { return light.kind == LightKind::lamp; }),
@@ -171,9 +171,10 @@ TEST(LightDetectorOnRealGlows, ReturnsSameCentersInEachImageFormat) {
     cv::Mat dimmed;
     picture.convertTo(dimmed, -1, 0.5);
     for (const cv::Mat& image :
-         {encoded(picture, ".png"), encoded(picture, ".bmp"), encoded(picture, ".jpg", 100),
-          encoded(picture, ".jpg", 95), encoded(picture, ".jpg", 90), encoded(picture, ".jpg", 80),
-          encoded(dimmed, ".png")}) {
+         {encode_image(picture, ".png"), encode_image(picture, ".bmp"),
+          encode_image(picture, ".jpg", 100), encode_image(picture, ".jpg", 95),
+          encode_image(picture, ".jpg", 90), encode_image(picture, ".jpg", 80),
+          encode_image(dimmed, ".png")}) {
       const auto lamps = lamps_in(detector, image);
       EXPECT_EQ(lamps.size(), count);
       for (const auto& [id, lamp] : lamps) {

@@ -18,7 +18,7 @@ namespace {
 
 constexpr double kFocal_px = 5620, kRowTime_s = 1 / 47540.0;
 
-Camera camera_of(const cv::Mat& image, Readout readout) {
+Camera make_camera(const cv::Mat& image, Readout readout) {
   Camera camera;
   camera.id = "phone";
   camera.imager_px = {image.cols, image.rows};
@@ -29,40 +29,41 @@ Camera camera_of(const cv::Mat& image, Readout readout) {
   return camera;
 }
 
-struct Seen {
+struct ImageDetections {
   LampMap map;
   Calibration calibration;
   std::map<int, Light> lamps;
 };
 
-Seen seen_in(const std::filesystem::path& folder, const char* name, Readout readout) {
+ImageDetections detect_lamps_in(const std::filesystem::path& folder, const char* name,
+                                Readout readout) {
   const cv::Mat image = read_image(folder / name);
-  Seen seen;
-  seen.map = read_lamp_map(folder / "lamps.yaml");
-  seen.calibration.camera = camera_of(image, readout);
-  const LightDetector detector(seen.map, detector_camera(seen.calibration));
+  ImageDetections result;
+  result.map = read_lamp_map(folder / "lamps.yaml");
+  result.calibration.camera = make_camera(image, readout);
+  const LightDetector detector(result.map, make_detector_camera(result.calibration));
   for (const Light& light : detector.detect(image_view(image))) {
     if (light.kind != LightKind::lamp) continue;
-    EXPECT_FALSE(seen.lamps.contains(*light.lamp)) << "one lamp twice";
-    seen.lamps[*light.lamp] = light;
+    EXPECT_FALSE(result.lamps.contains(*light.lamp)) << "one lamp twice";
+    result.lamps[*light.lamp] = light;
     const double frequency_hz = 1 / (light.stripes.period_lines * kRowTime_s);
     EXPECT_NEAR(frequency_hz / *light.lamp, 1, 0.05) << "the ids are nominal frequencies";
   }
-  return seen;
+  return result;
 }
 
 TEST(PositionerOnRealGlows, ComputesFixFromFiveLamps) {
   const auto folder = real_data("luxapose");
   if (folder.empty()) GTEST_SKIP() << "no real captures here";
-  const Seen seen = seen_in(folder, "x_0_y_1.27.jpg", Readout::rows);
+  const ImageDetections result = detect_lamps_in(folder, "x_0_y_1.27.jpg", Readout::rows);
   std::vector<Detection> detections;
-  for (const auto& [id, light] : seen.lamps) {
-    EXPECT_TRUE(light.glows);
+  for (const auto& [id, light] : result.lamps) {
+    EXPECT_TRUE(light.is_glow);
     detections.push_back({id, light.pixel, light.sigma_px});
   }
   ASSERT_EQ(detections.size(), 5U);
-  const Fix fix = Positioner(seen.map, seen.calibration).locate(detections);
-  ASSERT_TRUE(fix.ok()) << explanation_of(fix.status);
+  const Fix fix = Positioner(result.map, result.calibration).locate(detections);
+  ASSERT_TRUE(fix.ok()) << describe(fix.status);
   EXPECT_EQ(fix.lamps, 5);
   const double distance_m = 2.46 - fix.estimate.pose.position_m.z();
   EXPECT_NEAR(distance_m, 2.45, 0.02);
@@ -70,22 +71,22 @@ TEST(PositionerOnRealGlows, ComputesFixFromFiveLamps) {
 }
 
 /// Returns detections with equal weights, as OpenCV uses them.
-std::vector<Detection> alike(const Seen& seen) {
+std::vector<Detection> make_equal_detections(const ImageDetections& result) {
   std::vector<Detection> detections;
-  for (const auto& [id, light] : seen.lamps) detections.push_back({id, light.pixel, {}});
+  for (const auto& [id, light] : result.lamps) detections.push_back({id, light.pixel, {}});
   return detections;
 }
 
 /// Returns the camera positions of OpenCV's PnP for coplanar points, refined: the solutions below
 /// the lamps.
-std::vector<Eigen::Vector3d> opencv_places(const Seen& seen, const std::vector<Detection>& lamps,
-                                           int method) {
-  const auto& k = seen.calibration.camera.intrinsics;
+std::vector<Eigen::Vector3d> opencv_places(const ImageDetections& result,
+                                           const std::vector<Detection>& lamps, int method) {
+  const auto& k = result.calibration.camera.intrinsics;
   const cv::Matx33d camera(k[0], 0, k[2], 0, k[1], k[3], 0, 0, 1);
   std::vector<cv::Point3d> points;
   std::vector<cv::Point2d> pixels;
   for (const Detection& detection : lamps) {
-    for (const Lamp& lamp : seen.map.lamps) {
+    for (const Lamp& lamp : result.map.lamps) {
       if (lamp.id != detection.lamp) continue;
       points.emplace_back(lamp.position_m.x(), lamp.position_m.y(), lamp.position_m.z());
     }
@@ -115,14 +116,14 @@ std::vector<Eigen::Vector3d> opencv_places(const Seen& seen, const std::vector<D
 TEST(PositionerOnRealGlows, MatchesOpenCvPoseOfFiveLamps) {
   const auto folder = real_data("luxapose");
   if (folder.empty()) GTEST_SKIP() << "no real captures here";
-  const Seen seen = seen_in(folder, "x_0_y_1.27.jpg", Readout::rows);
-  const auto detections = alike(seen);
+  const ImageDetections result = detect_lamps_in(folder, "x_0_y_1.27.jpg", Readout::rows);
+  const auto detections = make_equal_detections(result);
   ASSERT_EQ(detections.size(), 5U);
   Sensors sensors;
   sensors.inclination_sigma_rad = 1.6;
-  const Fix fix = Positioner(seen.map, seen.calibration).locate(detections, sensors);
-  ASSERT_TRUE(fix.ok()) << explanation_of(fix.status);
-  const auto places_m = opencv_places(seen, detections, cv::SOLVEPNP_SQPNP);
+  const Fix fix = Positioner(result.map, result.calibration).locate(detections, sensors);
+  ASSERT_TRUE(fix.ok()) << describe(fix.status);
+  const auto places_m = opencv_places(result, detections, cv::SOLVEPNP_SQPNP);
   ASSERT_EQ(places_m.size(), 1U);
   const double off_m = (fix.estimate.pose.position_m - places_m[0]).norm();
   std::printf("lean %.2f %.2f degrees, %.2f mm from OpenCV's PnP\n",
@@ -135,22 +136,23 @@ TEST(PositionerOnRealGlows, MatchesOpenCvPoseOfFiveLamps) {
 TEST(PositionerOnRealGlows, MatchesOneOpenCvSolutionOfThreeLamps) {
   const auto folder = real_data("luxapose");
   if (folder.empty()) GTEST_SKIP() << "no real captures here";
-  const Seen seen = seen_in(folder, "2014-02-27--18-15-03-62.jpg", Readout::columns);
-  const auto detections = alike(seen);
+  const ImageDetections result =
+      detect_lamps_in(folder, "2014-02-27--18-15-03-62.jpg", Readout::columns);
+  const auto detections = make_equal_detections(result);
   ASSERT_EQ(detections.size(), 3U);
-  const auto places_m = opencv_places(seen, detections, cv::SOLVEPNP_P3P);
+  const auto places_m = opencv_places(result, detections, cv::SOLVEPNP_P3P);
   ASSERT_FALSE(places_m.empty());
-  const Positioner positioner(seen.map, seen.calibration);
+  const Positioner positioner(result.map, result.calibration);
   Sensors sensors;
   sensors.inclination_sigma_rad = 1.6;
   const Fix free = positioner.locate(detections, sensors);
-  std::printf("%zu of OpenCV's, free: %s\n", places_m.size(), name_of(free.status).data());
+  std::printf("%zu of OpenCV's, free: %s\n", places_m.size(), to_string(free.status).data());
   EXPECT_EQ(free.status == FixStatus::ambiguous, places_m.size() > 1);
   for (const Eigen::Vector3d& place_m : places_m) {
     sensors.height = KnownHeight{place_m.z(), 1e-3};
     const Fix fix = positioner.locate(detections, sensors);
     std::printf("OpenCV's at %.4f %.4f %.4f m, ours %s\n", place_m.x(), place_m.y(), place_m.z(),
-                name_of(fix.status).data());
+                to_string(fix.status).data());
     if (!fix.ok()) continue;
     EXPECT_LT((fix.estimate.pose.position_m - place_m).norm(), 0.01 * 2.35);
   }
@@ -159,9 +161,10 @@ TEST(PositionerOnRealGlows, MatchesOneOpenCvSolutionOfThreeLamps) {
 TEST(LightDetectorOnRealGlows, IdentifiesLampsWithColumnReadout) {
   const auto folder = real_data("luxapose");
   if (folder.empty()) GTEST_SKIP() << "no real captures here";
-  const Seen seen = seen_in(folder, "2014-02-27--18-15-03-62.jpg", Readout::columns);
-  EXPECT_EQ(seen.lamps.size(), 3U);
-  for (const int id : {3000, 3500, 4000}) EXPECT_TRUE(seen.lamps.contains(id)) << id;
+  const ImageDetections result =
+      detect_lamps_in(folder, "2014-02-27--18-15-03-62.jpg", Readout::columns);
+  EXPECT_EQ(result.lamps.size(), 3U);
+  for (const int id : {3000, 3500, 4000}) EXPECT_TRUE(result.lamps.contains(id)) << id;
 }
 
 }  // namespace

@@ -25,21 +25,21 @@ void expect_both(const Touching& touching) {
   const Vector2d direction(std::cos(touching.angle_rad), std::sin(touching.angle_rad));
   const double large_px = 38.4, small_px = large_px * touching.radius_ratio;
   const Vector2d middle(150.3, 149.6);
-  const DrawnLamp one{.center = middle - large_px * direction,
-                      .radius_px = large_px,
-                      .stripes = {.period_lines = kPeriods_lines[0]}};
-  const DrawnLamp other{.center = middle + (small_px + touching.gap_px) * direction,
-                        .radius_px = small_px,
-                        .stripes = {.period_lines = kPeriods_lines[1], .phase = 0.8}};
+  const DrawnLamp first_lamp{.center = middle - large_px * direction,
+                             .radius_px = large_px,
+                             .stripes = {.period_lines = kPeriods_lines[0]}};
+  const DrawnLamp second_lamp{.center = middle + (small_px + touching.gap_px) * direction,
+                              .radius_px = small_px,
+                              .stripes = {.period_lines = kPeriods_lines[1], .phase = 0.8}};
   const LampMap map{{drawn_lamp(1, kPeriods_lines[0]), drawn_lamp(2, kPeriods_lines[1])}};
   const LightDetector detector(map, drawn_camera(kTouchingSize));
-  const auto lights =
-      detector.detect(image_view(drawn({one, other}, kTouchingSize, touching.depth, 0.5)));
+  const auto lights = detector.detect(
+      image_view(render_lamps({first_lamp, second_lamp}, kTouchingSize, touching.depth, 0.5)));
   int lamps = 0;
   for (const Light& light : lights) {
     if (light.kind != LightKind::lamp) continue;
     ++lamps;
-    const DrawnLamp& truth = *light.lamp == 1 ? one : other;
+    const DrawnLamp& truth = *light.lamp == 1 ? first_lamp : second_lamp;
     EXPECT_LT((light.pixel - truth.center).norm(), 0.1) << "lamp " << *light.lamp;
     EXPECT_NEAR(light.radius_px, truth.radius_px, 0.3) << "lamp " << *light.lamp;
   }

@@ -64,7 +64,7 @@ class VlpAdjust : public testing::Test {
 TEST_F(VlpAdjust, RefinesMapOfOneRoom) {
   for (Lamp& lamp : rig.map.lamps) lamp.sd_m = 0.002;
   write_lamp_map(folder / "lamps.yaml", rig.map);
-  std::string lamps = TemporaryFolder::content_of(folder / "lamps.yaml");
+  std::string lamps = TemporaryFolder::read_content(folder / "lamps.yaml");
   for (std::size_t at = 0; (at = lamps.find("{id: ", at)) != std::string::npos; at += 20) {
     lamps.insert(at + 1, "room: hall, ");
   }
@@ -95,9 +95,9 @@ TEST_F(VlpAdjust, RefinesMapAndReportsUncertaintyOfFixes) {
   EXPECT_NEAR(calibration.rotation_center->lever_arm_m->x(), 0.009, 1e-6);
   ASSERT_TRUE(calibration.adjustment);
   EXPECT_EQ(calibration.history.back().part, "adjustment");
-  const std::string once = TemporaryFolder::content_of(folder / "adjusted.yaml");
+  const std::string once = TemporaryFolder::read_content(folder / "adjusted.yaml");
   ASSERT_EQ(adjust(refined()).exit_code, 0);
-  EXPECT_EQ(TemporaryFolder::content_of(folder / "adjusted.yaml"), once);
+  EXPECT_EQ(TemporaryFolder::read_content(folder / "adjusted.yaml"), once);
 
   const auto path = [&](const char* name) { return (folder / name).string() + " "; };
   const ProgramResult located =
@@ -163,7 +163,7 @@ TEST_F(VlpAdjust, EstimatesLensWithoutCovariance) {
 
 TEST_F(VlpAdjust, RejectsLensSdForLensWithCovariance) {
   rig.calibration.intrinsics_report.emplace();
-  rig.calibration.intrinsics_report->covariance = stated_lens_covariance(rig.calibration.camera, 1);
+  rig.calibration.intrinsics_report->covariance = make_lens_covariance(rig.calibration.camera, 1);
   const ProgramResult result = adjust("--map-sd-m 0.001 --lens-sd-px 10");
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.errors, HasSubstr("camera.yaml: states the covariance of its lens"));

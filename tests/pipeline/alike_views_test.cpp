@@ -29,7 +29,7 @@ class VlpIntrinsicsSimilarViews : public VlpIntrinsics {
   /// Views of the rig, all over the image.
   void render(int count) const {
     std::string scene =
-        TemporaryFolder::content_of(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml");
+        TemporaryFolder::read_content(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml");
     const std::string usual = "views: {count: 36,";
     scene.replace(scene.find(usual), usual.size(), "views: {count: " + std::to_string(count) + ",");
     const std::string file = folder.file("scene.yaml", scene).string();
@@ -39,7 +39,7 @@ class VlpIntrinsicsSimilarViews : public VlpIntrinsics {
       if (entry.path().extension() == ".png") fs::copy(entry.path(), images());
     }
   }
-  ProgramResult calibrate_them(const std::string& options = "") const {
+  ProgramResult calibrate_images(const std::string& options = "") const {
     return calibrate(images().string(), kRig + "/board.yaml", options);
   }
 };
@@ -62,7 +62,7 @@ TEST_F(VlpIntrinsicsSimilarViews, CountAsOneInOneImageCorner) {
     cv::add(image, noise, noisy, cv::noArray(), CV_8U);
     cv::imwrite((images() / (std::to_string(10 + i) + ".png")).string(), noisy);
   }
-  const auto result = calibrate_them();
+  const auto result = calibrate_images();
   EXPECT_EQ(result.exit_code, 3) << result.output;
   EXPECT_THAT(result.errors,
               HasSubstr("39.png: shows the same view as 10.png: views count once; skipped"));
@@ -73,7 +73,7 @@ TEST_F(VlpIntrinsicsSimilarViews, CountAsOneWhenSavedAgainAsJpeg) {
   fs::copy(kSample, images() / "0.png");
   cv::imwrite((images() / "1.jpg").string(), cv::imread(kSample, cv::IMREAD_GRAYSCALE),
               {cv::IMWRITE_JPEG_QUALITY, 85});
-  const auto result = calibrate_them();
+  const auto result = calibrate_images();
   EXPECT_EQ(result.exit_code, 3) << result.output;
   EXPECT_THAT(result.errors,
               HasSubstr("1.jpg: shows the same view as 0.png: views count once; skipped"));
@@ -82,7 +82,7 @@ TEST_F(VlpIntrinsicsSimilarViews, CountAsOneWhenSavedAgainAsJpeg) {
 
 TEST_F(VlpIntrinsicsSimilarViews, DoNotPassGateByCopiedFiles) {
   render(5);
-  const auto once = calibrate_them();
+  const auto once = calibrate_images();
   EXPECT_EQ(once.exit_code, 1);
   EXPECT_THAT(once.errors, HasSubstr("views is 5, at least 6 is asked for"));
   std::vector<fs::path> files;
@@ -90,17 +90,17 @@ TEST_F(VlpIntrinsicsSimilarViews, DoNotPassGateByCopiedFiles) {
   for (const fs::path& file : files) {
     fs::copy(file, images() / ("copy-of-" + file.filename().string()));
   }
-  const auto twice = calibrate_them();
+  const auto twice = calibrate_images();
   EXPECT_EQ(twice.exit_code, 1);
   EXPECT_EQ(twice.output, once.output);
   EXPECT_THAT(twice.errors, HasSubstr("copy-of-0004.png: is the same image as 0004.png"));
-  const auto gates_of = [](const std::string& errors) {
+  const auto find_failed_gates = [](const std::string& errors) {
     return errors.substr(errors.find("views is"));
   };
-  EXPECT_EQ(gates_of(twice.errors), gates_of(once.errors));
+  EXPECT_EQ(find_failed_gates(twice.errors), find_failed_gates(once.errors));
 
   // Two gates at once are both taken.
-  const auto changed = calibrate_them("--gate rms_px=1e-4,views=3");
+  const auto changed = calibrate_images("--gate rms_px=1e-4,views=3");
   EXPECT_EQ(changed.exit_code, 1);
   EXPECT_THAT(changed.errors, HasSubstr("at most 0.0001 px is asked for"));
   EXPECT_THAT(changed.errors, Not(HasSubstr("views is")));

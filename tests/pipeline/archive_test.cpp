@@ -81,7 +81,7 @@ TEST_F(VlpSimulateArchive, DamagesSessionsAsListedInTable) {
       EXPECT_EQ(fs::file_size(target / "0000.png"), 600U);
     }
     if (damage == "wrong-board") {
-      EXPECT_THAT(TemporaryFolder::content_of(target), HasSubstr("tag25h9"));
+      EXPECT_THAT(TemporaryFolder::read_content(target), HasSubstr("tag25h9"));
     }
     if (damage.empty()) {
       EXPECT_EQ(fs::file_size(cut) == 600, cell("fault") == "cut-image");

@@ -30,7 +30,7 @@ class BadInputFile : public testing::TestWithParam<Bad> {};
 TEST_P(BadInputFile, IsReportedInOneLineWithoutOutput) {
   const TemporaryFolder folder;
   for (const std::string name : {"lamps.yaml", "calibration.yaml", "detections.csv"}) {
-    std::string content = TemporaryFolder::content_of(kExample + name);
+    std::string content = TemporaryFolder::read_content(kExample + name);
     if (name == GetParam().file) {
       const auto at = content.find(GetParam().find);
       ASSERT_NE(at, std::string::npos);
@@ -51,7 +51,7 @@ TEST_P(BadInputFile, IsReportedInOneLineWithoutOutput) {
     EXPECT_EQ(std::count(result.errors.begin(), result.errors.end(), '\n'), 1) << result.errors;
     EXPECT_EQ(result.output, "");
   }
-  EXPECT_EQ(TemporaryFolder::content_of(old), "old\n");
+  EXPECT_EQ(TemporaryFolder::read_content(old), "old\n");
   EXPECT_FALSE(std::filesystem::exists(folder / "new.csv"));
 }
 

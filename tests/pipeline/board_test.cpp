@@ -26,14 +26,14 @@ class VlpBoard : public testing::Test {
 TEST_F(VlpBoard, WritesPdfAsPrinted) {
   const std::string pdf = (folder / "board.pdf").string();
   ASSERT_EQ(run_program("vlp-board --kalibr --tag-mm 30 --paper A3 -o " + pdf).exit_code, 0);
-  const std::string bytes = TemporaryFolder::content_of(pdf);
+  const std::string bytes = TemporaryFolder::read_content(pdf);
   EXPECT_TRUE(bytes.starts_with("%PDF-"));
   const Board board = read_board(folder / "board.yaml");
   EXPECT_EQ(board.tag_size_m, 0.03);
   EXPECT_EQ(board.border_bits, 2);
   EXPECT_TRUE(board.corner_squares);
   ASSERT_EQ(run_program("vlp-board --kalibr --tag-mm 30 --paper A3 -o " + pdf).exit_code, 0);
-  EXPECT_EQ(TemporaryFolder::content_of(pdf), bytes);
+  EXPECT_EQ(TemporaryFolder::read_content(pdf), bytes);
 }
 
 TEST_F(VlpBoard, PrintsTagsToScale) {
@@ -48,7 +48,7 @@ TEST_F(VlpBoard, PrintsTagsToScale) {
   const cv::Mat page = cv::imread((folder / "page.png").string(), cv::IMREAD_GRAYSCALE);
   EXPECT_NEAR(page.cols, 297 * px_per_mm, 2);
   const Board board = read_board(folder / "board.yaml");
-  const SeenBoard seen = BoardDetector(board).detect(page);
+  const BoardDetection seen = BoardDetector(board).detect(page);
   ASSERT_EQ(seen.tags.size(), 30U);
   const double width_px = (seen.tags[5].corners_px[2] - seen.tags[0].corners_px[3]).norm();
   EXPECT_NEAR(width_px / px_per_mm / 1000, tag_field_m(board).x(), 1e-4);

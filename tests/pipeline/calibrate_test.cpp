@@ -49,7 +49,7 @@ class VlpCalibrate : public testing::Test {
                        options);
   }
   std::string result(const std::string& name) const {
-    return TemporaryFolder::content_of(folder / ("results/" + name));
+    return TemporaryFolder::read_content(folder / ("results/" + name));
   }
   void expect_documents_as_their_schemas_say() const {
     EXPECT_EQ(problems_by_schema("session", {folder / "results/session.json"}), "");
@@ -90,7 +90,7 @@ TEST_F(VlpCalibrate, NamesMovedLampInEveryStep) {
   Calibration known;
   known.camera = read_calibration(folder / "a session/true_calibration.yaml").camera;
   write_calibration(folder / "a session/camera.yaml", known);
-  const std::string lamps = TemporaryFolder::content_of(folder / "a session/lamps.yaml");
+  const std::string lamps = TemporaryFolder::read_content(folder / "a session/lamps.yaml");
   const auto expect_lines = [&](const std::string& moved_to, const std::string& line) {
     folder.file("a session/lamps.yaml",
                 std::regex_replace(lamps, std::regex("\\[0, -0.32, 1.6\\]"), moved_to));
@@ -111,7 +111,7 @@ TEST_F(VlpCalibrate, NamesMovedLampInEveryStep) {
 
 // From boards that are seen beyond 90 degrees off the axis.
 TEST_F(VlpCalibrate, Calibrates190DegreeLens) {
-  std::string scene = TemporaryFolder::content_of(kDatasets + "fisheye/scene.yaml");
+  std::string scene = TemporaryFolder::read_content(kDatasets + "fisheye/scene.yaml");
   for (const auto& [what, by] : std::vector<std::pair<std::string, std::string>>{
            {"turn: \\{count: 40, jitter_deg: 4\\}", "turn: {count: 12, jitter_deg: 4}"},
            {"columns: 6, rows: 6", "columns: 3, rows: 2"}}) {
@@ -126,7 +126,7 @@ TEST_F(VlpCalibrate, Calibrates190DegreeLens) {
     ASSERT_EQ(run.exit_code, 0) << run.errors;
     const Camera found = read_calibration(folder / "results/calibration.yaml").camera;
     const auto up_to = [&](double degrees) {
-      return projection_difference(
+      return compute_projection_difference(
           lens, Lens(found.lens_model, found.intrinsics), truth.imager_px, [&](const auto& pixel) {
             const auto ray = lens.unproject(pixel);
             const double least = std::cos(rad_from_deg(degrees));
@@ -154,7 +154,7 @@ class VlpCalibrateSmallSession : public VlpCalibrate {
     VlpCalibrate::SetUp();
     if (IsSkipped()) return;
     const std::string scene =
-        TemporaryFolder::content_of(kDatasets + "archive/scene.yaml") +
+        TemporaryFolder::read_content(kDatasets + "archive/scene.yaml") +
         "  - folder: line-x\n"
         "    exposure_s: 5.0e-5\n"
         "    drive: {from_m: [-0.35, 0], to_m: [0.35, 0], speed_m_per_s: 0.1}\n"
@@ -167,7 +167,7 @@ class VlpCalibrateSmallSession : public VlpCalibrate {
 
 TEST_F(VlpCalibrate, RunsOnlyChangedSteps) {
   // Stripes enough to find the row time; fewer check captures than the scene has.
-  std::string scene = TemporaryFolder::content_of(kDatasets + "paper-rig/scene.yaml");
+  std::string scene = TemporaryFolder::read_content(kDatasets + "paper-rig/scene.yaml");
   const std::string grid = "columns: 6, rows: 6}\n    heights_m: [0, 0.1, 0.2, 0.3]";
   ASSERT_NE(scene.find(grid), std::string::npos);
   scene.replace(scene.find(grid), grid.size(), "columns: 3, rows: 2}\n    heights_m: [0]");
@@ -215,9 +215,9 @@ TEST_F(VlpCalibrateSmallSession, RepeatsVerdictOfGates) {
   expect_documents_as_their_schemas_say();
   // Another limit measures nothing again.
   folder.file("a session/gates.yaml", "format: vlp-gates/1\ngates:\n  tilt_deg: 90\n");
-  const auto met = calibrate();
-  EXPECT_EQ(met.exit_code, 0) << met.output << met.errors;
-  EXPECT_THAT(met.output, HasSubstr("rotation      as before"));
+  const auto passed = calibrate();
+  EXPECT_EQ(passed.exit_code, 0) << passed.output << passed.errors;
+  EXPECT_THAT(passed.output, HasSubstr("rotation      as before"));
   folder.file("a session/gates.yaml", "format: vlp-gates/1\ngates:\n  coverage: 7\n");
   const auto refused = calibrate();
   EXPECT_EQ(refused.exit_code, 2);
@@ -245,7 +245,7 @@ TEST_F(VlpCalibrateSmallSession, GivesSameResultInForkedProcess) {
   }
   EXPECT_EQ(answers.get(), EOF);
   for (const char* file : {"calibration.yaml", "check-fixes.csv", "session.json"}) {
-    EXPECT_EQ(TemporaryFolder::content_of(folder / (std::string("each/") + file)), result(file))
+    EXPECT_EQ(TemporaryFolder::read_content(folder / (std::string("each/") + file)), result(file))
         << file;
   }
 }
@@ -337,7 +337,7 @@ class SingleStepPrograms : public VlpCalibrateSmallSession {
   const std::string how = "--row-time-s 3e-5 --readout rows --camera-id unit";
 
   std::string by_hand(const std::string& name) const {
-    return TemporaryFolder::content_of(folder / name);
+    return TemporaryFolder::read_content(folder / name);
   }
   static std::string without_history(const std::string& calibration) {
     return calibration.substr(calibration.find("\ncamera:"));
@@ -366,7 +366,7 @@ class SingleStepPrograms : public VlpCalibrateSmallSession {
     EXPECT_EQ(run.exit_code, 0) << run.errors;
     return lens;
   }
-  void expect_the_same() const {
+  void expect_same_results() const {
     EXPECT_EQ(by_hand("fixes.csv"), result("check-fixes.csv"));
     EXPECT_EQ(by_hand("evaluation.json"), result("evaluation.json"));
     EXPECT_EQ(without_history(by_hand("calibration.yaml")),
@@ -377,7 +377,7 @@ class SingleStepPrograms : public VlpCalibrateSmallSession {
 TEST_F(SingleStepPrograms, MatchVlpCalibrate) {
   ASSERT_EQ(calibrate("--no-report " + how).exit_code, 0);
   run_steps(lens_by_hand(), "truth.csv");
-  expect_the_same();
+  expect_same_results();
   EXPECT_EQ(by_hand("lens.cameramodel"), result("lens.cameramodel"));
 }
 
@@ -392,7 +392,7 @@ TEST_F(SingleStepPrograms, MatchVlpCalibrateWithInclinationSensor) {
   folder.file("a session/check/captures.csv", captures);
   ASSERT_EQ(calibrate("--no-report " + how).exit_code, 0);
   run_steps(lens_by_hand(), "captures.csv");
-  expect_the_same();
+  expect_same_results();
   // The inclination counts: without it the fixes are others.
   folder.file("a session/check/captures.csv",
               std::regex_replace(captures, std::regex("0.001,-0.002"), "0,0"));
@@ -404,7 +404,7 @@ TEST_F(SingleStepPrograms, MatchVlpCalibrateWithGivenLens) {
   fs::copy(folder / "a session/true_calibration.yaml", folder / "a session/camera.yaml");
   ASSERT_EQ(calibrate("--no-report").exit_code, 0);
   run_steps("'" + path("a session/camera.yaml'"), "truth.csv");
-  expect_the_same();
+  expect_same_results();
 }
 
 TEST_F(SingleStepPrograms, MatchVlpCalibrateWithClassifier) {
@@ -414,12 +414,12 @@ TEST_F(SingleStepPrograms, MatchVlpCalibrateWithClassifier) {
                                    "/true_calibration.yaml' -o '" + in + "/classifier.yaml'");
   ASSERT_EQ(trained.exit_code, 0) << trained.errors;
   // Only the classifier identifies the lamps.
-  const std::string map = TemporaryFolder::content_of(folder / "a session/lamps.yaml");
+  const std::string map = TemporaryFolder::read_content(folder / "a session/lamps.yaml");
   folder.file("a session/lamps.yaml",
               std::regex_replace(map, std::regex(", frequency_hz: [0-9.e+]+"), ""));
   ASSERT_EQ(calibrate("--no-report " + how).exit_code, 0);
   run_steps(lens_by_hand(), "truth.csv", "--classifier '" + in + "/classifier.yaml'");
-  expect_the_same();
+  expect_same_results();
 }
 
 TEST_F(VlpCalibrateSmallSession, RunsStepNamedByRedo) {
@@ -469,13 +469,13 @@ TEST_F(VlpCalibrateSmallSession, KeepsForeignFiles) {
       run_program("vlp-calibrate '" + path("a session") + "' -o '" + path("mine") + "'");
   EXPECT_EQ(run.exit_code, 2);
   EXPECT_THAT(run.errors, HasSubstr("mine: holds calibration.yaml, which is not of vlp-calibrate"));
-  EXPECT_EQ(TemporaryFolder::content_of(folder / "mine/calibration.yaml"), "of somebody\n");
+  EXPECT_EQ(TemporaryFolder::read_content(folder / "mine/calibration.yaml"), "of somebody\n");
   EXPECT_FALSE(fs::exists(folder / "mine/steps"));
 }
 
 TEST_F(VlpCalibrateSmallSession, RemovesOldResultsAfterFailure) {
   ASSERT_EQ(calibrate().exit_code, 0);
-  const std::string lamps = TemporaryFolder::content_of(folder / "a session/lamps.yaml");
+  const std::string lamps = TemporaryFolder::read_content(folder / "a session/lamps.yaml");
   fs::remove(folder / "a session/lamps.yaml");
   EXPECT_EQ(calibrate().exit_code, 2);
   for (const char* name : {"calibration.yaml", "report.html", "line-x-fixes.csv", "lens.yaml"}) {

@@ -40,7 +40,7 @@ class CiAction : public testing::Test {
                        inputs);
   }
   std::string content(const std::string& name) const {
-    return TemporaryFolder::content_of(folder / name);
+    return TemporaryFolder::read_content(folder / name);
   }
 };
 

@@ -43,7 +43,7 @@ class VlpConvert : public testing::Test {
     return result.output;
   }
   /// To a format and back.
-  Calibration there_and_back(const std::string& format) {
+  Calibration round_trip(const std::string& format) {
     write_calibration(folder_ / "camera.yaml", calibration_);
     convert("camera.yaml", format, "--to " + format);
     convert(format, "back.yaml");
@@ -57,13 +57,13 @@ class VlpConvert : public testing::Test {
 TEST_F(VlpConvert, RoundTripIsExact) {
   const Camera& camera = calibration_.camera;
   const auto expect_back = [&](const char* format) {
-    const Camera back = there_and_back(format).camera;
+    const Camera back = round_trip(format).camera;
     EXPECT_EQ(back.lens_model, camera.lens_model) << format;
     EXPECT_EQ(back.intrinsics, camera.intrinsics) << format;
     EXPECT_EQ(back.imager_px, camera.imager_px) << format;
   };
   for (const char* format : {"mrcal", "opencv", "ros"}) expect_back(format);
-  EXPECT_EQ(there_and_back("ros").camera.id, "cam 7");
+  EXPECT_EQ(round_trip("ros").camera.id, "cam 7");
   has_lens(LensModel::fisheye, {290, 291, 402, 297, 0.03, -0.012, 0.004, -0.0006});
   for (const char* format : {"opencv", "ros", "kalibr"}) expect_back(format);
 }
@@ -72,7 +72,7 @@ TEST_F(VlpConvert, KeepsCalibratedRegion) {
   IntrinsicsReport report{20, 2000, 3, 0.1, {}, 0.05, {}};
   report.region_px = {{0, 0}, {500.25, 0}, {512, 300.125}, {500, 599}, {0, 599}};
   calibration_.intrinsics_report = report;
-  const Calibration back = there_and_back("mrcal");
+  const Calibration back = round_trip("mrcal");
   ASSERT_TRUE(back.intrinsics_report);
   EXPECT_EQ(back.intrinsics_report->region_px, report.region_px);
   EXPECT_EQ(back.intrinsics_report->views, 0);
@@ -82,7 +82,7 @@ TEST_F(VlpConvert, KeepsCalibratedRegion) {
   EXPECT_THAT(convert("camera.yaml", "out", "--to ros"), HasSubstr("the format cannot say"));
 
   calibration_.intrinsics_report->region_px.clear();
-  EXPECT_FALSE(there_and_back("mrcal").intrinsics_report);
+  EXPECT_FALSE(round_trip("mrcal").intrinsics_report);
   EXPECT_THAT(convert("camera.yaml", "out", "--to ros"), testing::Not(HasSubstr("known")));
 }
 

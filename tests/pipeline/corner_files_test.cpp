@@ -39,7 +39,7 @@ class VlpIntrinsicsCornerFiles : public VlpIntrinsics {
     EXPECT_EQ(result.exit_code, 2) << result.output;
     return result.errors;
   }
-  Lens lens_of(const char* name) const {
+  Lens read_lens(const char* name) const {
     const Camera camera = read_calibration(folder / name).camera;
     return Lens(camera.lens_model, camera.intrinsics);
   }
@@ -70,8 +70,8 @@ TEST_F(VlpIntrinsicsCornerFiles, TolerateOutlier) {
   const BoardLattice lattice(views.board);
   constexpr double noise_px = 0.02;
   while (seen.size() < 10) {
-    const SeenBoard view = views.random_view(random, noise_px);
-    if (!lattice.enough(view)) continue;
+    const BoardDetection view = views.random_view(random, noise_px);
+    if (!lattice.sufficient(view)) continue;
     seen.push_back({"view" + std::to_string(seen.size()) + ".png", views.imager_px, view});
   }
   const fs::path table = folder / "corners.csv", board = folder / "board.yaml";
@@ -85,11 +85,11 @@ TEST_F(VlpIntrinsicsCornerFiles, TolerateOutlier) {
     EXPECT_THAT(result.errors, HasSubstr("view3.png: 1 of its "));
     EXPECT_THAT(result.errors, HasSubstr("corners are not where their neighbours predict them"));
     EXPECT_THAT(result.output, HasSubstr("views         10 used, 0 dropped"));
-    return lens_of("camera.yaml");
+    return read_lens("camera.yaml");
   };
   for (const Eigen::Vector2d& wrong : {Eigen::Vector2d(2, 2), {-5, 20}, {1e6, 300}}) {
-    const auto apart = projection_difference(views.lens, lens_with(wrong), views.imager_px,
-                                             [](const auto&) { return 1; });
+    const auto apart = compute_projection_difference(views.lens, lens_with(wrong), views.imager_px,
+                                                     [](const auto&) { return 1; });
     EXPECT_LT(apart->mean_px, 0.1);
   }
 }
@@ -123,16 +123,16 @@ TEST_F(VlpIntrinsicsCornerFiles, GiveLensOfImagesExactly) {
   EXPECT_EQ(content("camera.corners.vnl"), corners);
 
   // mrcal's table has the corners without the shift of their edges.
-  const Lens lens = lens_of("camera.yaml");
+  const Lens lens = read_lens("camera.yaml");
   fs::create_directory(folder / "mrcal");
   fs::copy(folder / "camera.corners.vnl", folder / "mrcal/corners.vnl");
   const std::string vnl = (folder / "mrcal/corners.vnl").string();
   const auto solved = calibrate(vnl, board, std::string("--warp on ") + kSize);
   ASSERT_EQ(solved.exit_code, 0) << solved.errors;
-  const Lens here = lens_of("camera.yaml");
+  const Lens here = read_lens("camera.yaml");
   const std::array imager_px{800, 600};
   const auto one = [](const auto&) { return 1; };
-  EXPECT_LT(projection_difference(lens, here, imager_px, one)->worst_px, 1e-3);
+  EXPECT_LT(compute_projection_difference(lens, here, imager_px, one)->worst_px, 1e-3);
   EXPECT_EQ(read_calibration(folder / "camera.yaml").intrinsics_report->outliers, 0);
   const IntrinsicsReport report = *read_calibration(folder / "camera.yaml").intrinsics_report;
 
@@ -161,7 +161,7 @@ TEST_F(VlpIntrinsicsCornerFiles, GiveLensOfImagesExactly) {
   ASSERT_LT(theirs_px, right_px);
   const Camera found = read_any_camera(folder / "mrcal/camera-0.cameramodel").camera;
   const Lens theirs(found.lens_model, found.intrinsics);
-  EXPECT_LT(projection_difference(theirs, here, imager_px, one)->worst_px, 0.01);
+  EXPECT_LT(compute_projection_difference(theirs, here, imager_px, one)->worst_px, 0.01);
   // mrcal counts the corners that are not seen, too, and its regularization, a tenth of the squares
   // of corners that are known to 0.01 px.
   constexpr double points = 12 * 10;
@@ -227,7 +227,7 @@ TEST_F(VlpIntrinsicsCornerFiles, ReportMiscountedBoardSize) {
     }
   }
   std::string corners = folder.file("corners.vnl", text).string();
-  const auto refusal_of = [&](const std::string& size) {
+  const auto rejection_message = [&](const std::string& size) {
     const std::string board = folder
                                   .file("board.yaml", "format: vlp-board/1\nkind: chessboard\n" +
                                                           size + "\nsquare_size_m: 0.02\n")
@@ -235,21 +235,22 @@ TEST_F(VlpIntrinsicsCornerFiles, ReportMiscountedBoardSize) {
     const auto result = calibrate(corners, board, kSize);
     return std::to_string(result.exit_code) + " " + result.errors;
   };
-  EXPECT_THAT(refusal_of("cols: 8\nrows: 5"),
+  EXPECT_THAT(rejection_message("cols: 8\nrows: 5"),
               HasSubstr("count squares, not the corners between them: cols 9, rows 6"));
-  EXPECT_THAT(refusal_of("cols: 6\nrows: 9"),
+  EXPECT_THAT(rejection_message("cols: 6\nrows: 9"),
               HasSubstr("2 vlp-intrinsics: error: " + corners +
                         ":2: the corners lie in rows of 8, but a board of 6 x 9 squares has 5 x 8 "
                         "corners; swap cols and rows"));
-  EXPECT_THAT(refusal_of("cols: 9\nrows: 6"), HasSubstr("3 "));  // one view is too few
+  EXPECT_THAT(rejection_message("cols: 9\nrows: 6"), HasSubstr("3 "));  // one view is too few
 
   corners = folder.file("corners.csv", table).string();
-  EXPECT_THAT(refusal_of("cols: 6\nrows: 9"),
+  EXPECT_THAT(rejection_message("cols: 6\nrows: 9"),
               HasSubstr("2 vlp-intrinsics: error: " + corners +
                         ": the corners lie in rows of 8, but a board of 6 x 9 squares has 5 x 8 "
                         "corners; swap cols and rows of board.yaml\n"));
-  EXPECT_THAT(refusal_of("cols: 11\nrows: 5"), HasSubstr("is board.yaml that of the board?"));
-  EXPECT_THAT(refusal_of("cols: 9\nrows: 6"), HasSubstr("3 "));
+  EXPECT_THAT(rejection_message("cols: 11\nrows: 5"),
+              HasSubstr("is board.yaml that of the board?"));
+  EXPECT_THAT(rejection_message("cols: 9\nrows: 6"), HasSubstr("3 "));
 }
 
 }  // namespace

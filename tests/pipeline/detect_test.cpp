@@ -41,7 +41,7 @@ class VlpDetect : public testing::Test {
 TEST_F(VlpDetect, ReportsBothRowTimesIfGivenOneIsWrong) {
   const std::string images = kRig + "/sample' --lamps " + kRig + "/lamps.yaml";
   const std::string output = " -o " + (folder / "out.csv").string();
-  std::string calibration = TemporaryFolder::content_of(kRig + "/true_calibration.yaml");
+  std::string calibration = TemporaryFolder::read_content(kRig + "/true_calibration.yaml");
   std::string stated = "row_time_s: 0.00003";
   for (const std::string wrong_us : {"28.5", "37.5"}) {
     const std::string wrong = "row_time_s: " + wrong_us + "e-06";
@@ -69,7 +69,7 @@ TEST_F(VlpDetect, ReportsBothRowTimesIfGivenOneIsWrong) {
 
 /// Two rooms with the same frequencies in one map.
 TEST_F(VlpDetect, IdentifiesLampsOfNamedRoom) {
-  std::istringstream lines(TemporaryFolder::content_of(kRig + "/lamps.yaml"));
+  std::istringstream lines(TemporaryFolder::read_content(kRig + "/lamps.yaml"));
   std::string lamps;
   int id = 0;
   for (std::string line; std::getline(lines, line);) {
@@ -227,16 +227,16 @@ TEST_F(VlpDetect, MatchesVlpLocateOnImages) {
 
 TEST_F(VlpDetect, GivesSameBytesForAllThreadCounts) {
   ASSERT_EQ(detect(kRig + "/sample", "--threads 1").exit_code, 0);
-  const std::string one = TemporaryFolder::content_of(folder / "found.csv");
+  const std::string one = TemporaryFolder::read_content(folder / "found.csv");
   ASSERT_EQ(detect(kRig + "/sample", "--threads 4").exit_code, 0);
-  EXPECT_EQ(TemporaryFolder::content_of(folder / "found.csv"), one);
+  EXPECT_EQ(TemporaryFolder::read_content(folder / "found.csv"), one);
   const std::string locate = "vlp-locate " + kRig + "/sample --lamps " + kRig +
                              "/lamps.yaml --calibration " + kRig + "/true_calibration.yaml -o " +
                              (folder / "fixes").string();
   ASSERT_EQ(run_program(locate + "1.csv --threads 1").exit_code, 0);
   ASSERT_EQ(run_program(locate + "4.csv --threads 4").exit_code, 0);
-  EXPECT_EQ(TemporaryFolder::content_of(folder / "fixes4.csv"),
-            TemporaryFolder::content_of(folder / "fixes1.csv"));
+  EXPECT_EQ(TemporaryFolder::read_content(folder / "fixes4.csv"),
+            TemporaryFolder::read_content(folder / "fixes1.csv"));
   for (const char* program : {"vlp-locate", "vlp-rotation", "vlp-dispersion"}) {
     const auto none = run_program(program + locate.substr(locate.find(' ')) + ".csv --threads 0");
     EXPECT_EQ(none.exit_code, 2);
@@ -246,13 +246,13 @@ TEST_F(VlpDetect, GivesSameBytesForAllThreadCounts) {
 
 TEST_F(VlpDetect, SkipsAndCountsUnusableImages) {
   const fs::path images = this->images();
-  const std::string whole = TemporaryFolder::content_of(images / "0000.png");
+  const std::string whole = TemporaryFolder::read_content(images / "0000.png");
   folder.file("images/empty.png", "");
   folder.file("images/text.png", "no image\n");
   folder.file("images/half.PNG", whole.substr(0, 300));
   fs::copy(VLP_SOURCE_DIR "/datasets/example/limits.png", images / "another.png");
   cv::imwrite((images / "cut.jpg").string(), cv::imread((images / "0000.png").string()));
-  const std::string jpeg = TemporaryFolder::content_of(images / "cut.jpg");
+  const std::string jpeg = TemporaryFolder::read_content(images / "cut.jpg");
   folder.file("images/cut.jpg", jpeg.substr(0, jpeg.size() * 9 / 10));
   const auto result = detect(images.string());
   EXPECT_EQ(result.exit_code, 0);
@@ -308,7 +308,7 @@ TEST_F(VlpDetect, FailsWhenNoImageIsUsable) {
 }
 
 TEST_F(VlpDetect, RequiresRowTimeAndFrequencies) {
-  std::string calibration = TemporaryFolder::content_of(kRig + "/true_calibration.yaml");
+  std::string calibration = TemporaryFolder::read_content(kRig + "/true_calibration.yaml");
   calibration.erase(calibration.find("  row_time_s"), 21);
   const auto without_row_time = run_program(
       "vlp-detect " + kRig + "/sample --lamps " + kRig + "/lamps.yaml --calibration " +

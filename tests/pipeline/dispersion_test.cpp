@@ -135,7 +135,7 @@ TEST_F(VlpDispersion, PlotsFixes) {
   const auto result =
       dispersion(turn(12, 6.28), "--station 0.1 -0.05 --plot " + path("picture.svg"));
   ASSERT_EQ(result.exit_code, 0) << result.errors;
-  EXPECT_THAT(TemporaryFolder::content_of(folder / "picture.svg"), HasSubstr("<svg"));
+  EXPECT_THAT(TemporaryFolder::read_content(folder / "picture.svg"), HasSubstr("<svg"));
 }
 
 TEST_F(VlpDispersion, KeepsOtherPartsOfCalibration) {

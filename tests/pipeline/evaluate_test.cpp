@@ -54,7 +54,7 @@ class VlpEvaluate : public testing::Test {
                        "truth.csv" + rig + options);
   }
   std::string content(const std::string& name) const {
-    return TemporaryFolder::content_of(folder / name);
+    return TemporaryFolder::read_content(folder / name);
   }
 };
 
@@ -108,8 +108,8 @@ TEST_F(VlpEvaluate, ProposesGatesThatPass) {
   EXPECT_THAT(content("gates.yaml"),
               AllOf(HasSubstr("format: vlp-gates/1\n"), HasSubstr("  mean_mm: "),
                     HasSubstr("  height_rms_mm: "), HasSubstr("  missing: 0 ")));
-  const auto met = evaluate_example("--noise-px 0.05 --gates '" + path("gates.yaml") + "'");
-  EXPECT_EQ(met.exit_code, 0) << met.errors;
+  const auto passed = evaluate_example("--noise-px 0.05 --gates '" + path("gates.yaml") + "'");
+  EXPECT_EQ(passed.exit_code, 0) << passed.errors;
 }
 
 TEST_F(VlpEvaluate, WarnsOfMissingFixesWithoutGate) {

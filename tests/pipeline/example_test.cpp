@@ -42,8 +42,8 @@ TEST(Example, MatchesGenerator) {
   ASSERT_EQ(run_program(VLP_MAKE_EXAMPLE " '" + (folder / "example").string() + "'").exit_code, 0);
   for (const std::string name : {"lamps.yaml", "calibration.yaml", "detections.csv", "truth.csv",
                                  "turning.csv", "station.csv"}) {
-    EXPECT_EQ(TemporaryFolder::content_of(folder / ("example/" + name)),
-              TemporaryFolder::content_of(kExample + name))
+    EXPECT_EQ(TemporaryFolder::read_content(folder / ("example/" + name)),
+              TemporaryFolder::read_content(kExample + name))
         << name;
   }
 }
@@ -71,8 +71,8 @@ TEST(Example, GivesSameBytesTwice) {
   const TemporaryFolder folder;
   const auto first = run_program(kLocate + (folder / "a.csv").string());
   const auto second = run_program(kLocate + (folder / "b.csv").string());
-  EXPECT_EQ(TemporaryFolder::content_of(folder / "a.csv"),
-            TemporaryFolder::content_of(folder / "b.csv"));
+  EXPECT_EQ(TemporaryFolder::read_content(folder / "a.csv"),
+            TemporaryFolder::read_content(folder / "b.csv"));
   EXPECT_EQ(first.output, second.output);
 }
 

@@ -33,7 +33,7 @@ std::string example_in(const std::string& help) {
   return example;
 }
 
-std::vector<std::string> lines_of(const std::string& text) {
+std::vector<std::string> split_lines(const std::string& text) {
   std::istringstream stream(text);
   std::vector<std::string> lines;
   for (std::string line; std::getline(stream, line);) lines.push_back(line);
@@ -44,7 +44,7 @@ std::vector<std::string> lines_of(const std::string& text) {
 std::vector<std::string> subcommands_in(const std::string& help) {
   std::vector<std::string> commands;
   bool below = false;
-  for (const std::string& line : lines_of(help)) {
+  for (const std::string& line : split_lines(help)) {
     if (!line.starts_with(' ')) below = line == "Subcommands:" || line == "SUBCOMMANDS:";
     const bool name = below && line.starts_with("  ") && line.size() > 2 && line[2] != ' ';
     if (name) commands.push_back(line.substr(2, line.find(' ', 2) - 2));
@@ -78,7 +78,7 @@ TEST_P(Help, FitsIn80Columns) {
     const auto help = run_program(program + " " + command + " --help");
     ASSERT_EQ(help.exit_code, 0) << command;
     EXPECT_THAT(help.output, HasSubstr("--help")) << command;
-    for (const std::string& line : lines_of(help.output)) {
+    for (const std::string& line : split_lines(help.output)) {
       EXPECT_LE(line.size(), 80U) << command << ": " << line;
     }
   }
@@ -105,7 +105,7 @@ TEST_P(Help, PrintsVersion) {
 std::vector<std::string> options_in(const std::string& help) {
   const std::regex name("(--?[a-z][a-z0-9-]*)[,{ ]?");
   std::vector<std::string> options;
-  for (const std::string& line : lines_of(help)) {
+  for (const std::string& line : split_lines(help)) {
     if (!line.starts_with("  -")) continue;
     const std::string names = line.substr(2, line.find(' ', 2) - 2);
     for (std::sregex_iterator at(names.begin(), names.end(), name), end; at != end; ++at) {
@@ -147,7 +147,7 @@ std::vector<std::string> completed(const std::string& program, const std::string
                   " " + words + "); COMP_CWORD=$((${#COMP_WORDS[@]} - 1)); " + function +
                   "; printf \"%s\\n\" \"${COMPREPLY[@]}\"'");
   EXPECT_EQ(offered.errors, "");
-  return lines_of(offered.output);
+  return split_lines(offered.output);
 }
 
 TEST_P(Help, ShellsCompleteAllOptions) {
@@ -197,12 +197,12 @@ TEST(BashCompletion, PrefersChoicesToCommands) {
   app.add_option("--size", size);
   app.add_subcommand("run", "Runs.");
   const TemporaryFolder folder;
-  const std::string script = folder.file("odd.bash", bash_completion(app)).string();
+  const std::string script = folder.file("odd.bash", format_bash_completion(app)).string();
   const auto offered = [&](const std::string& words) {
-    return lines_of(run_program("bash -c 'source " + script + "; COMP_WORDS=(vlp-odd " + words +
-                                "); COMP_CWORD=$((${#COMP_WORDS[@]} - 1)); _vlp_odd; "
-                                "printf \"%s\\n\" \"${COMPREPLY[@]}\"'")
-                        .output);
+    return split_lines(run_program("bash -c 'source " + script + "; COMP_WORDS=(vlp-odd " + words +
+                                   "); COMP_CWORD=$((${#COMP_WORDS[@]} - 1)); _vlp_odd; "
+                                   "printf \"%s\\n\" \"${COMPREPLY[@]}\"'")
+                           .output);
   };
   EXPECT_THAT(offered("--kind \"\""), testing::UnorderedElementsAre("red", "blue"));
   EXPECT_THAT(offered("--size \"\""), testing::ElementsAre(""));

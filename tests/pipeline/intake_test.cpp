@@ -59,7 +59,7 @@ class Intake : public SmallStation {
 
   /// Images of a board whose tags have other ids.
   void add_foreign_board() const {
-    std::string scene = TemporaryFolder::content_of(folder / "station/scene.yaml");
+    std::string scene = TemporaryFolder::read_content(folder / "station/scene.yaml");
     const std::string ids = "first_id: 0";
     ASSERT_NE(scene.find(ids), std::string::npos);
     scene.replace(scene.find(ids), ids.size(), "first_id: 100");
@@ -76,7 +76,7 @@ class Intake : public SmallStation {
     const auto result = records("export --last 1 -o " + file.string());
     EXPECT_EQ(result.exit_code, 0) << result.errors;
     Reasons reasons;
-    const json runs = json::parse(TemporaryFolder::content_of(file));
+    const json runs = json::parse(TemporaryFolder::read_content(file));
     for (const json& image : runs.at(0).at("images")) {
       const std::string refused = image.at("refused");
       if (refused.empty()) continue;
@@ -87,7 +87,8 @@ class Intake : public SmallStation {
   }
   Reasons reasons_of_session() const {
     Reasons reasons;
-    const json session = json::parse(TemporaryFolder::content_of(folder / "results/session.json"));
+    const json session =
+        json::parse(TemporaryFolder::read_content(folder / "results/session.json"));
     for (const json& step : session.at("steps")) {
       const std::string name = step.at("name") == "lens" ? "boards" : step.at("name");
       if (!step.contains("skipped")) continue;
@@ -159,7 +160,7 @@ TEST_F(Intake, IsIdenticalAtStationAndInSession) {
   const std::string by_station = without_origin(result("0001", "calibration.yaml"));
   EXPECT_THAT(by_station, HasSubstr("dispersion:"));
   EXPECT_EQ(by_station,
-            without_origin(TemporaryFolder::content_of(folder / "results/calibration.yaml")));
+            without_origin(TemporaryFolder::read_content(folder / "results/calibration.yaml")));
 }
 
 }  // namespace

@@ -19,7 +19,9 @@ class VlpIntrinsics : public testing::Test {
     return run_program("vlp-intrinsics " + images + " --board " + board + " -o " +
                        (folder / "camera.yaml").string() + " " + options);
   }
-  std::string content(const char* name) const { return TemporaryFolder::content_of(folder / name); }
+  std::string content(const char* name) const {
+    return TemporaryFolder::read_content(folder / name);
+  }
   const TemporaryFolder folder;
 };
 

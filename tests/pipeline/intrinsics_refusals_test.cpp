@@ -49,17 +49,18 @@ TEST_F(VlpIntrinsicsErrors, RejectsOneViewAndIdenticalViews) {
 
 TEST_F(VlpIntrinsicsErrors, RejectsTwoOutputsInOneFile) {
   const std::string images = copies({"0.png"}), board = kRig + "/board.yaml";
-  const auto refusal_of = [&](const std::string& ros, const std::string& kalibr) {
+  const auto rejection_message = [&](const std::string& ros, const std::string& kalibr) {
     const auto result = calibrate(images, board,
                                   "--lens LENSMODEL_OPENCV4 --ros " + (folder / ros).string() +
                                       " --kalibr " + (folder / kalibr).string());
     EXPECT_EQ(result.exit_code, 2);
     return result.errors;
   };
-  EXPECT_THAT(refusal_of("a.yaml", "./a.yaml"), HasSubstr("--ros and --kalibr name one file"));
-  EXPECT_THAT(refusal_of("images/../camera.yaml", "a.yaml"),
+  EXPECT_THAT(rejection_message("a.yaml", "./a.yaml"),
+              HasSubstr("--ros and --kalibr name one file"));
+  EXPECT_THAT(rejection_message("images/../camera.yaml", "a.yaml"),
               HasSubstr("--output and --ros name one file"));
-  EXPECT_THAT(refusal_of("a.yaml", "camera.cameramodel"),
+  EXPECT_THAT(rejection_message("a.yaml", "camera.cameramodel"),
               HasSubstr("--output's .cameramodel and --kalibr name one file"));
 }
 
@@ -84,7 +85,7 @@ TEST_F(VlpIntrinsicsErrors, ReportsCauseOfMissingTags) {
 }
 
 TEST_F(VlpIntrinsicsErrors, ReportsWrongKeyOfBoard) {
-  std::string text = TemporaryFolder::content_of(kRig + "/board.yaml");
+  std::string text = TemporaryFolder::read_content(kRig + "/board.yaml");
   const auto with = [&](const std::string& from, const std::string& to) {
     std::string changed = text;
     changed.replace(changed.find(from), from.size(), to);
@@ -109,14 +110,14 @@ TEST_F(VlpIntrinsicsErrors, ReportsWrongKeyOfBoard) {
 
 TEST_F(VlpIntrinsicsErrors, ReportsIdOrderOfSquareKalibrBoard) {
   std::string scene =
-      TemporaryFolder::content_of(VLP_SOURCE_DIR "/datasets/paper-rig-faulty/scene.yaml");
+      TemporaryFolder::read_content(VLP_SOURCE_DIR "/datasets/paper-rig-faulty/scene.yaml");
   const std::string rows = "rows: 5,";
   scene.replace(scene.find(rows), rows.size(), "rows: 6,");
   const std::string file = folder.file("scene.yaml", scene).string();
   const std::string rig = (folder / "rig").string();
   ASSERT_EQ(run_program("vlp-simulate -q " + file + " --only sample-boards -o " + rig).exit_code,
             0);
-  const std::string board = TemporaryFolder::content_of(rig + "/board.yaml");
+  const std::string board = TemporaryFolder::read_content(rig + "/board.yaml");
   const std::string right = "row-major-from-bottom-left";
   for (const char* wrong : {"row-major-from-top-left", "row-major-from-bottom-right",
                             "column-major-from-top-left", "column-major-from-bottom-right"}) {
@@ -182,7 +183,7 @@ TEST_F(VlpIntrinsicsErrors, ReportsOverexposedTags) {
 
 TEST_F(VlpIntrinsicsErrors, ReportsSaturatedBoards) {
   const std::string text =
-      TemporaryFolder::content_of(VLP_SOURCE_DIR "/datasets/paper-rig-faulty/scene.yaml");
+      TemporaryFolder::read_content(VLP_SOURCE_DIR "/datasets/paper-rig-faulty/scene.yaml");
   const std::string usual = "folder: boards\n    exposure_s: 0.004\n    views: {count: 36,";
   const auto at = text.find(usual);
   ASSERT_NE(at, std::string::npos);

@@ -32,9 +32,9 @@ TEST_P(VlpIntrinsicsRenderedImages, GiveTrueLensForAllThreadCounts) {
   const Camera truth = read_calibration(rig + "/true_calibration.yaml").camera;
   const Calibration found = read_calibration(folder / "camera.yaml");
   const auto difference =
-      projection_difference(Lens(truth.lens_model, truth.intrinsics),
-                            Lens(found.camera.lens_model, found.camera.intrinsics), truth.imager_px,
-                            [](const auto&) { return 1; });
+      compute_projection_difference(Lens(truth.lens_model, truth.intrinsics),
+                                    Lens(found.camera.lens_model, found.camera.intrinsics),
+                                    truth.imager_px, [](const auto&) { return 1; });
   EXPECT_LT(difference->mean_px, 0.05);
   EXPECT_LT(difference->worst_px, 0.2);
   ASSERT_TRUE(found.intrinsics_report);
@@ -99,8 +99,8 @@ class VlpIntrinsicsProcessedImages : public VlpIntrinsics,
                                      public testing::WithParamInterface<Coded> {};
 
 TEST_P(VlpIntrinsicsProcessedImages, GiveTrueLens) {
-  std::string scene = TemporaryFolder::content_of(std::string(VLP_SOURCE_DIR "/datasets/") +
-                                                  GetParam().scene + "/scene.yaml");
+  std::string scene = TemporaryFolder::read_content(std::string(VLP_SOURCE_DIR "/datasets/") +
+                                                    GetParam().scene + "/scene.yaml");
   scene.insert(scene.find("\nmount:"), GetParam().picture);
   const std::string boards = "folder: boards\n    exposure_s: ", exposure = "0.004";
   const auto at = scene.find(boards + exposure);
@@ -113,9 +113,9 @@ TEST_P(VlpIntrinsicsProcessedImages, GiveTrueLens) {
   ASSERT_EQ(result.exit_code, 0) << result.errors;
   const Camera truth = read_calibration(rig + "/true_calibration.yaml").camera;
   const Camera found = read_calibration(folder / "camera.yaml").camera;
-  const auto difference = projection_difference(Lens(truth.lens_model, truth.intrinsics),
-                                                Lens(found.lens_model, found.intrinsics),
-                                                truth.imager_px, [](const auto&) { return 1; });
+  const auto difference = compute_projection_difference(
+      Lens(truth.lens_model, truth.intrinsics), Lens(found.lens_model, found.intrinsics),
+      truth.imager_px, [](const auto&) { return 1; });
   EXPECT_LT(difference->mean_px, GetParam().mean_px);
   EXPECT_LT(difference->worst_px, GetParam().worst_px);
   RecordProperty("mean_px", std::to_string(difference->mean_px));
@@ -162,7 +162,7 @@ TEST_F(VlpIntrinsics, SelectsLensModel) {
   const auto real = real_data("apriltag-lattice-phone");
   if (real.empty()) GTEST_SKIP() << "no real captures here";
   const auto result = calibrate(real.string(), (real / "board.yaml").string(), "--lens auto");
-  const std::string taken(name_of(read_calibration(folder / "camera.yaml").camera.lens_model));
+  const std::string taken(to_string(read_calibration(folder / "camera.yaml").camera.lens_model));
   EXPECT_THAT(result.output, HasSubstr("lens model    " + taken + ", 0."));
   // Models of four coefficients: RMS residual of held-out views 0.252 px for OPENCV4, 0.246 px for
   // OPENCV_FISHEYE, more for other models. Eight views cannot distinguish these two.

@@ -16,7 +16,7 @@ TEST(VlpLocateOutput, IsOldOrNewFileAfterKill) {
   const TemporaryFolder folder;
   const std::string example = VLP_SOURCE_DIR "/datasets/example/";
   // The example many times over, so that writing takes a while.
-  std::string detections = TemporaryFolder::content_of(example + "detections.csv");
+  std::string detections = TemporaryFolder::read_content(example + "detections.csv");
   const std::string header = detections.substr(0, detections.find('\n') + 1);
   const std::string rows = detections.substr(header.size());
   std::string many = header;
@@ -36,8 +36,8 @@ TEST(VlpLocateOutput, IsOldOrNewFileAfterKill) {
   const auto begin = std::chrono::steady_clock::now();
   ASSERT_EQ(run_program(locate(large, folder / "new.csv")).exit_code, 0);
   const std::chrono::duration<double> run_time = std::chrono::steady_clock::now() - begin;
-  const std::string old_content = TemporaryFolder::content_of(folder / "old.csv");
-  const std::string new_content = TemporaryFolder::content_of(folder / "new.csv");
+  const std::string old_content = TemporaryFolder::read_content(folder / "old.csv");
+  const std::string new_content = TemporaryFolder::read_content(folder / "new.csv");
 
   Random random(1);
   int left_old = 0, left_new = 0;
@@ -46,7 +46,7 @@ TEST(VlpLocateOutput, IsOldOrNewFileAfterKill) {
     const double wait_s = random.uniform(0, 2 * run_time.count());
     run_program("(" + locate(large, output) + ") & sleep " + std::to_string(wait_s) +
                 "; kill -9 $! 2>&-; wait");
-    const std::string content = TemporaryFolder::content_of(output);
+    const std::string content = TemporaryFolder::read_content(output);
     ASSERT_TRUE(content == old_content || content == new_content) << "after " << wait_s << " s";
     ++(content == old_content ? left_old : left_new);
   }

@@ -49,9 +49,9 @@ struct Errors {
   /// Squared errors over their stated variances.
   double over_sd = 0;
 
-  void check(double most_over_sd, double worst_allowed_m = 1e-3) const {
+  void check(double max_over_sd, double worst_allowed_m = 1e-3) const {
     EXPECT_LT(worst_m, worst_allowed_m);
-    EXPECT_LT(std::sqrt(over_sd / fixes), most_over_sd);
+    EXPECT_LT(std::sqrt(over_sd / fixes), max_over_sd);
   }
   std::string words() const {
     return fmt::format("{} of {} fixes, {:.3f} mm, height {:.3f} mm rms, error over sd {:.2f}",
@@ -203,11 +203,11 @@ TEST_F(TiltedCamera, AnnotatesFinalDetection) {
   const std::string level = (folder / "level").string(), leaning = (folder / "leaning").string();
   ASSERT_EQ(locate("roll15", "--annotate " + level).exit_code, 0);
   ASSERT_EQ(locate("roll15", "--lean-sd-deg 90 --threads 1 --annotate " + leaning).exit_code, 0);
-  const std::string fixes = TemporaryFolder::content_of(fixes_file("roll15"));
-  EXPECT_NE(TemporaryFolder::content_of(folder / "level/0000.png.png"),
-            TemporaryFolder::content_of(folder / "leaning/0000.png.png"));
+  const std::string fixes = TemporaryFolder::read_content(fixes_file("roll15"));
+  EXPECT_NE(TemporaryFolder::read_content(folder / "level/0000.png.png"),
+            TemporaryFolder::read_content(folder / "leaning/0000.png.png"));
   ASSERT_EQ(locate("roll15", "--lean-sd-deg 90 --threads 3").exit_code, 0);
-  EXPECT_EQ(TemporaryFolder::content_of(fixes_file("roll15")), fixes);
+  EXPECT_EQ(TemporaryFolder::read_content(fixes_file("roll15")), fixes);
 }
 
 /// Neither lean nor motion is known.

@@ -36,10 +36,10 @@ class VlpRotationByLamps : public testing::Test {
     return frames;
   }
   ProgramResult level(const std::vector<Frame>& frames, const std::string& options = "") {
-    Calibration camera_alone = rig.calibration;
-    camera_alone.rotation_center.reset();
-    camera_alone.dispersion = Dispersion{{1, 2}, 0, {0, 0}, 1, {}};
-    write_calibration(folder / "camera.yaml", camera_alone);
+    Calibration extract_camera = rig.calibration;
+    extract_camera.rotation_center.reset();
+    extract_camera.dispersion = Dispersion{{1, 2}, 0, {0, 0}, 1, {}};
+    write_calibration(folder / "camera.yaml", extract_camera);
     write_lamp_map(folder / "lamps.yaml", surveyed);
     write_detections(folder / "detections.csv", frames);
     return run_program("vlp-rotation --method lamps " + path("detections.csv") + "--lamps " +

@@ -49,25 +49,25 @@ TEST(VlpLimits, WritesMapAsTableAndPlot) {
     EXPECT_NEAR(map.number(row, map.required("horizontal_m")), std::hypot(noise_m, tilt_m), 1e-6);
     EXPECT_EQ(map.number(row, map.required("center_m")), 0);
   }
-  EXPECT_THAT(TemporaryFolder::content_of(folder / "map.png"), StartsWith("\x89PNG"));
+  EXPECT_THAT(TemporaryFolder::read_content(folder / "map.png"), StartsWith("\x89PNG"));
 }
 
 TEST(VlpLimits, ReportsEffectOfMotionAndTilt) {
   const TemporaryFolder folder;
-  const auto map_of = [&](const std::string& options) {
+  const auto compute_map = [&](const std::string& options) {
     const auto result = run_program(kLimits + "--floor-m -0.2 0.2 0 0.1 --step-m 0.1 --map " +
                                     (folder / "map.csv").string() + options);
     EXPECT_EQ(result.exit_code, 0) << result.errors;
     return std::pair(result.output, CsvTable(folder / "map.csv"));
   };
-  const auto [output, map] =
-      map_of(" --max-speed-m-per-s 2 --lean-sd-deg 90 --picture " + (folder / "map.svg").string());
+  const auto [output, map] = compute_map(" --max-speed-m-per-s 2 --lean-sd-deg 90 --picture " +
+                                         (folder / "map.svg").string());
   for (const char* row : {"\nmotion ", "\nlean ", ", a fix at "}) {
     EXPECT_THAT(output, HasSubstr(row));
   }
-  EXPECT_THAT(TemporaryFolder::content_of(folder / "map.svg"),
+  EXPECT_THAT(TemporaryFolder::read_content(folder / "map.svg"),
               HasSubstr("up to 2 m/s, lean to 90 deg"));
-  const auto [standing_output, standing] = map_of("");
+  const auto [standing_output, standing] = compute_map("");
   EXPECT_THAT(standing_output, Not(HasSubstr("motion")));
   ASSERT_EQ(map.rows(), standing.rows());
   int with_fix = 0;
@@ -91,7 +91,7 @@ TEST(VlpLimits, RequiresRowTimeOfMovingCamera) {
   const TemporaryFolder folder;
   Calibration calibration{synthetic_camera(), {}, {}, {}, {}};
   write_calibration(folder / "camera.yaml", calibration);
-  write_lamp_map(folder / "lamps.yaml", lamp_map_of({{-0.5, 0, 1.6}, {0.5, 0, 1.6}}));
+  write_lamp_map(folder / "lamps.yaml", make_lamp_map({{-0.5, 0, 1.6}, {0.5, 0, 1.6}}));
   const std::string two_lamps = "vlp-limits --lamps " + (folder / "lamps.yaml").string() +
                                 " --calibration " + (folder / "camera.yaml").string() +
                                 " --height-m 0 --noise-px 0.1 --step-m 0.5 ";
@@ -197,7 +197,7 @@ TEST(VlpLimits, WritesNothingForInvalidPlotName) {
 
 TEST(VlpLimits, CoverFieldOfViewOfFisheye) {
   const TemporaryFolder folder;
-  const auto map_of = [&](const Camera& camera) {
+  const auto compute_map = [&](const Camera& camera) {
     write_calibration(folder / "camera.yaml", {camera, {}, {}, {}, {}});
     const auto result =
         run_program("vlp-limits --lamps " VLP_SOURCE_DIR
@@ -207,7 +207,8 @@ TEST(VlpLimits, CoverFieldOfViewOfFisheye) {
     EXPECT_EQ(result.exit_code, 0) << result.errors;
     return CsvTable(folder / "map.csv");
   };
-  const CsvTable by_fisheye = map_of(fisheye_camera()), by_other = map_of(synthetic_camera());
+  const CsvTable by_fisheye = compute_map(fisheye_camera()),
+                 by_other = compute_map(synthetic_camera());
   ASSERT_EQ(by_fisheye.rows(), by_other.rows());
   int more = 0;
   for (std::size_t row = 0; row < by_fisheye.rows(); ++row) {

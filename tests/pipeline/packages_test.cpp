@@ -40,7 +40,7 @@ class Packages : public testing::Test {
                     "' && PATH=$PWD/bin:$PATH bash scripts/packages.sh -o out tools");
     EXPECT_EQ(result.exit_code, 0) << result.errors;
     EXPECT_THAT(result.output, HasSubstr("out/vlp.deb"));
-    return TemporaryFolder::content_of(folder / "calls");
+    return TemporaryFolder::read_content(folder / "calls");
   }
 };
 

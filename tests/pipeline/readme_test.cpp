@@ -29,7 +29,7 @@ const fs::path kSource = VLP_SOURCE_DIR;
 constexpr const char* kFolders[] = {"apps", "datasets", "lib", "scripts", "tests"};
 
 /// The files of the tree whose names end like this, in order; those at the top first.
-std::vector<fs::path> files_of(const std::vector<std::string>& endings) {
+std::vector<fs::path> find_files(const std::vector<std::string>& endings) {
   const auto wanted = [&](const fs::path& file) {
     return std::find(endings.begin(), endings.end(), file.extension()) != endings.end();
   };
@@ -49,7 +49,7 @@ std::vector<fs::path> files_of(const std::vector<std::string>& endings) {
 }
 
 /// README.md, those of apps, and so on.
-std::vector<fs::path> pages() { return files_of({".md"}); }
+std::vector<fs::path> pages() { return find_files({".md"}); }
 
 std::string name_of_page(const fs::path& page) { return page.lexically_relative(kSource).string(); }
 
@@ -81,7 +81,7 @@ std::vector<std::string> commands_in(const fs::path& page) {
 }
 
 /// The page without its blocks of code, which may hold anything.
-std::string prose_of(const fs::path& page) {
+std::string read_prose(const fs::path& page) {
   std::string prose;
   bool code = false;
   for (const std::string& line : lines_in(page)) {
@@ -111,14 +111,14 @@ std::vector<fs::path> pages_in_reading_order() {
   for (const fs::path& page : pages()) {
     add(page);
     if (name_of_page(page) != "apps/README.md") continue;
-    for (const std::string& link : matches(prose_of(page), "\\]\\(([^)#/\\s]+\\.md)")) {
+    for (const std::string& link : matches(read_prose(page), "\\]\\(([^)#/\\s]+\\.md)")) {
       add(page.parent_path() / link);
     }
   }
   return ordered;
 }
 
-std::vector<std::string> headings_of(const fs::path& page) {
+std::vector<std::string> find_headings(const fs::path& page) {
   std::vector<std::string> headings;
   for (const std::string& line : lines_in(page)) {
     const auto begin = line.find_first_not_of('#');
@@ -128,7 +128,7 @@ std::vector<std::string> headings_of(const fs::path& page) {
 }
 
 /// As GitHub makes them: small letters, digits, '-' and '_', blanks as '-'.
-std::string anchor_of(const std::string& heading) {
+std::string make_anchor(const std::string& heading) {
   std::string anchor;
   for (const char letter : heading) {
     const auto code = static_cast<unsigned char>(letter);
@@ -142,9 +142,9 @@ std::string anchor_of(const std::string& heading) {
 }
 
 bool has_anchor(const fs::path& page, const std::string& anchor) {
-  const auto headings = headings_of(page);
+  const auto headings = find_headings(page);
   return std::any_of(headings.begin(), headings.end(),
-                     [&](const std::string& heading) { return anchor_of(heading) == anchor; });
+                     [&](const std::string& heading) { return make_anchor(heading) == anchor; });
 }
 
 /// Returns true if a page may use this path: relative to the top, to its own folder, or to lib.
@@ -155,8 +155,8 @@ bool is_there(const fs::path& page, const std::string& path) {
 }
 
 /// Every column of a table that the programs wrote stands in the formats.
-void expect_formats_to_name_the_columns_of(const fs::path& results) {
-  const std::string page = prose_of(kSource / "datasets/README.md");
+void expect_formats_to_name_columns(const fs::path& results) {
+  const std::string page = read_prose(kSource / "datasets/README.md");
   std::set<std::string> named;
   for (const std::string& code : matches(page, "`([^`]*)`")) {
     for (const std::string& word : matches(code, "([a-z0-9_]+)")) named.insert(word);
@@ -199,7 +199,7 @@ TEST(Pages, CommandsRunAsTyped) {
     const std::string name = program.path().filename().string();
     EXPECT_TRUE(programs.contains("build/bin/" + name)) << name << " is shown by no page";
   }
-  expect_formats_to_name_the_columns_of(folder / "out");
+  expect_formats_to_name_columns(folder / "out");
 }
 
 /// Names of the programs, such as "vlp-locate".
@@ -217,9 +217,9 @@ TEST(Pages, ExistForEachProgram) {
   for (const std::string& name : names) {
     const fs::path page = kSource / "apps" / (name + ".md");
     ASSERT_TRUE(fs::exists(page)) << page;
-    EXPECT_THAT(headings_of(page), testing::Contains(name));
-    EXPECT_THAT(prose_of(kSource / "apps/README.md"), testing::HasSubstr("(" + name + ".md)"));
-    EXPECT_THAT(prose_of(kSource / "README.md"), testing::HasSubstr("(apps/" + name + ".md)"));
+    EXPECT_THAT(find_headings(page), testing::Contains(name));
+    EXPECT_THAT(read_prose(kSource / "apps/README.md"), testing::HasSubstr("(" + name + ".md)"));
+    EXPECT_THAT(read_prose(kSource / "README.md"), testing::HasSubstr("(apps/" + name + ".md)"));
   }
 }
 
@@ -258,7 +258,7 @@ TEST(Pages, NameOptionsOfTheirPrograms) {
   std::size_t checked = 0;
   for (const fs::path& page : pages()) {
     if (page.parent_path() != kSource / "apps" || page.stem() == "MESSAGES") continue;
-    const std::string prose = std::regex_replace(prose_of(page), std::regex("\n"), " ");
+    const std::string prose = std::regex_replace(read_prose(page), std::regex("\n"), " ");
     for (const std::string& code : matches(prose, "`([^`]+)`")) {
       // On a program's page an option alone is its own; elsewhere only those with a program count.
       const std::string first = code.substr(0, code.find(' '));
@@ -296,7 +296,7 @@ TEST(Pages, DefineEachMetricOnce) {
       defined.push_back(name);
       const auto kind = metric_kind(name);
       ASSERT_TRUE(kind) << name;
-      EXPECT_EQ(kind->asked == Direction::at_least, at_least) << name;
+      EXPECT_EQ(kind->direction == Direction::at_least, at_least) << name;
       EXPECT_EQ(kind->of_camera, of_camera) << name;
     }
   }
@@ -313,7 +313,7 @@ TEST(Pages, ReadmeFitsOnOnePage) { EXPECT_LE(fs::file_size(kSource / "README.md"
 TEST(Pages, LinksHaveTargets) {
   std::size_t links = 0;
   for (const fs::path& page : pages()) {
-    for (const std::string& link : matches(prose_of(page), "\\]\\(([^)\\s]+)\\)")) {
+    for (const std::string& link : matches(read_prose(page), "\\]\\(([^)\\s]+)\\)")) {
       if (link.starts_with("https://")) continue;
       ++links;
       const auto hash = std::min(link.find('#'), link.size());
@@ -334,7 +334,7 @@ TEST(Pages, PathsExist) {
   std::size_t paths = 0;
   for (const fs::path& page : pages()) {
     if (name_of_page(page) == "CHANGELOG.md") continue;  // of what has been
-    for (const std::string& name : matches(prose_of(page), path)) {
+    for (const std::string& name : matches(read_prose(page), path)) {
       ++paths;
       EXPECT_TRUE(is_there(page, name)) << name_of_page(page) << ": " << name;
     }
@@ -393,7 +393,7 @@ constexpr Question kQuestions[] = {
 };
 
 /// The text under a heading, down to the next, as one line.
-std::string section_of(const fs::path& page, const std::string& heading) {
+std::string read_section(const fs::path& page, const std::string& heading) {
   std::string text;
   bool inside = false;
   for (const std::string& line : lines_in(page)) {
@@ -411,14 +411,15 @@ TEST(Pages, AnswerQuestionsWithinTwoClicks) {
   std::set<std::string> reached{"README.md"};
   for (int click = 0; click < 2; ++click) {
     for (const std::string& page : std::set(reached)) {
-      for (const std::string& link : matches(prose_of(kSource / page), "\\]\\(([^)#\\s]+\\.md)")) {
+      for (const std::string& link :
+           matches(read_prose(kSource / page), "\\]\\(([^)#\\s]+\\.md)")) {
         reached.insert((fs::path(page).parent_path() / link).lexically_normal().string());
       }
     }
   }
   for (const auto& [asked, page, section, words] : kQuestions) {
     EXPECT_TRUE(reached.contains(page)) << asked << " " << page;
-    const std::string text = section_of(kSource / page, section);
+    const std::string text = read_section(kSource / page, section);
     EXPECT_NE(text, "") << asked;
     EXPECT_THAT(text, testing::HasSubstr(words)) << asked;
   }
@@ -426,16 +427,16 @@ TEST(Pages, AnswerQuestionsWithinTwoClicks) {
 
 TEST(Pages, EachJsonDocumentHasSchema) {
   std::set<std::string> writers, have_schemas;
-  for (const fs::path& file : files_of({".cpp", ".h", ".py", ".sh"})) {
+  for (const fs::path& file : find_files({".cpp", ".h", ".py", ".sh"})) {
     const std::string name = name_of_page(file);
     if (name.starts_with("tests/") || name.ends_with("/files.py")) continue;  // json_text() itself
-    const std::string text = TemporaryFolder::content_of(file);
+    const std::string text = TemporaryFolder::read_content(file);
     const std::regex writes("\\.dump\\(|json_text\\(|json\\.dumps?\\(");
     if (std::regex_search(text, writes)) writers.insert(name);
   }
-  const std::string page = prose_of(kSource / "datasets/README.md");
+  const std::string page = read_prose(kSource / "datasets/README.md");
   for (const auto& schema : fs::directory_iterator(kSource / "datasets/schemas")) {
-    const std::string text = TemporaryFolder::content_of(schema.path());
+    const std::string text = TemporaryFolder::read_content(schema.path());
     EXPECT_THAT(page, testing::HasSubstr("(schemas/" + schema.path().filename().string() + ")"));
     const auto line = matches(text, "\"\\$comment\": \"(written by [^\"]+)\"");
     ASSERT_EQ(line.size(), 1U) << schema.path();
@@ -452,12 +453,12 @@ TEST(Pages, EachJsonDocumentHasSchema) {
 
 TEST(Pages, NamedTestsAndBenchmarksExist) {
   std::string tests;
-  for (const fs::path& file : files_of({".cpp", ".txt", ".sh"})) {
-    if (name_of_page(file).starts_with("tests/")) tests += TemporaryFolder::content_of(file);
+  for (const fs::path& file : find_files({".cpp", ".txt", ".sh"})) {
+    if (name_of_page(file).starts_with("tests/")) tests += TemporaryFolder::read_content(file);
   }
   std::size_t programs = 0;
   for (const fs::path& page : pages()) {
-    const std::string prose = prose_of(page);
+    const std::string prose = read_prose(page);
     for (const std::string& name : matches(prose, "build/tests/benchmarks/([a-z_]+)")) {
       ++programs;
       EXPECT_TRUE(fs::exists(kSource / "tests/benchmarks" / (name + ".cpp")) ||
@@ -472,10 +473,10 @@ TEST(Pages, NamedTestsAndBenchmarksExist) {
 }
 
 TEST(Pages, TheoryHasCitedSections) {
-  const auto headings = headings_of(kSource / "lib/THEORY.md");
+  const auto headings = find_headings(kSource / "lib/THEORY.md");
   std::size_t citations = 0;
-  for (const fs::path& file : files_of({".h", ".cpp"})) {
-    std::string text = TemporaryFolder::content_of(file);
+  for (const fs::path& file : find_files({".h", ".cpp"})) {
+    std::string text = TemporaryFolder::read_content(file);
     text = std::regex_replace(text, std::regex("\n */// ?"), " ");
     for (const std::string& heading : matches(text, "lib/THEORY\\.md, \"([^\"]+)\"")) {
       ++citations;
@@ -492,7 +493,7 @@ struct Literal {
 };
 
 /// In their order. What is no literal stands in `code`, with the literals empty.
-std::vector<Literal> literals_of(const std::string& source, std::string& code) {
+std::vector<Literal> find_literals(const std::string& source, std::string& code) {
   std::vector<Literal> literals;
   std::size_t statement = 0;
   bool joins = false;  // nothing but blanks since the literal before
@@ -545,7 +546,7 @@ std::vector<std::string> messages_in(const fs::path& file) {
   std::string code;
   std::vector<std::string> messages;
   std::size_t last = std::string::npos;
-  for (const Literal& literal : literals_of(TemporaryFolder::content_of(file), code)) {
+  for (const Literal& literal : find_literals(TemporaryFolder::read_content(file), code)) {
     const auto end = std::min(code.find_first_of(";", literal.statement), code.size());
     const std::string statement = code.substr(literal.statement, end - literal.statement);
     if (!std::regex_search(statement, tells) &&
@@ -565,7 +566,7 @@ std::vector<std::string> messages_in(const fs::path& file) {
 
 /// The scripts of reprocessing, which are programs, too.
 std::vector<fs::path> scripts_of_programs() {
-  auto files = files_of({".py", ".sh"});
+  auto files = find_files({".py", ".sh"});
   std::erase_if(files, [](const fs::path& file) {
     return !name_of_page(file).starts_with("scripts/reprocess");
   });
@@ -617,7 +618,7 @@ std::vector<std::string> explained_messages() {
 }
 
 std::vector<fs::path> sources_of_programs() {
-  auto files = files_of({".cpp", ".h"});
+  auto files = find_files({".cpp", ".h"});
   std::erase_if(files,
                 [](const fs::path& file) { return name_of_page(file).starts_with("tests/"); });
   return files;
@@ -628,12 +629,12 @@ TEST(Messages, ExplainedOnesCanOccur) {
   for (const fs::path& file : sources_of_programs()) {
     sources.emplace_back();
     std::string code;
-    for (const Literal& literal : literals_of(TemporaryFolder::content_of(file), code)) {
+    for (const Literal& literal : find_literals(TemporaryFolder::read_content(file), code)) {
       sources.back().append(literal.text).append("\n");
     }
   }
   for (const fs::path& file : scripts_of_programs()) {
-    sources.push_back(TemporaryFolder::content_of(file));
+    sources.push_back(TemporaryFolder::read_content(file));
   }
   const auto said = [&](const std::string& message) {
     return std::any_of(sources.begin(), sources.end(),

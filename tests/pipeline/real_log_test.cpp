@@ -52,7 +52,7 @@ class RealLog : public testing::Test {
     if (log.empty()) GTEST_SKIP() << "no real captures: set VLP_REAL_DATA_DIR";
     calibration = folder
                       .file("calibration.yaml",
-                            calibration_in(TemporaryFolder::content_of(log / "README.md")))
+                            calibration_in(TemporaryFolder::read_content(log / "README.md")))
                       .string();
   }
   std::string in_log(const char* name) const { return "'" + (log / name).string() + "' "; }
@@ -177,7 +177,7 @@ double path_over_fixes(const std::vector<Eigen::Vector2d>& driven,
     Eigen::Vector4d right = Eigen::Vector4d::Zero();
     for (const Eigen::Vector2d& fix : fixes) {
       const Eigen::Vector2d at = turn * fix + shift;
-      const Eigen::Vector2d off = at - nearest_on(driven, at);
+      const Eigen::Vector2d off = at - find_nearest_on_polyline(driven, at);
       if (off.norm() < 1e-9) continue;
       const Eigen::Vector2d n = off.normalized();
       const Eigen::Vector4d row(n.dot(at), n.dot(Eigen::Vector2d(-at.y(), at.x())), n.x(), n.y());

@@ -40,13 +40,12 @@ class VlpEvaluateReport : public testing::Test {
          in("calibration.yaml") + " --plot" + in("dispersion.svg"));
     must("vlp-locate " + kExample + "detections.csv" + rig(kExample + "calibration.yaml") + " -o" +
          in("fixes.csv"));
-    draw(
-        folder / "camera.svg",
-        drawing_of(IntrinsicsPlot{"unit 7",
-                                  {800, 600},
-                                  {{{10, 20}, {0.1, 0.2}, false}, {{700, 500}, {-0.1, 0.1}, false}},
-                                  2,
-                                  {0.1, 0.2, 0.3, 0.4}}));
+    draw(folder / "camera.svg", make_drawing(IntrinsicsPlot{"unit 7",
+                                                            {800, 600},
+                                                            {{{10, 20}, {0.1, 0.2}, false},
+                                                             {{700, 500}, {-0.1, 0.1}, false}},
+                                                            2,
+                                                            {0.1, 0.2, 0.3, 0.4}}));
     folder.file("track.csv",
                 "image,status,x_m,y_m,z_m,yaw_rad,sd_x_m,sd_y_m,sd_z_m,sd_yaw_rad,"
                 "lamps,residual_px\n0,ok,0,0.001,0,0,,,,,3,0.1\n"
@@ -81,12 +80,12 @@ TEST_F(VlpEvaluateReport, PassesBrowserCheck) {
 
 TEST_F(VlpEvaluateReport, IsReproducibleAndWrittenWhenGateFails) {
   ASSERT_EQ(evaluate(all()).exit_code, 0);
-  const std::string first = TemporaryFolder::content_of(folder / "report.html");
+  const std::string first = TemporaryFolder::read_content(folder / "report.html");
   EXPECT_THAT(first, Not(HasSubstr((folder / "").string()))) << "paths of a machine";
   ASSERT_EQ(evaluate(all() + " --threads 1").exit_code, 0);
-  EXPECT_EQ(TemporaryFolder::content_of(folder / "report.html"), first);
+  EXPECT_EQ(TemporaryFolder::read_content(folder / "report.html"), first);
   EXPECT_EQ(evaluate(" --gate p90_mm=0.001").exit_code, 1);
-  EXPECT_THAT(TemporaryFolder::content_of(folder / "report.html"),
+  EXPECT_THAT(TemporaryFolder::read_content(folder / "report.html"),
               HasSubstr("FAIL</strong>1 of 2"));
 }
 
@@ -109,7 +108,7 @@ TEST_F(VlpEvaluateReport, RejectsInvalidContent) {
 std::string good_page() {
   Report report{"unit 7", {{"mean_mm", "mm", 0.5, 1, Direction::at_most}}, {}, {}, {}, {}, {}};
   report.pictures = {
-      report_picture(drawing_of(CdfPlot{"errors", {{"fixes", {0.001, 0.002}, 0.001, 0.002}}}))};
+      make_report_plot(make_drawing(CdfPlot{"errors", {{"fixes", {0.001, 0.002}, 0.001, 0.002}}}))};
   return report_html(report);
 }
 

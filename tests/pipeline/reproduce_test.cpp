@@ -30,7 +30,7 @@ class ReproducePaper : public testing::Test {
 
   void SetUp() override {
     std::string scene =
-        TemporaryFolder::content_of(VLP_SOURCE_DIR "/datasets/paper-rig-faulty/scene.yaml");
+        TemporaryFolder::read_content(VLP_SOURCE_DIR "/datasets/paper-rig-faulty/scene.yaml");
     scene.resize(scene.find("captures:\n"));
     std::filesystem::create_directory(folder / "few");
     folder.file("few/scene.yaml", scene + kFewCaptures);

@@ -52,13 +52,13 @@ TEST_F(VlpRotation, KeepsCameraAndReplacesRotationCenter) {
 
 TEST_F(VlpRotation, GivesSameBytesTwice) {
   const auto first = rotation(kExample + "turning.csv", "--plot " + (folder / "a.png").string());
-  const std::string calibration = TemporaryFolder::content_of(output);
+  const std::string calibration = TemporaryFolder::read_content(output);
   const auto second = rotation(kExample + "turning.csv", "--plot " + (folder / "b.png").string());
-  EXPECT_EQ(TemporaryFolder::content_of(output), calibration);
+  EXPECT_EQ(TemporaryFolder::read_content(output), calibration);
   EXPECT_EQ(first.output, second.output);
-  const std::string picture = TemporaryFolder::content_of(folder / "a.png");
+  const std::string picture = TemporaryFolder::read_content(folder / "a.png");
   EXPECT_THAT(picture, StartsWith("\x89PNG"));
-  EXPECT_EQ(TemporaryFolder::content_of(folder / "b.png"), picture);
+  EXPECT_EQ(TemporaryFolder::read_content(folder / "b.png"), picture);
 }
 
 /// Lamps at 2.4 to 2.6 m, camera at one height. Rendered images give realistic noise.

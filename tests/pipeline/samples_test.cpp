@@ -69,7 +69,7 @@ TEST_P(RenderedSamples, MatchScene) {
       expect_same_picture(entry, rendered);
       ++images;
     } else {
-      EXPECT_EQ(TemporaryFolder::content_of(rendered), TemporaryFolder::content_of(entry));
+      EXPECT_EQ(TemporaryFolder::read_content(rendered), TemporaryFolder::read_content(entry));
     }
   }
   EXPECT_GE(images, 1);

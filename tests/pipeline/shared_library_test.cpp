@@ -25,8 +25,8 @@ std::vector<std::string> headers() {
   return names;
 }
 
-std::string text_of(const std::string& header) {
-  return TemporaryFolder::content_of(std::filesystem::path(VLP_SOURCE_DIR "/lib") / header);
+std::string read_header(const std::string& header) {
+  return TemporaryFolder::read_content(std::filesystem::path(VLP_SOURCE_DIR "/lib") / header);
 }
 
 /// The words of the headers that are installed.
@@ -34,7 +34,7 @@ std::set<std::string> words_of_headers() {
   std::set<std::string> words;
   const std::regex word("[A-Za-z_][A-Za-z0-9_]*");
   for (const std::string& header : headers()) {
-    const std::string text = text_of(header);
+    const std::string text = read_header(header);
     for (std::sregex_iterator at(text.begin(), text.end(), word), end; at != end; ++at) {
       words.insert(at->str());
     }
@@ -85,7 +85,7 @@ TEST(SharedLibrary, ExportsOnlyDeclaredSymbols) {
 
 TEST(SharedLibrary, ExportsAllFunctionsOfCHeader) {
   const auto shown = run_program("nm -D --defined-only '" VLP_SHARED_LIBRARY "'");
-  const std::string text = text_of("positioning/vlp.h");
+  const std::string text = read_header("positioning/vlp.h");
   const std::regex function(
       "\n[a-z_0-9]+\\*? \\*?(vlp_[a-z_]+)\\(|\nconst char\\* (vlp_[a-z_]+)\\(");
   std::size_t functions = 0;
@@ -102,7 +102,7 @@ TEST(SharedLibrary, ExportsAllFunctionsOfCHeader) {
 TEST(SharedLibrary, HasProcessorIndependentLayout) {
   const std::regex matrix("Eigen::(?:Matrix<double, ([0-9]+), ([0-9]+)>|(Matrix|Vector)([24])d)");
   for (const std::string& header : headers()) {
-    const std::string text = text_of(header);
+    const std::string text = read_header(header);
     if (!header.ends_with("types.h")) {
       for (std::sregex_iterator at(text.begin(), text.end(), matrix), end; at != end; ++at) {
         const auto& found = *at;

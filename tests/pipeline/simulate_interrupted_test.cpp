@@ -27,7 +27,7 @@ TEST_F(VlpSimulateInterrupted, RendersOnlyMissingFiles) {
     ASSERT_TRUE(std::filesystem::remove(output / name));
   }
   std::map<std::string, std::pair<ino_t, std::filesystem::file_time_type>> before;
-  for (const std::string& image : images_of(files_below(output))) {
+  for (const std::string& image : find_images(files_below(output))) {
     before[image] = {file_number(output / image), last_write_time(output / image)};
   }
   ASSERT_EQ(before.size(), 21U);
@@ -53,7 +53,7 @@ TEST_F(VlpSimulateInterrupted, StartsInEmptyFolder) {
   EXPECT_EQ(simulate("--only boards").exit_code, 0);
 }
 
-// That is how it is left when the program is killed as it writes there first; see WholeFile.
+// That is how it is left when the program is killed as it writes there first; see AtomicFileWriter.
 TEST_F(VlpSimulateInterrupted, StartsInFolderWithTemporaryFile) {
   ASSERT_TRUE(std::filesystem::create_directory(output));
   folder.file("output/.scene.yaml.tmp-123-0", "# vlp-sim");
@@ -82,7 +82,7 @@ TEST_F(VlpSimulateInterrupted, LeavesCompleteImagesAfterKill) {
         ASSERT_TRUE(content == expected.at(name)) << name;
       }
       incomplete += left.size() < expected.size() ? 1 : 0;
-      begun += images_of(left).empty() ? 0 : 1;
+      begun += find_images(left).empty() ? 0 : 1;
     }
     const auto result = simulate("--threads 2");
     ASSERT_EQ(result.exit_code, 0) << result.errors;

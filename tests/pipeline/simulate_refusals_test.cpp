@@ -67,7 +67,7 @@ TEST_F(VlpSimulateErrors, NameOutputThatCannotBeCreated) {
   expect_refused("", output.string() + ": cannot be made: Not a directory");
   output = output / "below";
   expect_refused("", output.string() + ": cannot be made: Not a directory");
-  EXPECT_EQ(TemporaryFolder::content_of(folder / "file"), "mine\n");
+  EXPECT_EQ(TemporaryFolder::read_content(folder / "file"), "mine\n");
 }
 
 TEST_F(VlpSimulateErrors, NameLineAndKeyOfInvalidScene) {

@@ -21,7 +21,7 @@ TEST_F(VlpSimulate, WritesCapturesWithGroundTruth) {
   ASSERT_EQ(result.exit_code, 0) << result.errors;
   EXPECT_EQ(result.output, "rendered 24 captures, 0 were there; in " + output.string() + "\n");
   const Files files = files_below(output);
-  EXPECT_EQ(images_of(files).size(), 24U);
+  EXPECT_EQ(find_images(files).size(), 24U);
   std::set<std::string> others;
   for (const auto& [name, content] : files) {
     if (!name.ends_with(".png")) others.insert(name);
@@ -51,7 +51,7 @@ TEST_F(VlpSimulate, ChangesImagesButNotRigWithSeed) {
   const Files first = undisturbed();
   EXPECT_TRUE(undisturbed("--seed 1") == first) << "the scene's own";
   const Files other = undisturbed("--seed 2");
-  for (const std::string& image : images_of(first)) EXPECT_NE(first.at(image), other.at(image));
+  for (const std::string& image : find_images(first)) EXPECT_NE(first.at(image), other.at(image));
   for (const std::string name :
        {"lamps.yaml", "true_lamps.yaml", "board.yaml", "true_calibration.yaml"}) {
     EXPECT_EQ(first.at(name), other.at(name)) << name;
@@ -64,7 +64,7 @@ TEST_F(VlpSimulate, RendersSingleFolderIdentically) {
   const auto result = simulate("--only boards");
   EXPECT_EQ(result.output, "rendered 8 captures, 0 were there; in " + output.string() + "\n");
   const Files boards = files_below(output);
-  EXPECT_EQ(images_of(boards).size(), 8U);
+  EXPECT_EQ(find_images(boards).size(), 8U);
   for (const auto& [name, content] : boards) EXPECT_TRUE(all.at(name) == content) << name;
   EXPECT_EQ(simulate("--only lamps,boards").output,
             "rendered 16 captures, 8 were there; in " + output.string() + "\n");
@@ -110,7 +110,7 @@ TEST_F(VlpSimulate, PrintsNothingWhenQuiet) {
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_EQ(result.output, "");
   EXPECT_EQ(result.errors, "");
-  EXPECT_EQ(images_of(files_below(output)).size(), 24U);
+  EXPECT_EQ(find_images(files_below(output)).size(), 24U);
 }
 
 /// The largest differences of the fixes that vlp-locate makes of the true detections.

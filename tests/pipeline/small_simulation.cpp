@@ -43,12 +43,13 @@ Files files_below(const fs::path& folder) {
   Files files;
   for (const auto& entry : fs::recursive_directory_iterator(folder)) {
     if (!entry.is_regular_file() || entry.path().filename().string().starts_with('.')) continue;
-    files[fs::relative(entry.path(), folder).string()] = TemporaryFolder::content_of(entry.path());
+    files[fs::relative(entry.path(), folder).string()] =
+        TemporaryFolder::read_content(entry.path());
   }
   return files;
 }
 
-std::vector<std::string> images_of(const Files& files) {
+std::vector<std::string> find_images(const Files& files) {
   std::vector<std::string> images;
   for (const auto& [name, content] : files) {
     if (name.ends_with(".png")) images.push_back(name);
@@ -57,7 +58,7 @@ std::vector<std::string> images_of(const Files& files) {
 }
 
 void SmallSimulation::change_scene(const std::string& from, const std::string& to) {
-  std::string yaml = TemporaryFolder::content_of(scene);
+  std::string yaml = TemporaryFolder::read_content(scene);
   const auto at = yaml.find(from);
   ASSERT_NE(at, std::string::npos) << from;
   folder.file("scene.yaml", yaml.replace(at, from.size(), to));

@@ -21,7 +21,7 @@ using Files = std::map<std::string, std::string>;
 Files files_below(const std::filesystem::path& folder);
 
 /// The names alone, of the images among them.
-std::vector<std::string> images_of(const Files& files);
+std::vector<std::string> find_images(const Files& files);
 
 /// Tests of vlp-simulate with the small scene, as it is or changed.
 class SmallSimulation : public testing::Test {

@@ -41,7 +41,7 @@ SmallStation::SmallStation() {
 void SmallStation::change(const std::string& file, const std::string& from,
                           const std::string& to) const {
   const std::string name = "station/" + file;
-  std::string text = TemporaryFolder::content_of(folder / name);
+  std::string text = TemporaryFolder::read_content(folder / name);
   const auto at = text.find(from);
   ASSERT_NE(at, std::string::npos) << from;
   folder.file(name, text.replace(at, from.size(), to));
@@ -70,7 +70,7 @@ std::vector<fs::path> SmallStation::images(const std::string& step) const {
 }
 
 std::string SmallStation::with_inclinations(const std::string& step) const {
-  std::istringstream lines(TemporaryFolder::content_of(folder / "unit" / step / "captures.csv"));
+  std::istringstream lines(TemporaryFolder::read_content(folder / "unit" / step / "captures.csv"));
   std::string table, line;
   while (std::getline(lines, line)) {
     table += line + (table.empty() ? ",roll_rad,pitch_rad\n" : ",0.0002,-0.0001\n");
@@ -116,7 +116,7 @@ std::string SmallStation::result(const std::string& camera, const std::string& n
   for (const auto& run : fs::directory_iterator(results)) {
     if (!fs::exists(run.path() / name)) continue;
     EXPECT_EQ(content, "") << "more than one " << name;
-    content = TemporaryFolder::content_of(run.path() / name);
+    content = TemporaryFolder::read_content(run.path() / name);
   }
   return content;
 }

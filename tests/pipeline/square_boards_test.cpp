@@ -24,7 +24,7 @@ class VlpIntrinsicsSquareBoards : public VlpIntrinsics {
   /// The camera of paper-rig, before a board of this print.
   void render(const std::string& print, const std::string& views) const {
     std::string scene =
-        TemporaryFolder::content_of(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml");
+        TemporaryFolder::read_content(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml");
     const auto from = scene.find("{family:"), to = scene.find('}', from) + 1;
     scene.replace(from, to - from, print);
     scene.resize(scene.find("captures:"));
@@ -37,13 +37,13 @@ class VlpIntrinsicsSquareBoards : public VlpIntrinsics {
   double mean_error_px() const {
     const Camera truth = read_calibration(rig + "/true_calibration.yaml").camera;
     const Calibration found = read_calibration(folder / "camera.yaml");
-    return projection_difference(Lens(truth.lens_model, truth.intrinsics),
-                                 Lens(found.camera.lens_model, found.camera.intrinsics),
-                                 truth.imager_px, [](const auto&) { return 1; })
+    return compute_projection_difference(Lens(truth.lens_model, truth.intrinsics),
+                                         Lens(found.camera.lens_model, found.camera.intrinsics),
+                                         truth.imager_px, [](const auto&) { return 1; })
         ->mean_px;
   }
   std::string board_with(const std::string& from, const std::string& to) const {
-    std::string text = TemporaryFolder::content_of(rig + "/board.yaml");
+    std::string text = TemporaryFolder::read_content(rig + "/board.yaml");
     text.replace(text.find(from), from.size(), to);
     return folder.file("board.yaml", text).string();
   }
@@ -66,12 +66,12 @@ TEST_F(VlpIntrinsicsSquareBoards, GiveLensFromChessboard) {
   EXPECT_EQ(content("camera.cameramodel"), camera);
 
   // Turned by a quarter it is a board of 7 x 10.
-  std::string turned = TemporaryFolder::content_of(board);
+  std::string turned = TemporaryFolder::read_content(board);
   turned.replace(turned.find("cols: 10\nrows: 7"), 16, "cols: 7\nrows: 10");
   EXPECT_EQ(calibrate(boards, folder.file("turned.yaml", turned).string()).exit_code, 0);
   EXPECT_LT(mean_error_px(), 0.04);
 
-  std::string counted = TemporaryFolder::content_of(board);
+  std::string counted = TemporaryFolder::read_content(board);
   counted.replace(counted.find("cols: 10\nrows: 7"), 16, "cols: 9\nrows: 6");
   const auto corners = calibrate(boards, folder.file("counted.yaml", counted).string());
   EXPECT_EQ(corners.exit_code, 2);
@@ -140,7 +140,7 @@ TEST_F(VlpIntrinsicsSquareBoards, ArePrintedToScale) {
     ASSERT_EQ(
         run_program("pdftoppm -r 127 -gray -singlefile -png " + page + ".pdf " + page).exit_code,
         0);
-    const SeenBoard seen =
+    const BoardDetection seen =
         BoardDetector(print).detect(cv::imread(page + ".png", cv::IMREAD_GRAYSCALE));
     ASSERT_EQ(seen.points.size(), static_cast<std::size_t>((print.cols - 1) * (print.rows - 1)));
     const double width_px =

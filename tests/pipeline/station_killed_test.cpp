@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 using testing::HasSubstr;
 
 /// A number from the environment, for trials that take longer than a test may.
-int number_of(const char* variable, int otherwise) {
+int read_environment_number(const char* variable, int otherwise) {
   const char* text = std::getenv(variable);
   return text == nullptr ? otherwise : std::atoi(text);
 }
@@ -46,14 +46,14 @@ class VlpStationKilled : public SmallStation {
     const auto file = folder / "kept.json";
     const auto exported = records("export --camera-id b -o " + file.string());
     EXPECT_EQ(exported.exit_code, 0) << exported.errors;
-    return nlohmann::json::parse(TemporaryFolder::content_of(file));
+    return nlohmann::json::parse(TemporaryFolder::read_content(file));
   }
-  void kill_again_and_again(int kills) const;
+  void kill_repeatedly(int kills) const;
   void expect_all_there() const;
 };
 
-void VlpStationKilled::kill_again_and_again(int kills) const {
-  Random random(static_cast<unsigned>(number_of("VLP_STATION_SEED", 1)));
+void VlpStationKilled::kill_repeatedly(int kills) const {
+  Random random(static_cast<unsigned>(read_environment_number("VLP_STATION_SEED", 1)));
   for (int i = 0; i < kills; ++i) {
     arrive(static_cast<std::size_t>(random.uniform(0, 60)));
     const double wait_s = random.uniform(0, 2.5);
@@ -84,8 +84,8 @@ void VlpStationKilled::expect_all_there() const {
       EXPECT_EQ(sha256_of_file(file), image["sha256"].get<std::string>()) << file;
     }
     const auto results = folder / "station/results/b" / name;
-    EXPECT_EQ(TemporaryFolder::content_of(results / "calibration.yaml"), calibration);
-    EXPECT_THAT(TemporaryFolder::content_of(results / "report.html"), HasSubstr("</html>"));
+    EXPECT_EQ(TemporaryFolder::read_content(results / "calibration.yaml"), calibration);
+    EXPECT_THAT(TemporaryFolder::read_content(results / "report.html"), HasSubstr("</html>"));
   }
   // Nothing else is there: no calibration without a record.
   std::size_t results = 0;
@@ -98,7 +98,7 @@ void VlpStationKilled::expect_all_there() const {
 // As often as VLP_STATION_KILLS says.
 TEST_F(VlpStationKilled, ResumesUnit) {
   render();
-  kill_again_and_again(number_of("VLP_STATION_KILLS", 4));
+  kill_repeatedly(read_environment_number("VLP_STATION_KILLS", 4));
   expect_all_there();
 }
 
@@ -108,7 +108,7 @@ TEST_F(VlpStationKilled, ResumesUnitWithPostgres) {
   ASSERT_NE(server.uri(), "");
   change("station.yaml", "records: records.db", "records: \"" + server.uri() + "\"");
   render();
-  kill_again_and_again(number_of("VLP_STATION_KILLS", 3));
+  kill_repeatedly(read_environment_number("VLP_STATION_KILLS", 3));
   expect_all_there();
 }
 
@@ -222,7 +222,7 @@ TEST_F(VlpStationKilled, SurvivesFullDisk) {
   }
   for (const auto& entry : fs::recursive_directory_iterator(small)) {
     if (entry.path().filename() != "invalid-calibration.yaml") continue;
-    EXPECT_THAT(TemporaryFolder::content_of(entry.path()), HasSubstr("intrinsics: ["));
+    EXPECT_THAT(TemporaryFolder::read_content(entry.path()), HasSubstr("intrinsics: ["));
   }
   ::umount(small.c_str());
 }

@@ -258,7 +258,7 @@ TEST_F(VlpStationRecords, TrendReportsAlarm) {
             ContainsRegex("m1 +1 +2 +0[.]1 +0[.]1 +1[.]00 +0[.]5000   -1[.]171 to 1[.]371\n"),
             ContainsRegex("m2 +2[.]1 +2 +[-0-9.e]+ +0[.]1 "), ContainsRegex("all +0[.]05 "),
             ContainsRegex("slope +-0[.]09091 "), Not(HasSubstr("shows"))));
-  EXPECT_THAT(TemporaryFolder::content_of(folder / "bias.svg"), HasSubstr("<svg"));
+  EXPECT_THAT(TemporaryFolder::read_content(folder / "bias.svg"), HasSubstr("<svg"));
   EXPECT_THAT(records("study rms_px --reference m9=1").errors,
               HasSubstr("no judged run that has the figure is of: m9"));
   EXPECT_EQ(records("study rms_px --reference 500=1").exit_code, 2);

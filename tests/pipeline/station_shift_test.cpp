@@ -161,7 +161,7 @@ TEST_F(VlpStationShift, MemoryDoesNotGrow) {
   figures >> early_kb >> late_kb;
   EXPECT_GT(early_kb, 1000);
   EXPECT_LT(late_kb, 1.1 * early_kb);
-  EXPECT_THAT(TemporaryFolder::content_of(folder / "station/out"),
+  EXPECT_THAT(TemporaryFolder::read_content(folder / "station/out"),
               HasSubstr(units + " units: 0 passed, 0 failed, " + units + " invalid"));
 }
 
@@ -177,7 +177,7 @@ TEST_F(VlpStationShift, CallsHookForEachVerdict) {
               HasSubstr("INVALID   camera 0001   station-1\nHook     failed: exit code 3: no "
                         "labels; 'vlp-station hook' runs it again\n"));
   const auto seen =
-      nlohmann::json::parse(TemporaryFolder::content_of(folder / "station/seen.json"));
+      nlohmann::json::parse(TemporaryFolder::read_content(folder / "station/seen.json"));
   EXPECT_EQ(seen["camera"], "0001");
   EXPECT_EQ(seen["verdict"], "INVALID");
   EXPECT_EQ(seen["images"].size(), 4U);

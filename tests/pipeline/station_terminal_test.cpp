@@ -64,7 +64,7 @@ class Tmux {
 void expect_screen(const std::string& shown, const std::string& name) {
   const fs::path kept = fs::path(VLP_SOURCE_DIR) / "tests/pipeline/station_screens" / name;
   if (std::getenv("VLP_WRITE_SCREENS") != nullptr) std::ofstream(kept) << shown;
-  EXPECT_EQ(shown, TemporaryFolder::content_of(kept)) << name;
+  EXPECT_EQ(shown, TemporaryFolder::read_content(kept)) << name;
 }
 
 /// Measured figures differ in the last digits from one system to another.
@@ -124,7 +124,7 @@ TEST_F(VlpStationTerminal, GuidesOperatorThroughUnit) {
   // One second is wanted; the rest is for a machine that does other things, too.
   EXPECT_LT(wait.count(), 5);
   expect_screen(without_figures(verdict), "verdict.txt");
-  EXPECT_THAT(TemporaryFolder::content_of(folder / "log"), Not(HasSubstr("error")));
+  EXPECT_THAT(TemporaryFolder::read_content(folder / "log"), Not(HasSubstr("error")));
 }
 
 TEST_F(VlpStationTerminal, UsesColorAndStopsOnKey) {

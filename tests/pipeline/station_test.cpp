@@ -77,10 +77,10 @@ TEST_F(VlpStation, PassesGoodUnitAndKeepsRecord) {
             ContainsRegex("nominal_px +[0-9.e-]+ px"), HasSubstr("images     48, 48 used")));
   const auto exported = folder / "runs.json", picture = folder / "trend.svg";
   EXPECT_EQ(records("export -o " + exported.string()).exit_code, 0);
-  EXPECT_THAT(TemporaryFolder::content_of(exported), HasSubstr("vlp-calibration/1"));
+  EXPECT_THAT(TemporaryFolder::read_content(exported), HasSubstr("vlp-calibration/1"));
   EXPECT_EQ(problems_by_schema("runs", {exported}), "");
   EXPECT_THAT(records("trend rms_px -o " + picture.string()).output, HasSubstr("limits"));
-  EXPECT_THAT(TemporaryFolder::content_of(picture), HasSubstr("<svg"));
+  EXPECT_THAT(TemporaryFolder::read_content(picture), HasSubstr("<svg"));
 
   // The golden unit on the station as it was, and after a lamp has moved.
   folder.file("station/golden.yaml", calibration);
@@ -146,17 +146,17 @@ TEST_F(VlpStation, MatchesVlpCalibrate) {
     return std::regex_replace(calibration, std::regex("\n  pixel_pitch_m: [0-9.e-]+"), "");
   };
   EXPECT_EQ(comparable(result("0001", "calibration.yaml")),
-            comparable(TemporaryFolder::content_of(folder / "results/calibration.yaml")));
+            comparable(TemporaryFolder::read_content(folder / "results/calibration.yaml")));
 
   using Json = nlohmann::json;
   ASSERT_EQ(records("export -o " + (folder / "runs.json").string()).exit_code, 0);
   const Json figures =
-      Json::parse(TemporaryFolder::content_of(folder / "runs.json")).at(0).at("figures");
+      Json::parse(TemporaryFolder::read_content(folder / "runs.json")).at(0).at("figures");
   const auto of_station = [&](const std::string& name) {
     return figures.at(name).at("value").get<double>();
   };
   const auto of_session = [&](const char* file) {
-    return Json::parse(TemporaryFolder::content_of(folder / "results" / file));
+    return Json::parse(TemporaryFolder::read_content(folder / "results" / file));
   };
   const Json session = of_session("session.json");
   int same = 0;
@@ -175,7 +175,7 @@ TEST_F(VlpStation, MatchesVlpCalibrate) {
 
 TEST_F(VlpStation, NamesFaultOfLampsAndBoard) {
   render();
-  const auto lamps = TemporaryFolder::content_of(folder / "station/lamps.yaml");
+  const auto lamps = TemporaryFolder::read_content(folder / "station/lamps.yaml");
   change("lamps.yaml", "[0, 0.28, 1.6]", "[0.05, 0.27, 1.6]");
   const auto loose = run_program(batch("loose"));
   EXPECT_EQ(loose.exit_code, 3);
@@ -217,7 +217,7 @@ TEST_F(VlpStation, DoesNotFailUnitForStationFault) {
   fs::rename(folder / "captures.csv", table);
 
   // One capture of the check beside where its table has it.
-  const std::string said = TemporaryFolder::content_of(table);
+  const std::string said = TemporaryFolder::read_content(table);
   std::smatch x_m;
   ASSERT_TRUE(std::regex_search(said, x_m, std::regex("0003\\.png,[^,]*,([^,]*),")));
   std::string moved = said;
@@ -270,7 +270,7 @@ TEST_F(VlpStation, ReportsWrongRowTime) {
 
 TEST_F(VlpStation, ReportsWrongRowTimeOfGoldenUnit) {
   render("check");
-  const std::string right = TemporaryFolder::content_of(folder / "unit/true_calibration.yaml");
+  const std::string right = TemporaryFolder::read_content(folder / "unit/true_calibration.yaml");
   const std::string stated = "row_time_s: 0.00003";
   ASSERT_NE(right.find(stated), std::string::npos);
   change("station.yaml", "# The images of a unit",

@@ -83,7 +83,7 @@ TEST_F(VlpStationWatched, WaitsForTablesOfPlaces) {
   render();
   prepare("a");
   const auto table = captures("a") / "check/captures.csv";
-  const std::string places = TemporaryFolder::content_of(table);
+  const std::string places = TemporaryFolder::read_content(table);
   std::ofstream(table) << places.substr(0, places.size() - 5);  // cut short
   drop_all("a");
   const auto result =

@@ -35,7 +35,7 @@ class VlpTrain : public testing::Test {
     return run_program("vlp-train " + options + " -o " + output.string());
   }
   fs::path without(const std::string& line) const {
-    std::string calibration = TemporaryFolder::content_of(kRig + "/true_calibration.yaml");
+    std::string calibration = TemporaryFolder::read_content(kRig + "/true_calibration.yaml");
     const auto begin = calibration.find(line);
     calibration.erase(begin, calibration.find('\n', begin) + 1 - begin);
     return folder.file("without.yaml", calibration);
@@ -49,7 +49,7 @@ TEST_F(VlpTrain, MakesClassifierForVlpDetectAndVlpLocate) {
   ASSERT_EQ(trained.exit_code, 0) << trained.errors;
   EXPECT_THAT(trained.output, HasSubstr("right       100.00 %\n  wrong     0\n  unknown   0\n"));
   // On captures that it has not seen, without the map's frequencies and the row time.
-  std::string map = TemporaryFolder::content_of(kRig + "/lamps.yaml");
+  std::string map = TemporaryFolder::read_content(kRig + "/lamps.yaml");
   for (auto at = map.find(", frequency_hz"); at != std::string::npos;
        at = map.find(", frequency_hz")) {
     map.erase(at, map.find(", duty", at) - at);
@@ -83,9 +83,9 @@ TEST_F(VlpTrain, MakesClassifierForVlpDetectAndVlpLocate) {
 TEST_F(VlpTrain, GivesSameBytesForAllThreadCounts) {
   const std::string options = captures() + kLamps + kCalibration;
   ASSERT_EQ(train(options + " --threads 1").exit_code, 0);
-  const std::string one = TemporaryFolder::content_of(output);
+  const std::string one = TemporaryFolder::read_content(output);
   ASSERT_EQ(train(options + " --threads 4").exit_code, 0);
-  EXPECT_EQ(TemporaryFolder::content_of(output), one);
+  EXPECT_EQ(TemporaryFolder::read_content(output), one);
 }
 
 TEST_F(VlpTrain, NamesLampsWithTooFewLights) {
@@ -119,7 +119,7 @@ TEST_F(VlpTrain, EstimatesRowTimeAndReadoutDirection) {
   const auto bare = run_program("vlp-train --row-time " + (folder / "images").string() + kLamps);
   ASSERT_EQ(bare.exit_code, 0) << bare.errors;
   EXPECT_THAT(bare.output, HasSubstr("read-out    along rows"));
-  std::string calibration = TemporaryFolder::content_of(without("  row_time_s"));
+  std::string calibration = TemporaryFolder::read_content(without("  row_time_s"));
   calibration.erase(calibration.find("  readout"), 16);
   const auto result = train("--row-time " + (folder / "images").string() + kLamps +
                             " --calibration " + folder.file("bare.yaml", calibration).string());
@@ -152,7 +152,7 @@ TEST_F(VlpTrain, EstimatesRowTimeFromLampPositions) {
     EXPECT_THAT(result.output, HasSubstr("of 5 lamps"));
   }
   // Frequencies elsewhere in the room: the places fit neither row time.
-  std::string map = TemporaryFolder::content_of(lamps);
+  std::string map = TemporaryFolder::read_content(lamps);
   map.replace(map.find("[-0.6, 0.3"), 10, "[0.6, 0.32");
   map.replace(map.find("[0.6, 0.3,"), 10, "[-0.6, 0.3,");
   const auto swapped = run_program(command + folder.file("swapped.yaml", map).string());
@@ -164,7 +164,7 @@ TEST_F(VlpTrain, EstimatesRowTimeFromLampPositions) {
 /// The classifier is still trained, because it identifies lamps without the row time.
 TEST_F(VlpTrain, ReportsBothRowTimesIfGivenOneIsWrong) {
   const std::string images = captures();
-  const std::string right = TemporaryFolder::content_of(kRig + "/true_calibration.yaml");
+  const std::string right = TemporaryFolder::read_content(kRig + "/true_calibration.yaml");
   const std::string stated = "row_time_s: 0.00003";
   ASSERT_NE(right.find(stated), std::string::npos);
   for (const std::string wrong_us : {"28.5", "37.5"}) {
@@ -211,7 +211,7 @@ TEST_F(VlpTrain, ReportsAmbiguousRowTime) {
 
 TEST_F(VlpTrain, EstimatesColumnReadoutForVlpDetect) {
   const std::string wide = VLP_SOURCE_DIR "/datasets/wide/rendered";
-  std::string calibration = TemporaryFolder::content_of(wide + "/true_calibration.yaml");
+  std::string calibration = TemporaryFolder::read_content(wide + "/true_calibration.yaml");
   calibration.erase(calibration.find("  readout: columns\n"), 19);
   const std::string command = "vlp-detect " + wide + "/sample --lamps " + wide + "/lamps.yaml -o " +
                               (folder / "found.csv").string() + " --calibration " +
@@ -240,7 +240,7 @@ TEST_F(VlpTrain, ClassifierMustMatchLampsAndCamera) {
   EXPECT_THAT(
       refusal(" --lamps " VLP_SOURCE_DIR "/datasets/wide/rendered/lamps.yaml", kCalibration),
       HasSubstr("trained.yaml: lamp 1 is not in"));
-  std::string calibration = TemporaryFolder::content_of(kRig + "/true_calibration.yaml");
+  std::string calibration = TemporaryFolder::read_content(kRig + "/true_calibration.yaml");
   calibration.replace(calibration.find("0.00003"), 7, "0.00004");
   EXPECT_THAT(refusal(kLamps, " --calibration " + folder.file("other.yaml", calibration).string()),
               HasSubstr("trained.yaml: row_time_s is 3e-05"));
@@ -253,7 +253,7 @@ TEST_F(VlpTrain, ClassifierMustMatchLampsAndCamera) {
 }
 
 TEST_F(VlpTrain, IsNotRequiredForWarningOfInseparableLamps) {
-  std::string map = TemporaryFolder::content_of(kRig + "/lamps.yaml");
+  std::string map = TemporaryFolder::read_content(kRig + "/lamps.yaml");
   map.replace(map.find("2000"), 4, "1620");
   const std::string command = "vlp-detect " + kRig + "/sample" + kCalibration + " --lamps " +
                               folder.file("alike.yaml", map).string() + " -o " +

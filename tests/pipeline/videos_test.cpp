@@ -23,7 +23,8 @@ using testing::Not;
 using testing::StartsWith;
 
 /// Writes a video of the images in a folder, each repeated `times` times. Returns false on failure.
-bool film_of(const fs::path& file, const fs::path& folder, int times, const char* codec = "FFV1") {
+bool write_video_of_folder(const fs::path& file, const fs::path& folder, int times,
+                           const char* codec = "FFV1") {
   std::vector<cv::Mat> frames;
   for (const auto& image : list_images(folder)) {
     for (int i = 0; i < times; ++i) frames.push_back(read_image(image));
@@ -52,7 +53,7 @@ class VlpDetectVideo : public testing::Test {
 
 TEST_F(VlpDetectVideo, YieldsSameDetectionsAsImages) {
   const std::string film = (folder / "drive.avi").string();
-  if (!film_of(film, kRig + "/sample", 1)) GTEST_SKIP() << "OpenCV writes no FFV1";
+  if (!write_video_of_folder(film, kRig + "/sample", 1)) GTEST_SKIP() << "OpenCV writes no FFV1";
   ASSERT_EQ(detect(kRig + "/sample", "images.csv").exit_code, 0);
   const auto found = detect(film, "film.csv",
                             "--annotate " + (folder / "pictures").string() + " --captures " +
@@ -60,9 +61,9 @@ TEST_F(VlpDetectVideo, YieldsSameDetectionsAsImages) {
   ASSERT_EQ(found.exit_code, 0) << found.errors;
   EXPECT_EQ(found.errors, "");
   EXPECT_THAT(found.output, HasSubstr("images      2\n"));
-  const std::string table = TemporaryFolder::content_of(folder / "film.csv");
+  const std::string table = TemporaryFolder::read_content(folder / "film.csv");
   EXPECT_EQ(with(with(table, "drive.avi#000000", "0000.png"), "drive.avi#000001", "0001.png"),
-            TemporaryFolder::content_of(folder / "images.csv"));
+            TemporaryFolder::read_content(folder / "images.csv"));
   EXPECT_TRUE(fs::exists(folder / "pictures/drive.avi#000001.png"));
   EXPECT_NEAR(*read_captures(folder / "captures.csv").at("drive.avi#000001").time_s, 0.05, 1e-9);
   // Both go on to the fixes.
@@ -71,10 +72,11 @@ TEST_F(VlpDetectVideo, YieldsSameDetectionsAsImages) {
                                    "/lamps.yaml --calibration " + kRig +
                                    "/true_calibration.yaml -o " + (folder / "fixes.csv").string());
   EXPECT_EQ(located.exit_code, 0) << located.errors;
-  EXPECT_THAT(TemporaryFolder::content_of(folder / "fixes.csv"), HasSubstr("drive.avi#000001,ok"));
+  EXPECT_THAT(TemporaryFolder::read_content(folder / "fixes.csv"),
+              HasSubstr("drive.avi#000001,ok"));
 
   ASSERT_EQ(detect(film, "first.csv", "--every 2").exit_code, 0);
-  EXPECT_THAT(TemporaryFolder::content_of(folder / "first.csv"),
+  EXPECT_THAT(TemporaryFolder::read_content(folder / "first.csv"),
               Not(HasSubstr("drive.avi#000001")));
 }
 
@@ -97,11 +99,11 @@ TEST_F(VlpDetectVideo, ReportsErrorInOneLine) {
   EXPECT_THAT(located.errors, HasSubstr("is a video: vlp-detect finds the lamps in it"));
 
   const std::string film = (folder / "drive.avi").string();
-  if (!film_of(film, kRig + "/sample", 6)) GTEST_SKIP() << "OpenCV writes no FFV1";
+  if (!write_video_of_folder(film, kRig + "/sample", 6)) GTEST_SKIP() << "OpenCV writes no FFV1";
   const auto over = detect(film, "drive.avi");
   EXPECT_EQ(over.errors,
             "vlp-detect: error: " + film + ": is an input, too, and would be overwritten\n");
-  const std::string bytes = TemporaryFolder::content_of(film);
+  const std::string bytes = TemporaryFolder::read_content(film);
   const std::string cut = folder.file("cut.avi", bytes.substr(0, bytes.size() * 6 / 10)).string();
   const auto result = detect(cut, "found.csv");
   EXPECT_EQ(result.exit_code, 0);
@@ -113,14 +115,15 @@ class BoardVideo : public VlpIntrinsics {};
 
 TEST_F(BoardVideo, YieldsSameCornersAsImages) {
   const std::string rig = (folder / "rig").string(), board = rig + "/board.yaml";
-  std::string scene = TemporaryFolder::content_of(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml");
+  std::string scene =
+      TemporaryFolder::read_content(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml");
   scene = with(scene, "views: {count: 36", "views: {count: 12");
   ASSERT_EQ(run_program("vlp-simulate -q " + folder.file("scene.yaml", scene).string() +
                         " --only boards -o " + rig)
                 .exit_code,
             0);
   const std::string film = (folder / "boards.avi").string();
-  if (!film_of(film, rig + "/boards", 2)) GTEST_SKIP() << "OpenCV writes no FFV1";
+  if (!write_video_of_folder(film, rig + "/boards", 2)) GTEST_SKIP() << "OpenCV writes no FFV1";
   // Few views: gates are not met.
   const auto of_images = calibrate(rig + "/boards", board);
   ASSERT_LE(of_images.exit_code, 1) << of_images.errors;

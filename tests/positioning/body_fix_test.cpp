@@ -74,9 +74,9 @@ Sensors sensors_for(const BodyState& state, const Estimated& estimated) {
 }
 
 void expect_state(const Fix& fix, const BodyState& state, double tolerance) {
-  ASSERT_TRUE(fix.ok()) << name_of(fix.status);
+  ASSERT_TRUE(fix.ok()) << to_string(fix.status);
   EXPECT_THAT(fix.estimate.pose.position_m, IsNear(state.pose.position_m, tolerance));
-  EXPECT_NEAR(wrapped_rad(fix.estimate.pose.yaw_rad - state.pose.yaw_rad), 0, tolerance);
+  EXPECT_NEAR(wrap_rad(fix.estimate.pose.yaw_rad - state.pose.yaw_rad), 0, tolerance);
   ASSERT_TRUE(fix.body.has_value());
   const Eigen::Vector2d velocity =
       Eigen::Rotation2Dd(state.pose.yaw_rad) * state.motion.velocity_m_per_s;
@@ -84,16 +84,16 @@ void expect_state(const Fix& fix, const BodyState& state, double tolerance) {
   EXPECT_THAT(fix.body->velocity_m_per_s, IsNear(velocity, 100 * tolerance));
   EXPECT_NEAR(fix.body->yaw_rate_rad_per_s, state.motion.yaw_rate_rad_per_s, 100 * tolerance);
   const Inclination& lean = state.motion.inclination;
-  EXPECT_NEAR(wrapped_rad(fix.body->inclination.roll_rad - lean.roll_rad), 0, tolerance);
-  EXPECT_NEAR(wrapped_rad(fix.body->inclination.pitch_rad - lean.pitch_rad), 0, tolerance);
+  EXPECT_NEAR(wrap_rad(fix.body->inclination.roll_rad - lean.roll_rad), 0, tolerance);
+  EXPECT_NEAR(wrap_rad(fix.body->inclination.pitch_rad - lean.pitch_rad), 0, tolerance);
 }
 
 class PositionerNoiselessBody : public testing::TestWithParam<Estimated> {
  protected:
   Random random{41};
 
-  void expect_exact(BodyRig rig, std::size_t lamps, bool one_height, double least_rad) {
-    rig.map = lamps_in_view(rig, lamps, one_height, least_rad, random);
+  void expect_exact(BodyRig rig, std::size_t lamps, bool one_height, double min_rad) {
+    rig.map = draw_lamps_in_view(rig, lamps, one_height, min_rad, random);
     const auto detections = seen_from(rig, kTinyNoise_px);
     if (detections.size() < lamps) return;
     const Fix fix = rig.positioner().locate(detections, sensors_for(rig.body, GetParam()));
@@ -152,7 +152,7 @@ TEST_P(PositionerNoiselessBody, MatchesTruthWhenPriorMeanIsTrue) {
   for (int i = 0; i < 60; ++i) {
     BodyRig rig{{}, rolling_calibration(), random_state(random, 0.1), {}};
     const std::size_t lamps = 2 + random.index(3);
-    rig.map = lamps_in_view(rig, lamps, true, 0.4, random);
+    rig.map = draw_lamps_in_view(rig, lamps, true, 0.4, random);
     const auto detections = seen_from(rig, 0.1);
     if (detections.size() < lamps) continue;
     Sensors sensors;
@@ -176,7 +176,7 @@ TEST(EvaluatedState, DerivativesMatchFiniteDifferences) {
     const BodyState state = random_state(random, 1.4);
     const Eigen::Vector3d lamp_m(1.1, 0.4, 2.5);
     const double time_s = random.uniform(-0.2, 0.2);
-    const auto derivative = PosedBody(state).d_lamp_in_body(lamp_m, time_s);
+    const auto derivative = EvaluatedState(state).d_lamp_in_body(lamp_m, time_s);
     for (int index = 0; index < kBodyStates; ++index) {
       const auto q = [&](double change) {
         BodyState at = state;
@@ -188,7 +188,7 @@ TEST(EvaluatedState, DerivativesMatchFiniteDifferences) {
         if (index == kBodyYawRate) motion.yaw_rate_rad_per_s += change;
         if (index == kBodyRoll) motion.inclination.roll_rad += change;
         if (index == kBodyPitch) motion.inclination.pitch_rad += change;
-        return PosedBody(at).lamp_in_body(lamp_m, time_s);
+        return EvaluatedState(at).lamp_in_body(lamp_m, time_s);
       };
       const Eigen::Vector3d difference = (q(step) - q(-step)) / (2 * step);
       EXPECT_THAT(Eigen::Vector3d(derivative.col(index)), IsNear(difference, tolerance)) << index;
@@ -227,7 +227,7 @@ TEST(ComputeThreeLampPoses, ContainsTruth) {
       lamps_m[k].z() = i % 2 ? 2 : random.uniform(1.7, 2.3);
       rays[k] = (camera_from_world * lamps_m[k]).normalized();
     }
-    const ThreeLampPoses found = three_lamp_poses(lamps_m, rays);
+    const ThreeLampPoses found = compute_three_lamp_poses(lamps_m, rays);
     double nearest = 1;
     for (int k = 0; k < found.count; ++k) {
       const FreePose& pose = found.poses[static_cast<std::size_t>(k)];
@@ -245,7 +245,7 @@ TEST(ComputeThreeLampPoses, ReturnsNoneForCollinearLamps) {
       Eigen::Vector3d(-1, 0.2, 2), {0, 0.2, 2}, {1, 0.2, 2}};
   std::array<Eigen::Vector3d, 3> rays;
   for (std::size_t i = 0; i < 3; ++i) rays[i] = lamps_m[i].normalized();
-  EXPECT_EQ(three_lamp_poses(lamps_m, rays).count, 0);
+  EXPECT_EQ(compute_three_lamp_poses(lamps_m, rays).count, 0);
 }
 
 /// A lamp with equal distances and angles to both others: one of the conics is a pair of lines.
@@ -257,7 +257,7 @@ TEST(ComputeThreeLampPoses, ContainsTruthForSymmetricLamps) {
           Eigen::Vector3d(-0.5, -0.5, 0), {0.5, -0.5, 0}, {0, 0.6, 0}};
       std::array<Eigen::Vector3d, 3> rays;
       for (std::size_t i = 0; i < 3; ++i) rays[i] = (lamps_m[i] - camera_m).normalized();
-      const ThreeLampPoses found = three_lamp_poses(lamps_m, rays);
+      const ThreeLampPoses found = compute_three_lamp_poses(lamps_m, rays);
       double nearest_m = 1;
       for (int i = 0; i < found.count; ++i) {
         const FreePose& pose = found.poses[static_cast<std::size_t>(i)];
@@ -273,7 +273,7 @@ class BodyScatter {
  public:
   using Vector = Eigen::Matrix<double, kBodyStates, 1>;
 
-  static Vector vector_of(const Fix& fix) {
+  static Vector to_vector(const Fix& fix) {
     Vector all;
     all << fix.estimate.pose.position_m, fix.estimate.pose.yaw_rad, fix.body->velocity_m_per_s,
         fix.body->yaw_rate_rad_per_s, fix.body->inclination.roll_rad,
@@ -330,14 +330,14 @@ TEST_P(BodyFixCovariance, MatchesScatterWithLampsAlone) {
   const Positioner positioner = rig.positioner();
   const Sensors sensors = sensors_for(rig.body, GetParam());
   const Fix stated = positioner.locate(exact, sensors);
-  ASSERT_TRUE(stated.ok()) << name_of(stated.status);
-  const auto truth = BodyScatter::vector_of(stated);
+  ASSERT_TRUE(stated.ok()) << to_string(stated.status);
+  const auto truth = BodyScatter::to_vector(stated);
   BodyScatter scatter;
   Random random(51);
   for (int i = 0; i < kBodyDraws; ++i) {
     const Fix fix = positioner.locate(with_noise(exact, random), sensors);
-    ASSERT_TRUE(fix.ok()) << name_of(fix.status);
-    scatter.add(BodyScatter::vector_of(fix) - truth);
+    ASSERT_TRUE(fix.ok()) << to_string(fix.status);
+    scatter.add(BodyScatter::to_vector(fix) - truth);
   }
   scatter.expect(stated.body->covariance, kBodyScatterTolerance);
 }
@@ -355,8 +355,8 @@ TEST_P(BodyFixCovariance, MatchesScatterWithLampsAndSensors) {
   sensors.inclination = motion.inclination;
   sensors.inclination_sigma_rad = GetParam().lean ? 0.003 : 0;
   const Fix stated = positioner.locate(exact, sensors);
-  ASSERT_TRUE(stated.ok()) << name_of(stated.status);
-  const auto truth = BodyScatter::vector_of(stated);
+  ASSERT_TRUE(stated.ok()) << to_string(stated.status);
+  const auto truth = BodyScatter::to_vector(stated);
   BodyScatter scatter;
   Random random(52);
   for (int i = 0; i < kBodyDraws; ++i) {
@@ -368,8 +368,8 @@ TEST_P(BodyFixCovariance, MatchesScatterWithLampsAndSensors) {
     read.inclination->roll_rad += sensors.inclination_sigma_rad * random.normal();
     read.inclination->pitch_rad += sensors.inclination_sigma_rad * random.normal();
     const Fix fix = positioner.locate(with_noise(exact, random), read);
-    ASSERT_TRUE(fix.ok()) << name_of(fix.status);
-    scatter.add(BodyScatter::vector_of(fix) - truth);
+    ASSERT_TRUE(fix.ok()) << to_string(fix.status);
+    scatter.add(BodyScatter::to_vector(fix) - truth);
   }
   scatter.expect(stated.body->covariance, kBodyScatterTolerance);
 }

@@ -47,7 +47,7 @@ class PositionerLocateBody : public testing::Test {
   }
   /// Expects errors below five reported standard deviations.
   void expect_truth(const Fix& fix) const {
-    ASSERT_TRUE(fix.ok()) << name_of(fix.status);
+    ASSERT_TRUE(fix.ok()) << to_string(fix.status);
     for (int i = 0; i < 3; ++i) {
       EXPECT_NEAR(fix.estimate.pose.position_m[i], rig.body.pose.position_m[i],
                   5 * std::sqrt(fix.estimate.covariance(i, i)));
@@ -112,7 +112,7 @@ TEST_F(PositionerLocateBody, ReturnsUndeterminedForTwoLampsWithFreeTilt) {
 }
 
 TEST_F(PositionerLocateBody, ReturnsUndeterminedForCollinearLampsWithFreeTilt) {
-  rig.map = lamp_map_of({{-0.7, 0.1, 1.6}, {0, 0.1, 1.6}, {0.7, 0.1, 1.6}});
+  rig.map = make_lamp_map({{-0.7, 0.1, 1.6}, {0, 0.1, 1.6}, {0.7, 0.1, 1.6}});
   stand();
   EXPECT_EQ(locate(seen(), leaning()).status, FixStatus::undetermined);
   Sensors nearly_level;
@@ -122,7 +122,7 @@ TEST_F(PositionerLocateBody, ReturnsUndeterminedForCollinearLampsWithFreeTilt) {
 
 /// Three lamps fit several poses of a camera with unknown tilt; a known height selects one.
 TEST_F(PositionerLocateBody, ResolvesAmbiguityOfThreeLampsByHeight) {
-  int ambiguous = 0, told = 0;
+  int ambiguous = 0, num_resolved = 0;
   for (int i = 0; i < 200; ++i) {
     rig.body.pose.position_m = {random.uniform(-0.3, 0.3), random.uniform(-0.3, 0.3), 0};
     rig.body.motion = {{0, 0}, 0, {random.uniform(-0.5, 0.5), 0.2}};
@@ -137,10 +137,10 @@ TEST_F(PositionerLocateBody, ResolvesAmbiguityOfThreeLampsByHeight) {
     const Fix fix = locate(detections, with_height);
     if (!fix.ok()) continue;
     expect_truth(fix);
-    told += alone.status == FixStatus::ambiguous;
+    num_resolved += alone.status == FixStatus::ambiguous;
   }
   EXPECT_GT(ambiguous, 30);
-  EXPECT_GT(told, ambiguous / 2);
+  EXPECT_GT(num_resolved, ambiguous / 2);
 }
 
 TEST_F(PositionerLocateBody, RejectsMisidentifiedLamp) {
@@ -213,9 +213,9 @@ TEST_F(PositionerLocateBody, ReturnsInconsistentForImpossibleMotion) {
 /// A tilted camera with a level prior is inconsistent; with free roll and pitch it is located.
 TEST_F(PositionerLocateBody, ReturnsInconsistentForUnmodeledTilt) {
   rig.body.motion = {{0, 0}, 0, {0.7, -0.5}};
-  rig.map = lamps_in_view(rig, 6, true, 0.3, random);
+  rig.map = draw_lamps_in_view(rig, 6, true, 0.3, random);
   EXPECT_EQ(locate(seen(), {}).status, FixStatus::inconsistent);
-  EXPECT_NE(explanation_of(FixStatus::inconsistent).find("lean"), std::string_view::npos);
+  EXPECT_NE(describe(FixStatus::inconsistent).find("lean"), std::string_view::npos);
   expect_truth(locate(seen(), leaning()));
 }
 

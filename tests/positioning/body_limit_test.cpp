@@ -26,7 +26,7 @@ struct OverLimit {
     }
     Eigen::Array4d error;
     error << (fix.estimate.pose.position_m - truth.position_m).array(),
-        wrapped_rad(fix.estimate.pose.yaw_rad - truth.yaw_rad);
+        wrap_rad(fix.estimate.pose.yaw_rad - truth.yaw_rad);
     over_limit += error.square() / limit.diagonal().array();
     over_stated += error.square() / fix.noise_covariance.diagonal().array();
     ++fixes;
@@ -36,7 +36,7 @@ struct OverLimit {
 };
 
 /// Returns the covariance of the fix of exact observations, which equals the bound.
-std::optional<Matrix4> limit_of(const BodyRig& rig, const Sensors& sensors) {
+std::optional<Matrix4> compute_limit(const BodyRig& rig, const Sensors& sensors) {
   const Fix exact = rig.positioner().locate(seen_from(rig, kLimitNoise_px), sensors);
   if (!exact.ok()) return std::nullopt;
   return exact.noise_covariance;
@@ -48,21 +48,21 @@ TEST(BodyLimit, FixErrorsStayNearBoundForAnyTilt) {
   Random random(81);
   Sensors in_hand;
   in_hand.inclination_sigma_rad = 1.6;
-  for (const auto& [least_deg, most_deg] : {std::pair(0.0, 30.0), {30.0, 60.0}, {60.0, 80.0}}) {
+  for (const auto& [min_deg, max_deg] : {std::pair(0.0, 30.0), {30.0, 60.0}, {60.0, 80.0}}) {
     OverLimit found;
     int lamps_seen = 0;
     while (found.fixes + found.refused < 200) {
       BodyRig rig{{}, rolling_calibration(), {}, {}};
-      const double lean_rad = rad_from_deg(random.uniform(least_deg, most_deg));
+      const double lean_rad = rad_from_deg(random.uniform(min_deg, max_deg));
       rig.body.pose = {{random.uniform(-0.3, 0.3), random.uniform(-0.3, 0.3), 0},
                        random.uniform(-3.1, 3.1)};
       Inclination& lean = rig.body.motion.inclination;
       (random.uniform(0, 1) < 0.5 ? lean.roll_rad : lean.pitch_rad) =
           random.uniform(0, 1) < 0.5 ? lean_rad : -lean_rad;
       const std::size_t lamps = 4 + random.index(2);
-      rig.map = lamps_in_view(rig, lamps, true, 0.2, random);
+      rig.map = draw_lamps_in_view(rig, lamps, true, 0.2, random);
       const auto exact = seen_from(rig, kLimitNoise_px);
-      const auto limit = limit_of(rig, in_hand);
+      const auto limit = compute_limit(rig, in_hand);
       if (exact.size() < 4 || !limit) continue;
       lamps_seen += static_cast<int>(exact.size());
       found.add(rig.positioner().locate(with_noise(exact, random), in_hand), rig.body.pose, *limit);
@@ -70,7 +70,7 @@ TEST(BodyLimit, FixErrorsStayNearBoundForAnyTilt) {
     std::printf(
         "lean %2.0f to %2.0f degrees: %d fixes, %d refused, %.1f lamps, over the limit "
         "%.2f %.2f %.2f, yaw %.2f\n",
-        least_deg, most_deg, found.fixes, found.refused,
+        min_deg, max_deg, found.fixes, found.refused,
         lamps_seen / double(found.fixes + found.refused), found.ratio()[0], found.ratio()[1],
         found.ratio()[2], found.ratio()[3]);
     EXPECT_LT(found.ratio().maxCoeff(), 1.5);
@@ -85,7 +85,7 @@ TEST(BodyLimit, FixErrorsMatchReportedWithFreeMotion) {
   Sensors might_drive;
   might_drive.motion = KnownMotion::up_to(2, rad_from_deg(180));
   for (const std::size_t lamps : {4U, 8U}) {
-    OverLimit told, not_told;
+    OverLimit with_motion, at_rest;
     Eigen::Array4d price = Eigen::Array4d::Zero();
     for (int i = 0; i < 600; ++i) {
       BodyRig rig{synthetic_lamps(), rolling_calibration(), {}, {}};
@@ -93,22 +93,23 @@ TEST(BodyLimit, FixErrorsMatchReportedWithFreeMotion) {
       rig.body.pose = {{random.uniform(-0.3, 0.3), random.uniform(-0.2, 0.2), 0},
                        random.uniform(-3.1, 3.1)};
       const auto exact = seen_from(rig, kLimitNoise_px);
-      const auto limit = limit_of(rig, might_drive), standing = limit_of(rig, {});
+      const auto limit = compute_limit(rig, might_drive), standing = compute_limit(rig, {});
       if (exact.size() < 4 || !limit || !standing) continue;
       const auto noisy = with_noise(exact, random);
-      told.add(rig.positioner().locate(noisy, might_drive), rig.body.pose, *limit);
-      not_told.add(rig.positioner().locate(noisy), rig.body.pose, *standing);
+      with_motion.add(rig.positioner().locate(noisy, might_drive), rig.body.pose, *limit);
+      at_rest.add(rig.positioner().locate(noisy), rig.body.pose, *standing);
       price += limit->diagonal().array() / standing->diagonal().array();
     }
-    price = (price / told.fixes).sqrt().eval();
+    price = (price / with_motion.fixes).sqrt().eval();
     std::printf(
         "%zu lamps, %d fixes: price %.2f %.2f %.2f, yaw %.2f; error over stated %.3f %.3f "
         "%.3f, yaw %.3f\n",
-        lamps, told.fixes, price[0], price[1], price[2], price[3], told.stated_ratio()[0],
-        told.stated_ratio()[1], told.stated_ratio()[2], told.stated_ratio()[3]);
-    EXPECT_GT(told.fixes, 300);
-    EXPECT_EQ(told.refused, 0);
-    for (const OverLimit* one : {&told, &not_told}) {
+        lamps, with_motion.fixes, price[0], price[1], price[2], price[3],
+        with_motion.stated_ratio()[0], with_motion.stated_ratio()[1], with_motion.stated_ratio()[2],
+        with_motion.stated_ratio()[3]);
+    EXPECT_GT(with_motion.fixes, 300);
+    EXPECT_EQ(with_motion.refused, 0);
+    for (const OverLimit* one : {&with_motion, &at_rest}) {
       EXPECT_GT(one->stated_ratio().minCoeff(), 0.9);
       EXPECT_LT(one->stated_ratio().maxCoeff(), 1.1);
     }

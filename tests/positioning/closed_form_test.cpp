@@ -13,7 +13,7 @@ namespace vlp {
 namespace {
 
 Sighting seen(const Eigen::Vector3d& lamp_m, const Pose& pose) {
-  return {lamp_m, predicted_z(LevelPose(pose), lamp_m), Matrix2::Identity() * 500, 1};
+  return {lamp_m, predict_z(LevelPose(pose), lamp_m), Matrix2::Identity() * 500, 1};
 }
 
 Pose random_pose(Random& random) {
@@ -23,14 +23,15 @@ Pose random_pose(Random& random) {
 
 void expect_pose(const Pose& pose, const Pose& truth) {
   EXPECT_THAT(pose.position_m, IsNear(truth.position_m, 1e-9));
-  EXPECT_NEAR(wrapped_rad(pose.yaw_rad - truth.yaw_rad), 0, 1e-9);
+  EXPECT_NEAR(wrap_rad(pose.yaw_rad - truth.yaw_rad), 0, 1e-9);
 }
 
 TEST(ComputeTwoLampPoses, ReturnsOnlyPoseForEqualHeights) {
   Random random(3);
   for (int i = 0; i < 200; ++i) {
     const Pose truth = random_pose(random);
-    const TwoLampFix fix = fix_two_lamps(seen({-1, 0.5, 2.5}, truth), seen({1, 0.2, 2.5}, truth));
+    const TwoLampPoses fix =
+        compute_two_lamp_poses(seen({-1, 0.5, 2.5}, truth), seen({1, 0.2, 2.5}, truth));
     ASSERT_EQ(fix.count, 1);
     expect_pose(fix.poses[0], truth);
   }
@@ -43,7 +44,7 @@ TEST(ComputeTwoLampPoses, ContainsTruthForDifferentHeights) {
     const Pose truth = random_pose(random);
     const Sighting a = seen({random.uniform(-1, 1), random.uniform(-1, 1), 2.0}, truth);
     const Sighting b = seen({random.uniform(-1, 1), random.uniform(-1, 1), 2.6}, truth);
-    const TwoLampFix fix = fix_two_lamps(a, b);
+    const TwoLampPoses fix = compute_two_lamp_poses(a, b);
     ASSERT_GE(fix.count, 1);
     const bool first = (fix.poses[0].position_m - truth.position_m).norm() < 1e-6;
     if (fix.count == 2) ++doubles;
@@ -52,8 +53,8 @@ TEST(ComputeTwoLampPoses, ContainsTruthForDifferentHeights) {
     EXPECT_LT((nearest.position_m - truth.position_m).norm(), 1e-6);
     for (int k = 0; k < fix.count; ++k) {
       const LevelPose pose(fix.poses[static_cast<std::size_t>(k)]);
-      EXPECT_THAT(predicted_z(pose, a.lamp_m), IsNear(a.z, 1e-9));
-      EXPECT_THAT(predicted_z(pose, b.lamp_m), IsNear(b.z, 1e-9));
+      EXPECT_THAT(predict_z(pose, a.lamp_m), IsNear(a.z, 1e-9));
+      EXPECT_THAT(predict_z(pose, b.lamp_m), IsNear(b.z, 1e-9));
     }
   }
   EXPECT_GT(doubles, 10) << "the ambiguous case was not met";
@@ -63,14 +64,14 @@ TEST(ComputeTwoLampPoses, ReturnsNoneForCoincidentLamps) {
   const Pose pose{{0, 0, 0}, 0};
   Sighting a = seen({0, 0, 2}, pose), b = seen({1, 0, 2}, pose);
   b.z = a.z;
-  EXPECT_EQ(fix_two_lamps(a, b).count, 0);
+  EXPECT_EQ(compute_two_lamp_poses(a, b).count, 0);
 }
 
 TEST(ComputeTwoLampPoses, ReportsLampBelowCamera) {
   // The only pose has the second lamp, 2 m below the first, at the camera's own height.
   const Sighting a{{0, 0, 3}, {-1, 0}, Matrix2::Identity(), 1};
   const Sighting b{{2, 0, 1}, {1, 0}, Matrix2::Identity(), 1};
-  const TwoLampFix fix = fix_two_lamps(a, b);
+  const TwoLampPoses fix = compute_two_lamp_poses(a, b);
   EXPECT_EQ(fix.count, 0);
   EXPECT_TRUE(fix.lamp_below_camera);
 }
@@ -83,7 +84,7 @@ TEST(ComputeCoplanarPose, MatchesTruthForThreeLampsOrMore) {
     for (int lamp = 0; lamp < 3 + i % 6; ++lamp) {
       sightings.push_back(seen({random.uniform(-1, 1), random.uniform(-1, 1), 2.2}, truth));
     }
-    const auto pose = fix_coplanar_lamps(sightings);
+    const auto pose = compute_coplanar_pose(sightings);
     ASSERT_TRUE(pose);
     expect_pose(*pose, truth);
   }
@@ -94,7 +95,7 @@ TEST(ComputeOneLampPose, MatchesTruthWithKnownHeightAndYaw) {
   for (int i = 0; i < 100; ++i) {
     const Pose truth = random_pose(random);
     const auto pose =
-        fix_one_lamp(seen({0.3, -0.4, 2}, truth), {truth.position_m.z(), truth.yaw_rad});
+        compute_one_lamp_pose(seen({0.3, -0.4, 2}, truth), {truth.position_m.z(), truth.yaw_rad});
     ASSERT_TRUE(pose);
     expect_pose(*pose, truth);
   }
@@ -102,8 +103,8 @@ TEST(ComputeOneLampPose, MatchesTruthWithKnownHeightAndYaw) {
 
 TEST(ComputeOneLampPose, ReturnsNulloptWhenLampIsNotAboveCamera) {
   const Sighting sighting = seen({0, 0, 2}, {{0, 0, 0}, 0});
-  EXPECT_FALSE(fix_one_lamp(sighting, {2, 0}));
-  EXPECT_FALSE(fix_one_lamp(sighting, {2.5, 0}));
+  EXPECT_FALSE(compute_one_lamp_pose(sighting, {2, 0}));
+  EXPECT_FALSE(compute_one_lamp_pose(sighting, {2.5, 0}));
 }
 
 }  // namespace

@@ -22,7 +22,7 @@ class CommonErrorsTest : public testing::Test {
 
   /// States of a fix; without a body estimate only X, Y, Z and yaw, and zeros.
   using States = Eigen::Vector<double, kBodyStates>;
-  static States states_of(const Fix& fix) {
+  static States to_states(const Fix& fix) {
     States states = States::Zero();
     states.head<4>() << fix.estimate.pose.position_m, fix.estimate.pose.yaw_rad;
     if (const auto& body = fix.body) {
@@ -79,7 +79,7 @@ TEST_P(CommonErrorsOfFix, MatchesFiniteDifferencesOfFix) {
           by;
     }
     other.adjustment.reset();
-    return states_of(Positioner(map, other, options).locate(detections, known));
+    return to_states(Positioner(map, other, options).locate(detections, known));
   };
   Eigen::MatrixXd by_parameters(kBodyStates, 40);
   for (Eigen::Index i = 0; i < 40; ++i) {
@@ -128,7 +128,7 @@ TEST_F(CommonErrorsTest, MatchesFiniteDifferencesForLensAlone) {
   const auto fix_with = [&](Eigen::Index parameter, double by) {
     const Calibration other =
         with_lens_error(rig.calibration, by * Eigen::VectorXd::Unit(12, parameter));
-    return states_of(Positioner(rig.map, other).locate(detections));
+    return to_states(Positioner(rig.map, other).locate(detections));
   };
   Eigen::MatrixXd by_parameters(kBodyStates, 12);
   for (Eigen::Index i = 0; i < 12; ++i) {
@@ -144,7 +144,7 @@ TEST_F(CommonErrorsTest, MatchesFiniteDifferencesForLensAlone) {
 /// A part without derivatives by the lens hides the errors of the lens.
 TEST_F(CommonErrorsTest, StatedReportsLensOnlyWithDerivatives) {
   const auto stated = [&](Correction correction) {
-    return CommonErrors(rig.map.lamps, rig.calibration, correction).stated(CommonPart::lens);
+    return CommonErrors(rig.map.lamps, rig.calibration, correction).stated(CommonErrorSource::lens);
   };
   rig.calibrate_in_a_row();
   for (const Correction correction :
@@ -186,7 +186,7 @@ TEST_F(CommonErrorsTest, MatchesWithAndWithoutRowsOfLamps) {
   ASSERT_TRUE(with.ok() && without.ok());
   const double scale = with.estimate.covariance.norm();
   EXPECT_THAT(without.estimate.covariance, IsNear(with.estimate.covariance, 1e-12 * scale));
-  EXPECT_TRUE(small.stated() && small.only(CommonPart::lamps).stated());
+  EXPECT_TRUE(small.stated() && small.only(CommonErrorSource::lamps).stated());
 }
 
 TEST_F(CommonErrorsTest, RejectsLampThatNoErrorExplains) {

@@ -20,19 +20,19 @@ constexpr int kDraws = 20000;
 constexpr double kScatterTolerance = 0.03;
 constexpr double kShareTolerance = 0.0075;  // five standard deviations
 
-SyntheticRig rig_of(std::size_t lamps) {
+SyntheticRig make_rig(std::size_t lamps) {
   SyntheticRig rig{
       synthetic_lamps(), {synthetic_camera(), {}, {}, {}, {}}, {{0.15, -0.1, 0.1}, 0.9}, {}};
   rig.map.lamps.resize(lamps);
   return rig;
 }
 
-Eigen::Matrix4d limit_of(const SyntheticRig& rig, double sigma_px) {
+Eigen::Matrix4d compute_limit(const SyntheticRig& rig, double sigma_px) {
   std::vector<Eigen::Vector3d> lamps_m;
   for (const Lamp& lamp : rig.map.lamps) lamps_m.push_back(lamp.position_m);
   const Camera& camera = rig.calibration.camera;
-  const auto budget = error_budget(lamps_m, Lens(camera.lens_model, camera.intrinsics), rig.camera,
-                                   {sigma_px, 0, 0, 0});
+  const auto budget = compute_error_budget(lamps_m, Lens(camera.lens_model, camera.intrinsics),
+                                           rig.camera, {sigma_px, 0, 0, 0});
   return budget->noise;
 }
 
@@ -43,7 +43,7 @@ void expect_efficient(const Scatter& scatter) {
 
 class FixCovariance : public testing::TestWithParam<std::size_t> {
  protected:
-  SyntheticRig rig = rig_of(GetParam());
+  SyntheticRig rig = make_rig(GetParam());
   Random random{11};
 
   void expect_consistent(double sigma_px, const Sensors& sensors = {}) {
@@ -66,7 +66,7 @@ class FixCovariance : public testing::TestWithParam<std::size_t> {
 TEST_P(FixCovariance, EqualsCramerRaoBound) {
   const double sigma_px = 0.2;
   const Fix fix = Positioner(rig.map, rig.calibration).locate(seen_from(rig, sigma_px));
-  const Eigen::Matrix4d limit = limit_of(rig, sigma_px);
+  const Eigen::Matrix4d limit = compute_limit(rig, sigma_px);
   EXPECT_LT((fix.estimate.covariance - limit).norm(), 1e-6 * limit.norm());
 }
 
@@ -83,7 +83,7 @@ TEST_P(FixCovariance, MatchesScatterWithTiltAndManyHeights) {
 INSTANTIATE_TEST_SUITE_P(Lamps, FixCovariance, testing::Values(2, 3, 4, 8));
 
 TEST(FixCovariance, MatchesScatterWithDifferentNoise) {
-  const SyntheticRig rig = rig_of(4);
+  const SyntheticRig rig = make_rig(4);
   const Positioner positioner(rig.map, rig.calibration);
   auto exact = seen_from(rig, 0.1);
   exact[1].sigma_px = 0.5;
@@ -97,7 +97,7 @@ TEST(FixCovariance, MatchesScatterWithDifferentNoise) {
 }
 
 TEST(FixCovariance, IncludesNoiseOfInclinationSensor) {
-  SyntheticRig rig = rig_of(4);
+  SyntheticRig rig = make_rig(4);
   rig.inclination = {0.03, -0.02};
   const Positioner positioner(rig.map, rig.calibration);
   const auto exact = seen_from(rig, 0.1);
@@ -115,7 +115,7 @@ TEST(FixCovariance, IncludesNoiseOfInclinationSensor) {
 }
 
 TEST(FixCovariance, MatchesScatterOfRobotCenter) {
-  const SyntheticRig rig = rig_of(3);
+  const SyntheticRig rig = make_rig(3);
   PositionerOptions options;
   options.mount = CameraMount{{0.4, -0.3, 0.2}, 0.5};
   const Positioner positioner(rig.map, rig.calibration, options);
@@ -131,7 +131,7 @@ TEST(FixCovariance, MatchesScatterOfRobotCenter) {
 }
 
 TEST(FixCovariance, IncludesInclinationOfMountArm) {
-  const SyntheticRig rig = rig_of(4);
+  const SyntheticRig rig = make_rig(4);
   PositionerOptions options;
   options.mount = CameraMount{{0.3, -0.2, 1.0}, 0.8};
   const Positioner positioner(rig.map, rig.calibration, options);
@@ -148,7 +148,7 @@ TEST(FixCovariance, IncludesInclinationOfMountArm) {
 }
 
 TEST(FixCovariance, IncludesInclinationForOneLamp) {
-  const SyntheticRig rig = rig_of(1);
+  const SyntheticRig rig = make_rig(1);
   const Positioner positioner(rig.map, rig.calibration);
   const double sigma_rad = 0.005;
   const HeightAndYaw known{rig.camera.position_m.z(), rig.camera.yaw_rad};
@@ -167,7 +167,7 @@ TEST(FixCovariance, IncludesInclinationForOneLamp) {
 }
 
 TEST(FixCovariance, MatchesScatterWithStereographicLens) {
-  SyntheticRig rig = rig_of(4);
+  SyntheticRig rig = make_rig(4);
   rig.calibration.camera.lens_model = LensModel::stereographic;
   rig.calibration.camera.intrinsics = {300, 300, 400, 300};
   rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.1, 1);
@@ -182,7 +182,7 @@ TEST(FixCovariance, MatchesScatterWithStereographicLens) {
 }
 
 TEST(FixCovariance, MatchesScatterForOneLamp) {
-  const SyntheticRig rig = rig_of(1);
+  const SyntheticRig rig = make_rig(1);
   const Positioner positioner(rig.map, rig.calibration);
   const Sensors known{{}, 0, HeightAndYaw{rig.camera.position_m.z(), rig.camera.yaw_rad}};
   const auto exact = seen_from(rig, 0.2);
@@ -230,7 +230,7 @@ TEST(OneLampSensorCovariance, MatchesScatter) {
 }
 
 TEST(PositionerLocate, ReturnsRowTimeUnknownForOneMovingLamp) {
-  const SyntheticRig rig = rig_of(1);
+  const SyntheticRig rig = make_rig(1);
   Sensors sensors;
   sensors.height_and_yaw = HeightAndYaw{0.1, 0.9};
   sensors.motion = KnownMotion{{0.8, 0}, 0, 0, 0};
@@ -257,11 +257,11 @@ TEST(ComputeOneLampPose, MatchesTruthForRotatingRobot) {
 /// fix.
 TEST(FixCovariance, ClosedFormsReachCramerRaoBoundWithPinhole) {
   for (const std::size_t lamps : {2u, 3u}) {
-    SyntheticRig rig = rig_of(lamps);
+    SyntheticRig rig = make_rig(lamps);
     rig.calibration.camera.lens_model = LensModel::pinhole;
     rig.calibration.camera.intrinsics = {520, 520, 400, 300};
     const double sigma_px = 0.2;
-    Scatter scatter(rig.camera, limit_of(rig, sigma_px));
+    Scatter scatter(rig.camera, compute_limit(rig, sigma_px));
     std::vector<Sighting> sightings;
     const LevelPose camera(rig.camera);
     for (const Lamp& lamp : rig.map.lamps) {
@@ -270,11 +270,11 @@ TEST(FixCovariance, ClosedFormsReachCramerRaoBoundWithPinhole) {
     Random random(16);
     for (int i = 0; i < kDraws; ++i) {
       for (Sighting& sighting : sightings) {
-        sighting.z = predicted_z(camera, sighting.lamp_m) +
+        sighting.z = predict_z(camera, sighting.lamp_m) +
                      sigma_px / 520 * Eigen::Vector2d(random.normal(), random.normal());
       }
-      scatter.add(lamps == 2 ? fix_two_lamps(sightings[0], sightings[1]).poses[0]
-                             : *fix_coplanar_lamps(sightings));
+      scatter.add(lamps == 2 ? compute_two_lamp_poses(sightings[0], sightings[1]).poses[0]
+                             : *compute_coplanar_pose(sightings));
     }
     expect_efficient(scatter);
   }

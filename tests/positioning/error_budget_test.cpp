@@ -35,7 +35,7 @@ TEST(ComputeErrorBudget, MatchesFormulaForPinholeAndEqualHeights) {
     for (const auto& lamp_m : lamps_m) spread += (lamp_m - mean).squaredNorm();
     const double height_m = 1.6 - 0.25, unit_m = height_m / focal_px * sigma_px;
     const double d = (mean - pose.position_m).head<2>().norm();
-    const auto budget = error_budget(lamps_m, lens, pose, {sigma_px, 0, 0, 0});
+    const auto budget = compute_error_budget(lamps_m, lens, pose, {sigma_px, 0, 0, 0});
     ASSERT_TRUE(budget);
     const double horizontal_m = unit_m * std::sqrt(1 / static_cast<double>(n) + d * d / spread);
     const Eigen::Vector4d expected(horizontal_m, horizontal_m,
@@ -55,8 +55,8 @@ class ErrorBudgetTerm : public testing::Test {
 
   ErrorBudget budget(const ErrorSources& sources) {
     const Camera& camera = rig.calibration.camera;
-    return *error_budget(positions_of(rig.map), Lens(camera.lens_model, camera.intrinsics),
-                         rig.camera, sources);
+    return *compute_error_budget(positions_of(rig.map), Lens(camera.lens_model, camera.intrinsics),
+                                 rig.camera, sources);
   }
 
   /// Unit weights, as the budget assumes.
@@ -123,8 +123,8 @@ TEST_F(ErrorBudgetTerm, NoiseMatchesScatter) {
 
 TEST(ComputeErrorBudget, TotalIsSumOfSources) {
   const Lens lens(LensModel::pinhole, std::array{520.0, 520.0, 400.0, 300.0});
-  const auto budget =
-      error_budget(positions_of(synthetic_lamps()), lens, {{0, 0, 0}, 0}, {0.1, 0.2, 0.003, 0.004});
+  const auto budget = compute_error_budget(positions_of(synthetic_lamps()), lens, {{0, 0, 0}, 0},
+                                           {0.1, 0.2, 0.003, 0.004});
   EXPECT_THAT(budget->total(),
               IsNear(Matrix4(budget->noise + budget->center + budget->tilt + budget->lamp_map), 0));
   EXPECT_GT(budget->lamp_map(0, 0), 0);
@@ -134,23 +134,23 @@ TEST(ComputeErrorBudget, ReturnsNulloptWithoutTwoLampsInFrontOfLens) {
   const Lens lens(LensModel::pinhole, std::array{520.0, 520.0, 400.0, 300.0});
   const ErrorSources noise{0.1, 0, 0, 0};
   const std::vector<Eigen::Vector3d> lamps_m{{0, 0, 2}, {1, 0, 2}};
-  EXPECT_FALSE(error_budget({lamps_m.data(), 1}, lens, {{0, 0, 0}, 0}, noise));
-  EXPECT_FALSE(error_budget(lamps_m, lens, {{0, 0, 2.5}, 0}, noise));
-  EXPECT_TRUE(error_budget(lamps_m, lens, {{0, 0, 0}, 0}, noise));
+  EXPECT_FALSE(compute_error_budget({lamps_m.data(), 1}, lens, {{0, 0, 0}, 0}, noise));
+  EXPECT_FALSE(compute_error_budget(lamps_m, lens, {{0, 0, 2.5}, 0}, noise));
+  EXPECT_TRUE(compute_error_budget(lamps_m, lens, {{0, 0, 0}, 0}, noise));
 }
 
 /// Free states of a camera that is level and at rest: one or all.
-struct MayDo {
+struct FreeStates {
   bool drive, turn, lean;
 };
 
-class ErrorBudgetWithPrior : public testing::TestWithParam<MayDo> {
+class ErrorBudgetWithPrior : public testing::TestWithParam<FreeStates> {
  protected:
   static constexpr double kNoise_px = 0.1;
   BodyRig rig{synthetic_lamps(), rolling_calibration(), {{{0.1, -0.05, 0.05}, 0.7}, {}}, {}};
   ErrorSources sources{kNoise_px, 0.5, 0.002, 0.001};
 
-  static BodyPrior prior(const MayDo& may) {
+  static BodyPrior prior(const FreeStates& may) {
     BodyPrior prior;
     prior.velocity_sd_m_per_s = may.drive ? 1 : 0;
     prior.yaw_rate_sd_rad_per_s = may.turn ? 1.5 : 0;
@@ -166,10 +166,10 @@ class ErrorBudgetWithPrior : public testing::TestWithParam<MayDo> {
   }
   std::optional<ErrorBudget> budget(const BodyPrior& prior) const {
     const Camera& camera = rig.calibration.camera;
-    return error_budget(positions_of(rig.map), Lens(camera.lens_model, camera.intrinsics),
-                        rig.body.pose, sources, prior, row_clock_of(camera));
+    return compute_error_budget(positions_of(rig.map), Lens(camera.lens_model, camera.intrinsics),
+                                rig.body.pose, sources, prior, make_row_clock(camera));
   }
-  Eigen::Vector4d fix_of(const BodyRig& with, const std::vector<Detection>& detections) const {
+  Eigen::Vector4d locate(const BodyRig& with, const std::vector<Detection>& detections) const {
     const Fix fix = with.positioner().locate(detections, sensors());
     EXPECT_TRUE(fix.ok());
     Eigen::Vector4d state;
@@ -181,9 +181,11 @@ class ErrorBudgetWithPrior : public testing::TestWithParam<MayDo> {
   Eigen::Vector4d per_step(double step, const With& with) const {
     return (with(step) - with(-step)) / (2 * step);
   }
-  static void expect_like(const Matrix4& found, const Eigen::Matrix4d& expected, double share) {
+  static void expect_close(const Matrix4& found, const Eigen::Matrix4d& expected,
+                           double tolerance) {
     const Eigen::Vector4d sd = expected.diagonal().cwiseMax(1e-20).cwiseSqrt();
-    EXPECT_LT((found - expected).cwiseQuotient(sd * sd.transpose()).cwiseAbs().maxCoeff(), share)
+    EXPECT_LT((found - expected).cwiseQuotient(sd * sd.transpose()).cwiseAbs().maxCoeff(),
+              tolerance)
         << found << "\n\n"
         << expected;
   }
@@ -194,7 +196,7 @@ TEST_P(ErrorBudgetWithPrior, MatchesReportedCovarianceOfFix) {
   ASSERT_TRUE(fix.ok());
   const auto found = budget(prior(GetParam()));
   ASSERT_TRUE(found);
-  expect_like(found->noise + found->motion + found->lean, fix.noise_covariance, 1e-6);
+  expect_close(found->noise + found->motion + found->lean, fix.noise_covariance, 1e-6);
   const auto& [drive, turn, lean] = GetParam();
   EXPECT_EQ(found->motion.diagonal().minCoeff() > 0, drive || turn);
   EXPECT_EQ(found->lean.diagonal().maxCoeff() > 1e-12, lean);
@@ -212,14 +214,14 @@ TEST_P(ErrorBudgetWithPrior, MatchesEffectOfErrorsOnFix) {
     const Eigen::Vector4d shift = per_step(0.01, [&](double step_px) {
       auto shifted = exact;
       for (Detection& detection : shifted) detection.pixel[axis] += step_px;
-      return fix_of(rig, shifted);
+      return locate(rig, shifted);
     });
     by_center += std::pow(sources.center_px, 2) * shift * shift.transpose();
     const Eigen::Vector4d turn = per_step(1e-4, [&](double step_rad) {
       BodyRig leaning = rig;
       leaning.calibration.rotation_center =
           tilted_by(rig.calibration.camera, step_rad, axis * M_PI / 2);
-      return fix_of(leaning, exact);
+      return locate(leaning, exact);
     });
     by_tilt += std::pow(sources.tilt_rad, 2) * turn * turn.transpose();
   }
@@ -228,7 +230,7 @@ TEST_P(ErrorBudgetWithPrior, MatchesEffectOfErrorsOnFix) {
       const Eigen::Vector4d move = per_step(1e-4, [&](double step_m) {
         BodyRig wrong = rig;
         wrong.map.lamps[lamp].position_m[axis] += step_m;
-        return fix_of(wrong, exact);
+        return locate(wrong, exact);
       });
       by_lamps += std::pow(sources.lamp_map_m, 2) * move * move.transpose();
     }
@@ -243,16 +245,17 @@ TEST_P(ErrorBudgetWithPrior, MatchesEffectOfErrorsOnFix) {
   EXPECT_LT(relative(found->lamp_map - by_lamps), 1e-3);
 }
 
-std::string name_of_what_it_may(const testing::TestParamInfo<MayDo>& one) {
+std::string name_of_what_it_may(const testing::TestParamInfo<FreeStates>& one) {
   const auto& [drive, turn, lean] = one.param;
   return std::string(drive ? "Drive" : "") + (turn ? "Turn" : "") + (lean ? "Lean" : "");
 }
 
-INSTANTIATE_TEST_SUITE_P(FreeStates, ErrorBudgetWithPrior,
-                         testing::Values(MayDo{true, false, false}, MayDo{false, true, false},
-                                         MayDo{true, true, false}, MayDo{false, false, true},
-                                         MayDo{true, false, true}, MayDo{true, true, true}),
-                         name_of_what_it_may);
+INSTANTIATE_TEST_SUITE_P(
+    FreeStates, ErrorBudgetWithPrior,
+    testing::Values(FreeStates{true, false, false}, FreeStates{false, true, false},
+                    FreeStates{true, true, false}, FreeStates{false, false, true},
+                    FreeStates{true, false, true}, FreeStates{true, true, true}),
+    name_of_what_it_may);
 
 class ErrorBudgetPriorCases : public ErrorBudgetWithPrior {};
 
@@ -261,11 +264,11 @@ TEST_F(ErrorBudgetPriorCases, MatchesStandingCameraWhenPriorIsTight) {
   prior.velocity_sd_m_per_s = prior.inclination_sd_rad = 1e-7;
   const auto found = budget(prior);
   const Camera& camera = rig.calibration.camera;
-  const auto standing = error_budget(
+  const auto standing = compute_error_budget(
       positions_of(rig.map), Lens(camera.lens_model, camera.intrinsics), rig.body.pose, sources);
   ASSERT_TRUE(found && standing);
-  expect_like(found->noise, standing->noise, 1e-6);
-  expect_like(found->total(), standing->total(), 1e-6);
+  expect_close(found->noise, standing->noise, 1e-6);
+  expect_close(found->total(), standing->total(), 1e-6);
 }
 
 /// An unknown tilt is estimated, independently of the calibration.
@@ -282,7 +285,7 @@ TEST_F(ErrorBudgetPriorCases, ReturnsNulloptWhenLampsDoNotDetermineTilt) {
   rig.map.lamps.resize(2);
   EXPECT_TRUE(budget(prior({true, true, false})));
   EXPECT_FALSE(budget(in_hand));
-  rig.map = lamp_map_of({{-0.6, 0.2, 1.6}, {0, 0.2, 1.6}, {0.6, 0.2, 1.6}});
+  rig.map = make_lamp_map({{-0.6, 0.2, 1.6}, {0, 0.2, 1.6}, {0.6, 0.2, 1.6}});
   EXPECT_FALSE(budget(in_hand));
 }
 

@@ -25,7 +25,7 @@ LampMap first_lamps(std::size_t count, bool equal_heights) {
   return map;
 }
 
-SyntheticRig rig_of(std::size_t lamps, bool equal_heights) {
+SyntheticRig make_rig(std::size_t lamps, bool equal_heights) {
   return {first_lamps(lamps, equal_heights), {synthetic_camera(), {}, {}, {}, {}}, {}, {}};
 }
 
@@ -33,17 +33,17 @@ void expect_exact(const SyntheticRig& rig, const Sensors& sensors = {}) {
   const auto detections = seen_from(rig);
   ASSERT_EQ(detections.size(), rig.map.lamps.size());
   const Fix fix = Positioner(rig.map, rig.calibration).locate(detections, sensors);
-  ASSERT_TRUE(fix.ok()) << name_of(fix.status);
+  ASSERT_TRUE(fix.ok()) << to_string(fix.status);
   EXPECT_EQ(fix.lamps, static_cast<int>(detections.size()));
   EXPECT_THAT(fix.estimate.pose.position_m, IsNear(rig.camera.position_m, kExact_m));
-  EXPECT_NEAR(wrapped_rad(fix.estimate.pose.yaw_rad - rig.camera.yaw_rad), 0, kExact_rad);
+  EXPECT_NEAR(wrap_rad(fix.estimate.pose.yaw_rad - rig.camera.yaw_rad), 0, kExact_rad);
   EXPECT_NEAR(fix.residual_px, 0, 1e-6);  // 1e-9 m at f / H = 325 px/m
 }
 
 using LampsAndHeights = std::tuple<std::size_t, bool>;
 class PositionerNoiseless : public testing::TestWithParam<LampsAndHeights> {
  protected:
-  SyntheticRig rig = rig_of(std::get<0>(GetParam()), std::get<1>(GetParam()));
+  SyntheticRig rig = make_rig(std::get<0>(GetParam()), std::get<1>(GetParam()));
   Random random{7};
 
   Pose place() {
@@ -93,13 +93,13 @@ INSTANTIATE_TEST_SUITE_P(Lamps, PositionerNoiseless,
                          });
 
 TEST(PositionerNoiseless, MatchesTruthForOneLampWithKnownHeightAndYaw) {
-  SyntheticRig rig = rig_of(1, true);
+  SyntheticRig rig = make_rig(1, true);
   rig.camera = {{-0.3, 0.1, 0.2}, -2.5};
   expect_exact(rig, {{}, 0, HeightAndYaw{0.2, -2.5}});
 }
 
 TEST(PositionerNoiseless, MatchesTruthOfRobotCenter) {
-  SyntheticRig rig = rig_of(4, true);
+  SyntheticRig rig = make_rig(4, true);
   const Pose robot{{0.1, -0.2, 0.05}, 3.0};
   const CameraMount mount{{0.12, -0.03, 0.2}, 0.4};
   rig.camera = {robot.position_m + rotation_about_z(robot.yaw_rad) * mount.position_in_robot_m,
@@ -113,7 +113,7 @@ TEST(PositionerNoiseless, MatchesTruthOfRobotCenter) {
 }
 
 TEST(PositionerNoiseless, MatchesTruthOfTiltedRobotCenter) {
-  SyntheticRig rig = rig_of(4, true);
+  SyntheticRig rig = make_rig(4, true);
   const Eigen::Vector3d robot_m(0.1, -0.2, 0.05);
   const CameraMount mount{{0.12, -0.03, 0.2}, 1.3};
   const Inclination of_robot{0.08, -0.05};
@@ -142,20 +142,20 @@ TEST(PositionerNoiseless, MatchesTruthOfTiltedRobotCenter) {
 TEST(PositionerNoiseless, MatchesTruthForThreeLampsWithAmbiguousPair) {
   Random random(4);
   for (int i = 0; i < 200; ++i) {
-    SyntheticRig rig = rig_of(3, true);
-    rig.map = lamp_map_of({{1.0, 0, 1.6}, {1.2, 0.1, 2.4}, {1.1, 0.06, 1.9}});
+    SyntheticRig rig = make_rig(3, true);
+    rig.map = make_lamp_map({{1.0, 0, 1.6}, {1.2, 0.1, 2.4}, {1.1, 0.06, 1.9}});
     rig.camera = {{random.uniform(-0.1, 0.1), random.uniform(-0.1, 0.1), random.uniform(-0.3, 0.3)},
                   random.uniform(-3, 3)};
     const auto detections = seen_from(rig, 1e-3);
     if (detections.size() < 3) continue;
     const Fix fix = Positioner(rig.map, rig.calibration).locate(detections);
-    ASSERT_TRUE(fix.ok()) << name_of(fix.status);
+    ASSERT_TRUE(fix.ok()) << to_string(fix.status);
     EXPECT_THAT(fix.estimate.pose.position_m, IsNear(rig.camera.position_m, 1e-6));
   }
 }
 
 TEST(PositionerNoiseless, MatchesTruthInNationalCoordinates) {
-  SyntheticRig rig = rig_of(5, false);
+  SyntheticRig rig = make_rig(5, false);
   const Eigen::Vector3d origin_m(4.5e5, 5e6, 120);
   for (Lamp& lamp : rig.map.lamps) lamp.position_m += origin_m;
   Random random(3);
@@ -175,7 +175,7 @@ TEST(PositionerNoiseless, MatchesTruthWithEveryLensModel) {
                                      -.01, 0.02, 0.01, 1e-3, 1e-3,  -1e-3, 2e-3, 1e-3};
   for (const LensModel model : {LensModel::pinhole, LensModel::stereographic, LensModel::opencv4,
                                 LensModel::opencv5, LensModel::opencv8, LensModel::opencv12}) {
-    SyntheticRig rig = rig_of(8, false);
+    SyntheticRig rig = make_rig(8, false);
     Camera& camera = rig.calibration.camera;
     camera.lens_model = model;
     camera.intrinsics = opencv12;
@@ -186,14 +186,14 @@ TEST(PositionerNoiseless, MatchesTruthWithEveryLensModel) {
 }
 
 TEST(PositionerNoiseless, MatchesTruthWithSplinedLens) {
-  SyntheticRig rig = rig_of(8, false);
+  SyntheticRig rig = make_rig(8, false);
   rig.calibration.camera = splined_camera();
   rig.camera = {{0.1, 0.1, 0}, 1};
   expect_exact(rig);
 }
 
 TEST(PositionerNoiseless, MatchesTruthWithFisheye) {
-  SyntheticRig rig = rig_of(8, false);
+  SyntheticRig rig = make_rig(8, false);
   rig.calibration.camera = fisheye_camera();
   for (int yaw_deg = -180; yaw_deg <= 180; yaw_deg += 20) {
     rig.camera = {{0.1, 0.1, 0}, rad_from_deg(yaw_deg)};
@@ -202,7 +202,7 @@ TEST(PositionerNoiseless, MatchesTruthWithFisheye) {
 }
 
 TEST(PositionerNoiseless, MatchesTruthForLampsBeyond90DegreesOffAxis) {
-  SyntheticRig rig = rig_of(8, false);
+  SyntheticRig rig = make_rig(8, false);
   rig.calibration.camera = fisheye_camera();
   rig.camera = {{0.1, 0.1, 0}, 1};
   rig.inclination = {1.3, 0.2};

@@ -28,36 +28,37 @@ const ErrorSources kNoise{0.1, 0, 0, 0};
 
 TEST(FindVisibleLamps, ExcludesLampsOutsideImage) {
   // At 1 m above the camera the image is 1.6 m wide: its edges are at +-0.8 m, -+0.6 m.
-  const LampMap map = lamp_map_of({{0.7999, 0, 1},
-                                   {0.8001, 0, 1},
-                                   {-0.7999, 0, 1},
-                                   {-0.8001, 0, 1},
-                                   {0, 0.5999, 1},
-                                   {0, 0.6001, 1},
-                                   {0, -0.5999, 1},
-                                   {0, -0.6001, 1},
-                                   {0, 0, -1}});
-  EXPECT_EQ(visible_lamps(map, pinhole_camera(), {{0, 0, 0}, 0}).size(), 4);
+  const LampMap map = make_lamp_map({{0.7999, 0, 1},
+                                     {0.8001, 0, 1},
+                                     {-0.7999, 0, 1},
+                                     {-0.8001, 0, 1},
+                                     {0, 0.5999, 1},
+                                     {0, 0.6001, 1},
+                                     {0, -0.5999, 1},
+                                     {0, -0.6001, 1},
+                                     {0, 0, -1}});
+  EXPECT_EQ(find_visible_lamps(map, pinhole_camera(), {{0, 0, 0}, 0}).size(), 4);
 }
 
 TEST(FindVisibleLamps, ExcludesTruncatedLampsWhenDiameterIsKnown) {
-  LampMap map = lamp_map_of({{0.75, 0, 1}, {0, 0, 1}});
-  EXPECT_EQ(visible_lamps(map, pinhole_camera(), {{0, 0, 0}, 0}).size(), 2);
+  LampMap map = make_lamp_map({{0.75, 0, 1}, {0, 0, 1}});
+  EXPECT_EQ(find_visible_lamps(map, pinhole_camera(), {{0, 0, 0}, 0}).size(), 2);
   map.lamps[0].shape = map.lamps[1].shape = make_disc(0.2);
-  const auto visible = visible_lamps(map, pinhole_camera(), {{0, 0, 0}, 0});
+  const auto visible = find_visible_lamps(map, pinhole_camera(), {{0, 0, 0}, 0});
   ASSERT_EQ(visible.size(), 1);
   EXPECT_THAT(visible[0], IsNear(Eigen::Vector3d(0, 0, 1), 0));
 }
 
 TEST(FindVisibleLamps, DependsOnYaw) {
-  const LampMap map = lamp_map_of({{0.7, 0, 1}});
-  EXPECT_EQ(visible_lamps(map, pinhole_camera(), {{0, 0, 0}, 0}).size(), 1);
-  EXPECT_EQ(visible_lamps(map, pinhole_camera(), {{0, 0, 0}, M_PI / 2}).size(), 0);
+  const LampMap map = make_lamp_map({{0.7, 0, 1}});
+  EXPECT_EQ(find_visible_lamps(map, pinhole_camera(), {{0, 0, 0}, 0}).size(), 1);
+  EXPECT_EQ(find_visible_lamps(map, pinhole_camera(), {{0, 0, 0}, M_PI / 2}).size(), 0);
 }
 
 TEST(ComputeFloorLimits, CoversGridRowByRow) {
   const LampMap map = synthetic_lamps();
-  const auto limits = floor_limits(map, pinhole_camera(), {0, 0.3, -0.1, 0.1, 0.1}, 0.2, 0, kNoise);
+  const auto limits =
+      compute_floor_limits(map, pinhole_camera(), {0, 0.3, -0.1, 0.1, 0.1}, 0.2, 0, kNoise);
   ASSERT_EQ(limits.places.size(), 4 * 3);
   EXPECT_THAT(limits.places[5].camera.position_m, IsNear(Eigen::Vector3d(0.1, 0, 0.2), 1e-15));
   for (const auto& place : limits.places) {
@@ -73,8 +74,8 @@ TEST(ComputeFloorLimits, IncludesMotionAndLeanWhenFree) {
   prior.velocity_sd_m_per_s = 1;
   prior.inclination_sd_rad = 2;
   const FloorGrid grid{-1.5, 1.5, -0.3, 0.3, 0.3};
-  const auto standing = floor_limits(synthetic_lamps(), camera, grid, 0.2, 0, kNoise);
-  const auto limits = floor_limits(synthetic_lamps(), camera, grid, 0.2, 0, kNoise, prior);
+  const auto standing = compute_floor_limits(synthetic_lamps(), camera, grid, 0.2, 0, kNoise);
+  const auto limits = compute_floor_limits(synthetic_lamps(), camera, grid, 0.2, 0, kNoise, prior);
   ASSERT_EQ(limits.sources.size(), 6);
   EXPECT_EQ(limits.sources[1].key, "motion");
   EXPECT_EQ(limits.sources[2].key, "lean");
@@ -101,7 +102,7 @@ TEST(ComputeFloorLimits, MatchesScatterWithFisheye) {
   constexpr int draws = 4000;
   const FloorGrid grid{-1.2, 1.2, 0.2, 0.2, 0.8};
   SyntheticRig rig{synthetic_lamps(), {fisheye_camera(), {}, {}, {}, {}}, {}, {}};
-  const auto limits = floor_limits(rig.map, rig.calibration.camera, grid, 0.2, 0.5, kNoise);
+  const auto limits = compute_floor_limits(rig.map, rig.calibration.camera, grid, 0.2, 0.5, kNoise);
   ASSERT_EQ(limits.places.size(), 4);
   const Positioner positioner(rig.map, rig.calibration);
   Random random{23};
@@ -120,7 +121,7 @@ TEST(ComputeFloorLimits, MatchesScatterWithFisheye) {
 
 TEST(ComputeFloorLimits, ReturnsNoPartsWithoutVisibleLamps) {
   const auto limits =
-      floor_limits(synthetic_lamps(), pinhole_camera(), {50, 50, 0, 0, 1}, 0, 0, kNoise);
+      compute_floor_limits(synthetic_lamps(), pinhole_camera(), {50, 50, 0, 0, 1}, 0, 0, kNoise);
   ASSERT_EQ(limits.places.size(), 1);
   EXPECT_EQ(limits.places[0].lamps, 0);
   EXPECT_TRUE(limits.places[0].parts.empty());
@@ -128,7 +129,7 @@ TEST(ComputeFloorLimits, ReturnsNoPartsWithoutVisibleLamps) {
 
 TEST(ComputeFloorLimits, ThrowsOnInvalidGrid) {
   const auto on = [](const FloorGrid& grid) {
-    return floor_limits(synthetic_lamps(), pinhole_camera(), grid, 0, 0, kNoise);
+    return compute_floor_limits(synthetic_lamps(), pinhole_camera(), grid, 0, 0, kNoise);
   };
   EXPECT_THROW(on({0, 1, 0, 1, 0}), std::invalid_argument);
   EXPECT_THROW(on({0, 1, 0, 1, -1}), std::invalid_argument);
@@ -139,7 +140,7 @@ TEST(ComputeFloorLimits, ThrowsOnInvalidGrid) {
 }
 
 TEST(MakeFloorGrid, ReturnsBoundingBoxOfLamps) {
-  const FloorGrid grid = floor_under(synthetic_lamps(), 0.05);
+  const FloorGrid grid = make_floor_grid(synthetic_lamps(), 0.05);
   EXPECT_EQ(grid.x_min_m, -0.8);
   EXPECT_EQ(grid.x_max_m, 0.8);
   EXPECT_EQ(grid.y_min_m, -0.5);

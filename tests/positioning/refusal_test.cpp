@@ -61,7 +61,7 @@ TEST_F(PositionerStatus, ReturnsDuplicateLampForRepeatedId) {
 TEST_F(PositionerStatus, ReturnsTooManyLampsAboveLimit) {
   std::vector<Eigen::Vector3d> positions_m;
   for (int i = 0; i < 257; ++i) positions_m.emplace_back(0.01 * (i % 16), 0.01 * (i / 16), 2);
-  rig.map = lamp_map_of(positions_m);
+  rig.map = make_lamp_map(positions_m);
   auto detections = seen_from(rig);
   ASSERT_EQ(detections.size(), 257);
   EXPECT_EQ(status(detections), FixStatus::too_many_lamps);
@@ -120,7 +120,7 @@ TEST_F(PositionerStatus, ReturnsDegenerateWhenLampsAreCloserThanNoise) {
 }
 
 TEST_F(PositionerStatus, ReturnsAmbiguousForTwoPoses) {
-  rig.map = lamp_map_of({{1.0, 0, 1.6}, {1.2, 0.1, 2.4}});
+  rig.map = make_lamp_map({{1.0, 0, 1.6}, {1.2, 0.1, 2.4}});
   rig.camera = {{0, 0, 0}, 0};
   EXPECT_EQ(status(seen(2)), FixStatus::ambiguous);
 }
@@ -160,11 +160,11 @@ TEST_F(PositionerStatus, ConstructorThrowsOnInvalidArguments) {
 TEST(FixStatus, HasNameAndExplanationForEachValue) {
   for (int i = 0; i <= static_cast<int>(FixStatus::mirrored_map); ++i) {
     const auto status = static_cast<FixStatus>(i);
-    EXPECT_FALSE(name_of(status).empty());
-    EXPECT_FALSE(explanation_of(status).empty());
+    EXPECT_FALSE(to_string(status).empty());
+    EXPECT_FALSE(describe(status).empty());
   }
-  EXPECT_EQ(name_of(FixStatus::ok), "ok");
-  EXPECT_EQ(name_of(FixStatus::mirrored_map), "mirrored_map");
+  EXPECT_EQ(to_string(FixStatus::ok), "ok");
+  EXPECT_EQ(to_string(FixStatus::mirrored_map), "mirrored_map");
 }
 
 }  // namespace

@@ -28,7 +28,7 @@ class PositionerOutlierRejection : public testing::Test {
     return Positioner(rig.map, rig.calibration).locate(detections);
   }
   void expect_truth(const Fix& fix) {
-    ASSERT_TRUE(fix.ok()) << name_of(fix.status);
+    ASSERT_TRUE(fix.ok()) << to_string(fix.status);
     EXPECT_THAT(fix.estimate.pose.position_m, IsNear(rig.camera.position_m, 0.005));
   }
 };
@@ -112,11 +112,11 @@ TEST_F(PositionerOutlierRejection, ReturnsNoWrongFixInRegularGrid) {
   std::vector<Eigen::Vector3d> positions_m;
   for (int i = 0; i < 49; ++i)
     positions_m.emplace_back(0.5 * (i % 7) - 1.5, 0.5 * (i / 7) - 1.5, 1.8);
-  rig.map = lamp_map_of(positions_m);
+  rig.map = make_lamp_map(positions_m);
   int fixes = 0;
   for (int i = 0; i < 2000; ++i) {
     rig.camera = {{random.uniform(-0.5, 0.5), random.uniform(-0.5, 0.5), 0}, random.uniform(-3, 3)};
-    const auto visible = visible_lamps(rig.map, rig.calibration.camera, rig.camera);
+    const auto visible = find_visible_lamps(rig.map, rig.calibration.camera, rig.camera);
     auto detections = with_noise(seen_from(rig, 0.2), random);
     std::erase_if(detections, [&](const Detection& detection) {
       const auto& lamp = rig.map.lamps[static_cast<std::size_t>(detection.lamp) - 1];
@@ -145,7 +145,8 @@ TEST_F(PositionerOutlierRejection, ReturnsNoWrongFixInRegularGrid) {
 
 /// A cluster of lamps and a distant wrong one, which slightly rotates and scales the others.
 TEST_F(PositionerOutlierRejection, RejectsWrongLampFarFromCluster) {
-  rig.map = lamp_map_of({{0, 0, 2.5}, {0.1, 0, 2.5}, {0, 0.1, 2.5}, {1.5, 0, 2.5}, {0, 1.5, 2.5}});
+  rig.map =
+      make_lamp_map({{0, 0, 2.5}, {0.1, 0, 2.5}, {0, 0.1, 2.5}, {1.5, 0, 2.5}, {0, 1.5, 2.5}});
   rig.camera = {{0.3, 0.2, 0}, 0};
   for (const bool stated : {true, false}) {
     auto detections = seen(4);
@@ -160,13 +161,13 @@ TEST_F(PositionerOutlierRejection, RejectsWrongLampFarFromCluster) {
 
 TEST_F(PositionerOutlierRejection, DetectsMirroredMapOfNearlyCollinearLamps) {
   for (const double width_m : {0.1, 0.15, 0.3}) {
-    rig.map = lamp_map_of({{0, 0, 2.5}, {0.6, width_m, 2.5}, {1.2, 0, 2.5}, {1.8, width_m, 2.5}});
+    rig.map = make_lamp_map({{0, 0, 2.5}, {0.6, width_m, 2.5}, {1.2, 0, 2.5}, {1.8, width_m, 2.5}});
     rig.camera = {{0.9, 0, 0}, 0.4};
     const auto detections = seen(4);
-    SyntheticRig drawn_from_below = rig;
-    for (Lamp& lamp : drawn_from_below.map.lamps) lamp.position_m.y() *= -1;
-    const Fix fix = Positioner(drawn_from_below.map, rig.calibration).locate(detections);
-    EXPECT_EQ(fix.status, FixStatus::mirrored_map) << width_m << name_of(fix.status);
+    SyntheticRig mirrored_rig = rig;
+    for (Lamp& lamp : mirrored_rig.map.lamps) lamp.position_m.y() *= -1;
+    const Fix fix = Positioner(mirrored_rig.map, rig.calibration).locate(detections);
+    EXPECT_EQ(fix.status, FixStatus::mirrored_map) << width_m << to_string(fix.status);
   }
 }
 
@@ -183,14 +184,14 @@ TEST_F(PositionerOutlierRejection, ReturnsInconsistentWhenThreeLampsContradict) 
 }
 
 TEST_F(PositionerOutlierRejection, ReturnsInconsistentForMapOfAnotherRoom) {
-  rig.map = lamp_map_of({{0.1, 0.2, 1.6},
-                         {-0.7, 0.4, 1.6},
-                         {0.5, -0.4, 1.6},
-                         {0.2, 0.3, 1.6},
-                         {-0.1, -0.4, 1.6},
-                         {0.8, 0.1, 1.6},
-                         {-0.6, -0.3, 1.6},
-                         {0.4, 0.4, 1.6}});
+  rig.map = make_lamp_map({{0.1, 0.2, 1.6},
+                           {-0.7, 0.4, 1.6},
+                           {0.5, -0.4, 1.6},
+                           {0.2, 0.3, 1.6},
+                           {-0.1, -0.4, 1.6},
+                           {0.8, 0.1, 1.6},
+                           {-0.6, -0.3, 1.6},
+                           {0.4, 0.4, 1.6}});
   const auto detections = seen(8);
   rig.map = synthetic_lamps();
   EXPECT_EQ(locate(detections).status, FixStatus::inconsistent);
@@ -204,10 +205,10 @@ TEST_F(PositionerOutlierRejection, DetectsMirroredMap) {
     }
     for (const std::size_t count : {3u, 4u, 8u}) {
       const auto detections = seen(count);
-      SyntheticRig drawn_from_below = rig;
-      for (Lamp& lamp : drawn_from_below.map.lamps) lamp.position_m.x() *= -1;
-      const Fix fix = Positioner(drawn_from_below.map, rig.calibration).locate(detections);
-      EXPECT_EQ(fix.status, FixStatus::mirrored_map) << count << name_of(fix.status);
+      SyntheticRig mirrored_rig = rig;
+      for (Lamp& lamp : mirrored_rig.map.lamps) lamp.position_m.x() *= -1;
+      const Fix fix = Positioner(mirrored_rig.map, rig.calibration).locate(detections);
+      EXPECT_EQ(fix.status, FixStatus::mirrored_map) << count << to_string(fix.status);
     }
   }
 }

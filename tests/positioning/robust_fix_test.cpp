@@ -22,7 +22,7 @@ std::array<Sighting, 5> sightings() {
                                                {0, 0.5, 1.8}};
   std::array<Sighting, 5> seen;
   for (std::size_t i = 0; i < seen.size(); ++i) {
-    seen[i] = {lamps_m[i], predicted_z(LevelPose(kTruth), lamps_m[i]), Matrix2::Identity(), 0.05};
+    seen[i] = {lamps_m[i], predict_z(LevelPose(kTruth), lamps_m[i]), Matrix2::Identity(), 0.05};
   }
   return seen;
 }

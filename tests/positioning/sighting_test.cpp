@@ -23,7 +23,7 @@ TEST(PredictZ, MatchesProjectionOfLampInLevelFrame) {
                     random.uniform(-3, 3)};
     const Eigen::Vector3d lamp(random.uniform(-2, 2), random.uniform(-2, 2), random.uniform(2, 4));
     const Eigen::Vector3d x_in_level = level_from_world(pose, lamp);
-    EXPECT_THAT(predicted_z(LevelPose(pose), lamp), IsNear(x_in_level.hnormalized(), 1e-14));
+    EXPECT_THAT(predict_z(LevelPose(pose), lamp), IsNear(x_in_level.hnormalized(), 1e-14));
   }
 }
 
@@ -36,7 +36,7 @@ TEST(Predict, DerivativesMatchFiniteDifferences) {
     (i < 3 ? plus.position_m[i] : plus.yaw_rad) += kStep;
     (i < 3 ? minus.position_m[i] : minus.yaw_rad) -= kStep;
     const Eigen::Vector2d difference =
-        (predicted_z(LevelPose(plus), lamp) - predicted_z(LevelPose(minus), lamp)) / (2 * kStep);
+        (predict_z(LevelPose(plus), lamp) - predict_z(LevelPose(minus), lamp)) / (2 * kStep);
     EXPECT_THAT(Eigen::Vector2d(jacobian.col(i)), IsNear(difference, kDifferenceError)) << i;
   }
 }

@@ -41,12 +41,12 @@ std::vector<std::size_t> all_lamps() {
   return lamps;
 }
 
-UnitBudget budget_of(const StatedRig& rig) {
+UnitBudget compute_budget(const StatedRig& rig) {
   return *UnitErrors(rig.map, rig.calibration).budget(rig.camera, all_lamps(), kNoise_px);
 }
 
 /// seen_from() does not apply the dispersion.
-std::vector<Detection> detections_of(const StatedRig& rig) {
+std::vector<Detection> make_detections(const StatedRig& rig) {
   const Lens lens(rig.calibration.camera.lens_model, rig.calibration.camera.intrinsics);
   const Eigen::Matrix3d camera_from_level =
       level_from_camera(rig.calibration, Correction::all).inverse();
@@ -63,10 +63,10 @@ class UnitErrorsParts : public testing::TestWithParam<StatedRig> {};
 
 TEST_P(UnitErrorsParts, BudgetMatchesReportedCovarianceOfFix) {
   const StatedRig& rig = GetParam();
-  const Fix fix = Positioner(rig.map, rig.calibration).locate(detections_of(rig));
+  const Fix fix = Positioner(rig.map, rig.calibration).locate(make_detections(rig));
   ASSERT_TRUE(fix.ok());
   ASSERT_EQ(fix.lamps, 8);
-  const UnitBudget budget = budget_of(rig);
+  const UnitBudget budget = compute_budget(rig);
   const Eigen::Matrix4d common = fix.estimate.covariance - fix.noise_covariance;
   const Eigen::Vector4d sd = fix.estimate.covariance.diagonal().cwiseSqrt();
   const Eigen::Matrix4d scale = sd * sd.transpose();
@@ -86,7 +86,7 @@ TEST_P(UnitErrorsParts, BudgetMatchesReportedCovarianceWithFreeMotion) {
   Sensors sensors;
   sensors.motion = KnownMotion::up_to(2, 1);
   sensors.inclination_sigma_rad = 0.1;
-  const Fix fix = Positioner(rig.map, rig.calibration).locate(detections_of(rig), sensors);
+  const Fix fix = Positioner(rig.map, rig.calibration).locate(make_detections(rig), sensors);
   ASSERT_TRUE(fix.ok());
   ASSERT_EQ(fix.lamps, 8);
   BodyPrior prior;
@@ -113,19 +113,19 @@ TEST_P(UnitErrorsParts, SumToJointCovariance) {
   const UnitErrors unit(rig.map, rig.calibration);
   const Eigen::MatrixXd& whole = unit.common().joint();
   Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(whole.rows(), whole.cols());
-  for (const CommonPart part : kCommonParts) sum += unit.common().only(part).joint();
+  for (const CommonErrorSource part : kCommonErrorSources) sum += unit.common().only(part).joint();
   const Eigen::VectorXd inverse_sd = whole.diagonal().cwiseSqrt().cwiseInverse();
   EXPECT_THAT(inverse_sd.asDiagonal() * (sum - whole) * inverse_sd.asDiagonal(),
               IsNear(Eigen::MatrixXd::Zero(whole.rows(), whole.cols()), 1e-13));
 }
 
 TEST_P(UnitErrorsParts, ArePositiveSemidefinite) {
-  const UnitBudget budget = budget_of(GetParam());
+  const UnitBudget budget = compute_budget(GetParam());
   for (const Matrix4& part :
        {budget.noise, budget.lens, budget.zenith, budget.offset, budget.lamp_map}) {
     const Eigen::Vector4d sd = budget.total().diagonal().cwiseSqrt().cwiseInverse();
     const Eigen::MatrixXd scaled = sd.asDiagonal() * part * sd.asDiagonal();
-    EXPECT_GT(symmetric_eigen(scaled).values.minCoeff(), -1e-9);
+    EXPECT_GT(decompose_symmetric(scaled).values.minCoeff(), -1e-9);
   }
 }
 
@@ -140,7 +140,7 @@ TEST(UnitErrors, PartIsZeroForExactQuantity) {
     MatrixX& left = other.calibration.adjustment->covariance;
     left.middleRows(first, size).setZero();
     left.middleCols(first, size).setZero();
-    return budget_of(other);
+    return compute_budget(other);
   };
   const UnitBudget lens = without(0, 12), zenith = without(12, 2), map = without(16, 24);
   EXPECT_TRUE(lens.lens.isZero(0) && zenith.zenith.isZero(0) && map.lamp_map.isZero(0));
@@ -149,20 +149,20 @@ TEST(UnitErrors, PartIsZeroForExactQuantity) {
     EXPECT_TRUE(budget.offset.isZero(0));
   }
   covariance.setZero();
-  EXPECT_TRUE(budget_of(rig).common().isZero(0));
+  EXPECT_TRUE(compute_budget(rig).common().isZero(0));
 }
 
 /// Each part of sequential steps results from the covariance of one step alone.
 TEST(UnitErrors, PartsMatchSequentialSteps) {
   const StatedRig rig = in_a_row();
-  const UnitBudget whole = budget_of(rig);
+  const UnitBudget whole = compute_budget(rig);
   StatedRig only_lens = rig, only_zenith = rig, only_offset = rig, only_map = rig;
   const auto clear = [](StatedRig& one, bool lens, bool zenith, bool offset, bool map) {
     if (!lens) one.calibration.intrinsics_report->covariance->setZero();
     if (!zenith) one.calibration.rotation_center->covariance->setZero();
     if (!offset) one.calibration.dispersion->covariance->setZero();
     for (Lamp& lamp : one.map.lamps) lamp.sd_m = map ? *lamp.sd_m : 0;
-    return budget_of(one).common();
+    return compute_budget(one).common();
   };
   const double small = 1e-9 * whole.common().cwiseAbs().maxCoeff();
   EXPECT_THAT(whole.lens, IsNear(clear(only_lens, true, false, false, false), small));
@@ -174,11 +174,11 @@ TEST(UnitErrors, PartsMatchSequentialSteps) {
 /// Fixes with calibrations and maps drawn from the reported covariance, and with pixel noise.
 TEST(UnitErrors, BudgetMatchesErrorsOfDrawnCalibrations) {
   const StatedRig rig = adjusted();
-  const UnitBudget budget = budget_of(rig);
-  const auto exact = detections_of(rig);
+  const UnitBudget budget = compute_budget(rig);
+  const auto exact = make_detections(rig);
   const Eigen::MatrixXd root = rig.calibration.adjustment->covariance.llt().matrixL();
   Random random(11);
-  Judged judged;
+  NeesStatistics nees;
   Eigen::Matrix4d scatter = Eigen::Matrix4d::Zero();
   constexpr int trials = 2000;
   for (int trial = 0; trial < trials; ++trial) {
@@ -194,20 +194,20 @@ TEST(UnitErrors, BudgetMatchesErrorsOfDrawnCalibrations) {
     }
     const Fix fix = Positioner(map, calibration).locate(with_noise(exact, random));
     ASSERT_TRUE(fix.ok());
-    const Eigen::Vector4d off = error_of(fix, rig.camera);
+    const Eigen::Vector4d off = compute_pose_error(fix, rig.camera);
     scatter += off * off.transpose() / trials;
-    judged.add(off, budget.total());
+    nees.add(off, budget.total());
   }
   // 2000 draws determine a variance to 3.2 %, its root to half of that.
   for (int i = 0; i < 4; ++i) {
     EXPECT_NEAR(std::sqrt(scatter(i, i) / budget.total()(i, i)), 1, 0.06) << i;
   }
-  EXPECT_NEAR(judged.mean(), 1, 0.06);
-  EXPECT_NEAR(judged.share(), 0.95, 0.02);
+  EXPECT_NEAR(nees.mean(), 1, 0.06);
+  EXPECT_NEAR(nees.fraction(), 0.95, 0.02);
 }
 
 TEST(ComputeFixSds, ReturnsZeroForNegativeVariances) {
-  const FixSpread spread = spread_of(Matrix4(-1e-22 * Matrix4::Identity()));
+  const FixSds spread = compute_fix_sds(Matrix4(-1e-22 * Matrix4::Identity()));
   EXPECT_EQ(spread.horizontal_m, 0);
   EXPECT_EQ(spread.height_m, 0);
   EXPECT_EQ(spread.yaw_rad, 0);
@@ -215,35 +215,36 @@ TEST(ComputeFixSds, ReturnsZeroForNegativeVariances) {
 
 TEST(UnitErrors, StatedReportsKnownParts) {
   StatedRig rig;
-  const auto stated = [&](CommonPart part) {
+  const auto stated = [&](CommonErrorSource part) {
     return UnitErrors(rig.map, rig.calibration).common().stated(part);
   };
   EXPECT_FALSE(UnitErrors(rig.map, rig.calibration).common().stated());
-  EXPECT_FALSE(stated(CommonPart::lens) || stated(CommonPart::zenith) || stated(CommonPart::lamps));
-  EXPECT_TRUE(stated(CommonPart::offset));  // there is none
+  EXPECT_FALSE(stated(CommonErrorSource::lens) || stated(CommonErrorSource::zenith) ||
+               stated(CommonErrorSource::lamps));
+  EXPECT_TRUE(stated(CommonErrorSource::offset));  // there is none
   rig = in_a_row();
-  for (const CommonPart part : kCommonParts) EXPECT_TRUE(stated(part));
+  for (const CommonErrorSource part : kCommonErrorSources) EXPECT_TRUE(stated(part));
   rig.map.lamps[3].sd_m.reset();
   rig.calibration.dispersion->covariance.reset();
-  EXPECT_FALSE(stated(CommonPart::lamps) || stated(CommonPart::offset));
+  EXPECT_FALSE(stated(CommonErrorSource::lamps) || stated(CommonErrorSource::offset));
 }
 
 TEST(UnitErrors, LampsSeenFromAppliesTilt) {
   StatedRig rig;
-  rig.map = lamp_map_of({{0, 0, 1.6}, {0.1, 0, 1.6}});
+  rig.map = make_lamp_map({{0, 0, 1.6}, {0.1, 0, 1.6}});
   rig.camera = {{0, 0, 0}, 0};
   rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.9, 0);
-  EXPECT_TRUE(UnitErrors(rig.map, rig.calibration).lamps_seen_from(rig.camera).empty());
+  EXPECT_TRUE(UnitErrors(rig.map, rig.calibration).find_visible_lamps(rig.camera).empty());
   rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.1, 0);
-  EXPECT_EQ(UnitErrors(rig.map, rig.calibration).lamps_seen_from(rig.camera).size(), 2U);
+  EXPECT_EQ(UnitErrors(rig.map, rig.calibration).find_visible_lamps(rig.camera).size(), 2U);
 }
 
 TEST(FloorSummary, LargestReturnsDominantSource) {
   StatedRig rig = in_a_row();
   const auto summary_of = [&](double map_sd_m, double noise_px) {
     for (Lamp& lamp : rig.map.lamps) lamp.sd_m = map_sd_m;
-    const FloorLimits limits = floor_limits(UnitErrors(rig.map, rig.calibration),
-                                            {-0.2, 0.2, -0.1, 0.1, 0.1}, 0, 0.4, noise_px);
+    const FloorLimits limits = compute_floor_limits(UnitErrors(rig.map, rig.calibration),
+                                                    {-0.2, 0.2, -0.1, 0.1, 0.1}, 0, 0.4, noise_px);
     EXPECT_EQ(limits.sources.size(), 5U);
     EXPECT_EQ(limits.places.size(), 15U);
     return *summarize(limits);
@@ -251,12 +252,12 @@ TEST(FloorSummary, LargestReturnsDominantSource) {
   EXPECT_EQ(summary_of(0.01, 0.1).largest().source.key, "lamp_map");
   EXPECT_EQ(summary_of(1e-5, 5).largest().source.key, "noise");
   const FloorSummary summary = summary_of(0.001, 0.1);
-  double shares = 0;
-  for (const auto& source : summary.sources) shares += source.share;
-  EXPECT_NEAR(shares, 1, 1e-12);
+  double sum_of_fractions = 0;
+  for (const auto& source : summary.sources) sum_of_fractions += source.fraction;
+  EXPECT_NEAR(sum_of_fractions, 1, 1e-12);
   rig.calibration.dispersion.reset();
   const FloorLimits without =
-      floor_limits(UnitErrors(rig.map, rig.calibration), {0, 0, 0, 0, 0.1}, 0, 0.4, 0.1);
+      compute_floor_limits(UnitErrors(rig.map, rig.calibration), {0, 0, 0, 0, 0.1}, 0, 0.4, 0.1);
   EXPECT_EQ(without.sources.size(), 4U);
 }
 

@@ -20,7 +20,7 @@ namespace {
 using testing::HasSubstr;
 
 /// Returns the exit code of a program that executes `run`, and its stderr.
-std::pair<int, std::string> end_of(const std::function<void()>& run) {
+std::pair<int, std::string> run_and_capture(const std::function<void()>& run) {
   std::string name = "vlp-something";
   char* argv[] = {name.data(), nullptr};
   CLI::App app("Something", name);
@@ -30,15 +30,16 @@ std::pair<int, std::string> end_of(const std::function<void()>& run) {
 }
 
 TEST(RunApp, ReturnsExitCodeOfOutcome) {
-  EXPECT_EQ(end_of([] {}).first, kDone);
-  EXPECT_EQ(end_of([] { throw GateNotMet("mean_mm"); }).first, kGateNotMet);
-  EXPECT_EQ(end_of([] { throw InputError("lamps.yaml", "is empty"); }).first, kBadInput);
-  EXPECT_EQ(end_of([] { throw std::invalid_argument("no such lens"); }).first, kBadInput);
-  EXPECT_EQ(end_of([] { throw Undetermined("add lamps"); }).first, kUndetermined);
+  EXPECT_EQ(run_and_capture([] {}).first, kDone);
+  EXPECT_EQ(run_and_capture([] { throw GateNotMet("mean_mm"); }).first, kGateNotMet);
+  EXPECT_EQ(run_and_capture([] { throw InputError("lamps.yaml", "is empty"); }).first, kBadInput);
+  EXPECT_EQ(run_and_capture([] { throw std::invalid_argument("no such lens"); }).first, kBadInput);
+  EXPECT_EQ(run_and_capture([] { throw Undetermined("add lamps"); }).first, kUndetermined);
 }
 
 TEST(RunApp, PrintsErrorInOnePrintableLine) {
-  const std::string said = end_of([] { throw Undetermined("lamp \x1b[2J is dark"); }).second;
+  const std::string said =
+      run_and_capture([] { throw Undetermined("lamp \x1b[2J is dark"); }).second;
   EXPECT_THAT(said, HasSubstr("vlp-something: error: lamp "));
   EXPECT_EQ(said.find('\x1b'), std::string::npos);
   EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 1);
@@ -49,7 +50,7 @@ std::pair<int, std::string> end_with_full_stdout(const std::function<void()>& ru
   const int kept = ::dup(STDOUT_FILENO), full = ::open("/dev/full", O_WRONLY | O_CLOEXEC);
   std::fflush(stdout);
   ::dup2(full, STDOUT_FILENO);
-  const auto end = end_of([&] {
+  const auto end = run_and_capture([&] {
     std::fputs("figures\n", stdout);
     run();
   });
@@ -73,7 +74,7 @@ TEST(CheckOutput, RejectsInputFile) {
   const TemporaryFolder folder;
   const std::string lamps = folder.file("lamps.yaml", "x").string();
   const std::string again = (folder / ".").string() + "/lamps.yaml";
-  EXPECT_THAT(refusal_of<std::invalid_argument>([&] {
+  EXPECT_THAT(rejection_message<std::invalid_argument>([&] {
                 check_output(again, {"", lamps});
               }),
               HasSubstr("is an input, too"));
@@ -84,7 +85,7 @@ TEST(CheckOutputs, RejectsSameFileTwice) {
   const TemporaryFolder folder;
   const std::string file = (folder / "a").string(), same = (folder / "b/../a").string();
   check_outputs({{"--output", file}, {"--ros", ""}, {"--plot", ""}}, {});
-  EXPECT_EQ(refusal_of<std::invalid_argument>([&] {
+  EXPECT_EQ(rejection_message<std::invalid_argument>([&] {
               check_outputs({{"--output", file}, {"--ros", ""}, {"--plot", same}}, {});
             }),
             "--output and --plot name one file");
@@ -96,8 +97,8 @@ TEST(Validators, CheckNumbersAndNames) {
   EXPECT_NE(finite()("1 m"), "");
   EXPECT_EQ(finite_not_negative()("0"), "");
   EXPECT_NE(finite_positive()("0"), "");
-  EXPECT_EQ(is_picture()("a.svg"), "");
-  EXPECT_NE(is_picture()("a.pdf"), "");
+  EXPECT_EQ(is_plot_file()("a.svg"), "");
+  EXPECT_NE(is_plot_file()("a.pdf"), "");
   EXPECT_EQ(ends_in(".csv")("corners.csv"), "");
   EXPECT_EQ(ends_in(".csv")("corners.vnl"), "the file's name should end in .csv");
 }

@@ -12,7 +12,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 
 /// Formats a row as one text.
-std::vector<std::string> texts(const std::vector<ReportFigure>& figures) {
+std::vector<std::string> texts(const std::vector<ReportStatistic>& figures) {
   std::vector<std::string> lines;
   for (const auto& [label, value, unit, interval] : figures) {
     lines.push_back(label + " | " + value + " | " + unit + " | " + interval);
@@ -22,8 +22,8 @@ std::vector<std::string> texts(const std::vector<ReportFigure>& figures) {
 
 Evaluation evaluation() {
   Evaluation evaluation;
-  evaluation.against = "truth";
-  evaluation.drawn = "captures";
+  evaluation.reference = "truth";
+  evaluation.resampling_unit = "captures";
   evaluation.captures = 10;
   evaluation.fixes = 8;
   evaluation.missing = {{"degenerate", 1}, {"no row", 1}};
@@ -33,7 +33,7 @@ Evaluation evaluation() {
 
 TEST(ReportStatistics, FormatsMillimetersAndOmitsMissingStatistics) {
   EXPECT_THAT(
-      texts(report_figures(evaluation())),
+      texts(make_report_statistics(evaluation())),
       ElementsAre("captures | 10 |  | ", "without a fix | 2 |  | ",
                   "horizontal error, mean | 1 | mm | ", "horizontal error, median | 2 | mm | ",
                   "horizontal error, 90th percentile | 3 | mm | ",
@@ -44,24 +44,24 @@ TEST(ReportStatistics, FormatsMillimetersAndOmitsMissingStatistics) {
 TEST(ReportStatistics, MatchesIntervalsToStatistics) {
   Evaluation full = evaluation();
   full.intervals_m = {{0.001, 0.002}, {0.003, 0.004}, Interval{0.005, 0.006}, {0.007, 0.008}, 5};
-  full.drawn = "stations";
-  const auto lines = texts(report_figures(full));
+  full.resampling_unit = "stations";
+  const auto lines = texts(make_report_statistics(full));
   EXPECT_THAT(lines, Contains("horizontal error, median | 2 | mm | 3 to 4"));
   EXPECT_THAT(lines, Contains("horizontal error, root mean square | 5 | mm | 7 to 8"));
   EXPECT_THAT(lines, Contains("horizontal error, 90th percentile | 3 | mm | 5 to 6"));
-  EXPECT_THAT(report_notes(full), Contains(HasSubstr("bootstrap over 5 stations")));
-  EXPECT_THAT(report_notes(full), Contains(HasSubstr("Caution: of so few as 5 stations")));
+  EXPECT_THAT(make_report_notes(full), Contains(HasSubstr("bootstrap over 5 stations")));
+  EXPECT_THAT(make_report_notes(full), Contains(HasSubstr("Caution: of so few as 5 stations")));
   full.intervals_m->p90 = {};
-  EXPECT_THAT(texts(report_figures(full)),
+  EXPECT_THAT(texts(make_report_statistics(full)),
               Contains("horizontal error, 90th percentile | 3 | mm | "));
   full.comparison = Comparison{};
   EXPECT_THAT(
-      report_notes(full),
+      make_report_notes(full),
       Contains(HasSubstr("other fixes: no evidence, too few; 0 captures have a fix in both")));
 }
 
 TEST(ReportNotes, ReportsReferenceAndMissingFixes) {
-  const auto notes = report_notes(evaluation());
+  const auto notes = make_report_notes(evaluation());
   EXPECT_THAT(notes, ElementsAre("Horizontal errors are distances from the true place, by image.",
                                  "Captures without a fix: 1 degenerate, 1 no row.",
                                  "Caution: there are too few captures with a fix for intervals."));
@@ -71,7 +71,7 @@ TEST(ReportStatistics, LabelsBeginWithNameOfDrive) {
   LineFit fit{};
   fit.distances_m = {1001, 0.001, 0.002, 0.003, 0.004, 0.005};
   fit.jitter_m = 0.006;
-  EXPECT_THAT(texts(report_figures("a.csv", fit)),
+  EXPECT_THAT(texts(make_report_statistics("a.csv", fit)),
               ElementsAre("a.csv: fitted line from the commanded one, mean | 1 | mm | ",
                           "a.csv: the same, 90th percentile | 3 | mm | ",
                           "a.csv: jitter across the fitted line, root mean square | 6 | mm | "));

@@ -27,7 +27,7 @@ TEST(MakeEvaluationPlots, ContainsFloorPlanAndDistribution) {
                        {"b", {0.5, 0}, {}, {}, 3},
                        {"c", {1, 0}, {}, {}, 4},
                        {"d", {0, 1}, {}, {}, 5}}};
-  const auto pictures = evaluation_pictures(with_truth, evaluate(with_truth), {});
+  const auto pictures = make_evaluation_plots(with_truth, evaluate(with_truth), {});
   ASSERT_EQ(pictures.size(), 2u);
   EXPECT_EQ(pictures[0].part, ReportPart::floor);
   EXPECT_THAT(pictures[0].image, HasSubstr("no fix: 1"));
@@ -71,7 +71,7 @@ struct StatedRoom {
 
 TEST(MakeBudgetPlot, DividesReportedVarianceBySource) {
   const StatedRoom room;
-  const auto picture = budget_picture(room.fixes(), room.lamps, room.calibration);
+  const auto picture = make_budget_plot(room.fixes(), room.lamps, room.calibration);
   ASSERT_TRUE(picture);
   EXPECT_EQ(picture->part, ReportPart::distribution);
   // 0.18 of the 2 mm^2 are noise.
@@ -88,23 +88,23 @@ TEST(MakeBudgetPlot, OmitsFixesWithEstimatedRollPitch) {
   auto fixes = room.fixes();
   fixes[1].fix->sd = Eigen::Vector4d(1e-2, 1e-2, 2e-2, 2e-3);
   fixes[1].fix->inclination = Inclination{0.1, 0};
-  const auto picture = budget_picture(fixes, room.lamps, room.calibration);
+  const auto picture = make_budget_plot(fixes, room.lamps, room.calibration);
   ASSERT_TRUE(picture);
   EXPECT_THAT(picture->image, HasSubstr("noise, 9 %"));
   EXPECT_THAT(picture->caption, HasSubstr("as for a level camera"));
   fixes[0].fix->inclination = Inclination{0, 0};
-  EXPECT_FALSE(budget_picture(fixes, room.lamps, room.calibration));
+  EXPECT_FALSE(make_budget_plot(fixes, room.lamps, room.calibration));
 }
 
 TEST(MakeBudgetPlot, ReturnsNulloptWithoutReportedCommonPart) {
   StatedRoom room;
-  EXPECT_FALSE(budget_picture(room.fixes(), {}, room.calibration));
+  EXPECT_FALSE(make_budget_plot(room.fixes(), {}, room.calibration));
   auto fixes = room.fixes();
   for (FixRow& row : fixes) row.fix->noise_sd.reset();
-  EXPECT_FALSE(budget_picture(fixes, room.lamps, room.calibration));
+  EXPECT_FALSE(make_budget_plot(fixes, room.lamps, room.calibration));
   for (Lamp& lamp : room.lamps.lamps) lamp.sd_m.reset();
   room.calibration.rotation_center->covariance.reset();
-  EXPECT_FALSE(budget_picture(room.fixes(), room.lamps, room.calibration));
+  EXPECT_FALSE(make_budget_plot(room.fixes(), room.lamps, room.calibration));
 }
 
 /// A rejected lamp does not contribute to the uncertainty of the fix.
@@ -112,16 +112,16 @@ TEST(MakeBudgetPlot, OmitsLampsRejectedByFix) {
   StatedRoom room;
   room.lamps.lamps[0].sd_m = 0.1;
   auto fixes = room.fixes();
-  EXPECT_THAT(budget_picture(fixes, room.lamps, room.calibration)->alt, HasSubstr("zenith 0 %"));
+  EXPECT_THAT(make_budget_plot(fixes, room.lamps, room.calibration)->alt, HasSubstr("zenith 0 %"));
   for (FixRow& row : fixes) row.rejected = {1};
-  EXPECT_THAT(budget_picture(fixes, room.lamps, room.calibration)->alt,
+  EXPECT_THAT(make_budget_plot(fixes, room.lamps, room.calibration)->alt,
               testing::Not(HasSubstr("zenith 0 %")));
 }
 
 TEST(MakeEvaluationPlots, ContainsTrackAlongCommandedLine) {
   EvaluationInput with_line = input();
   with_line.line_m = {Eigen::Vector2d{0, 0}, Eigen::Vector2d{1, 0}};
-  const auto pictures = evaluation_pictures(with_line, evaluate(with_line), {});
+  const auto pictures = make_evaluation_plots(with_line, evaluate(with_line), {});
   ASSERT_EQ(pictures.size(), 2u);
   EXPECT_EQ(pictures[0].part, ReportPart::tracks);
   EXPECT_THAT(pictures[0].caption, HasSubstr("Drive. Above"));

@@ -17,13 +17,13 @@ using testing::Not;
 
 TEST(ReadReportPlot, RecognizesPlotsByTitle) {
   const TemporaryFolder folder;
-  draw(folder / "a.svg", drawing_of(RotationPlot{"", {}, {203, 198}, {210, 190}}));
-  EXPECT_EQ(read_report_picture(folder / "a.svg").part, ReportPart::rotation);
+  draw(folder / "a.svg", make_drawing(RotationPlot{"", {}, {203, 198}, {210, 190}}));
+  EXPECT_EQ(read_report_plot(folder / "a.svg").part, ReportPart::rotation);
   draw(folder / "b.svg",
-       drawing_of(DispersionPlot{"", {{{0.01, 0}}, {{0, 0}, 0.01}}, {{}, {}}, {}}));
-  const ReportPicture picture = read_report_picture(folder / "b.svg");
+       make_drawing(DispersionPlot{"", {{{0.01, 0}}, {{0, 0}, 0.01}}, {{}, {}}, {}}));
+  const ReportPlot picture = read_report_plot(folder / "b.svg");
   EXPECT_EQ(picture.part, ReportPart::dispersion);
-  EXPECT_EQ(picture.image, TemporaryFolder::content_of(folder / "b.svg"));
+  EXPECT_EQ(picture.image, TemporaryFolder::read_content(folder / "b.svg"));
   EXPECT_THAT(picture.caption, HasSubstr("station"));
   EXPECT_THAT(picture.alt, HasSubstr("dispersion"));
 }
@@ -31,27 +31,27 @@ TEST(ReadReportPlot, RecognizesPlotsByTitle) {
 TEST(ReadReportPlot, NamesUnknownImagesByFile) {
   const TemporaryFolder folder;
   const auto file = folder.file("my room.svg", "<?xml?><svg><title>else</title></svg>");
-  EXPECT_EQ(read_report_picture(file).part, ReportPart::other);
-  EXPECT_EQ(read_report_picture(file).caption, "my room.svg");
-  EXPECT_EQ(read_report_picture(folder.file("a.png", "\x89PNG...IEND\xAE\x42\x60\x82")).part,
+  EXPECT_EQ(read_report_plot(file).part, ReportPart::other);
+  EXPECT_EQ(read_report_plot(file).caption, "my room.svg");
+  EXPECT_EQ(read_report_plot(folder.file("a.png", "\x89PNG...IEND\xAE\x42\x60\x82")).part,
             ReportPart::other);
 }
 
 TEST(ReadReportPlot, RejectsInvalidFile) {
   const TemporaryFolder folder;
-  EXPECT_THAT(refusal_of([&] { read_report_picture(folder / "none.svg"); }),
+  EXPECT_THAT(rejection_message([&] { read_report_plot(folder / "none.svg"); }),
               HasSubstr("none.svg: cannot be opened"));
-  EXPECT_THAT(refusal_of([&] { read_report_picture(folder.file("a.svg", "")); }),
+  EXPECT_THAT(rejection_message([&] { read_report_plot(folder.file("a.svg", "")); }),
               HasSubstr("a.svg: is neither an SVG nor a PNG"));
-  EXPECT_THAT(refusal_of([&] { read_report_picture(folder.file("b.svg", "x,y\n")); }),
+  EXPECT_THAT(rejection_message([&] { read_report_plot(folder.file("b.svg", "x,y\n")); }),
               HasSubstr("b.svg: is neither"));
   for (const char* cut : {"<?xml?><svg><title>else</title>", "<svg></svg>", "\x89PNG.."}) {
-    EXPECT_THAT(refusal_of([&] { read_report_picture(folder.file("d.svg", cut)); }),
+    EXPECT_THAT(rejection_message([&] { read_report_plot(folder.file("d.svg", cut)); }),
                 HasSubstr("d.svg: is cut short"))
         << cut;
   }
   const std::string long_svg = "<svg>" + std::string((16u << 20) + 1, ' ');
-  EXPECT_THAT(refusal_of([&] { read_report_picture(folder.file("c.svg", long_svg)); }),
+  EXPECT_THAT(rejection_message([&] { read_report_plot(folder.file("c.svg", long_svg)); }),
               HasSubstr("c.svg: is longer than 16 MiB"));
 }
 

@@ -24,7 +24,7 @@ TEST(ReadBoard, ReadsEveryKey) {
 TEST(WriteBoard, MatchesFormatByteForByte) {
   const TemporaryFolder folder;
   write_board(folder / "board.yaml", sample_board());
-  EXPECT_EQ(folder.content_of(folder / "board.yaml"), kBoardYaml);
+  EXPECT_EQ(folder.read_content(folder / "board.yaml"), kBoardYaml);
 }
 
 TEST(WriteBoard, KeepsEachIdOrder) {
@@ -45,7 +45,7 @@ TEST(WriteBoard, KeepsEachIdOrder) {
     board.id_order = order;
     expect_same(read_board(folder.file("board.yaml", text)), board);
     write_board(folder / "written.yaml", board);
-    EXPECT_EQ(folder.content_of(folder / "written.yaml"), text);
+    EXPECT_EQ(folder.read_content(folder / "written.yaml"), text);
   }
 }
 
@@ -79,13 +79,14 @@ TEST(ReadBoard, UsesKalibrOffsetAsFirstId) {
 
 TEST(ReadBoard, RejectsOtherKalibrTargetsAndKeys) {
   const TemporaryFolder folder;
-  const auto refusal_of = [&](const std::string& from, const std::string& to) {
+  const auto rejection_message = [&](const std::string& from, const std::string& to) {
     return refusal(read_board, folder.file("target.yaml", changed(kKalibrTarget, from, to)));
   };
-  EXPECT_THAT(refusal_of("aprilgrid", "circlegrid"), HasSubstr("aprilgrid or checkerboard"));
-  EXPECT_THAT(refusal_of("tagSize", "tagsize"), HasSubstr("key 'tagSize' is missing"));
-  EXPECT_THAT(refusal_of("tagCols: 5", "tagCols: 0"), HasSubstr("tagCols"));
-  EXPECT_THAT(refusal_of("#gridtype", "\nrowSpacingMeters: 1"), HasSubstr("'rowSpacingMeters'"));
+  EXPECT_THAT(rejection_message("aprilgrid", "circlegrid"), HasSubstr("aprilgrid or checkerboard"));
+  EXPECT_THAT(rejection_message("tagSize", "tagsize"), HasSubstr("key 'tagSize' is missing"));
+  EXPECT_THAT(rejection_message("tagCols: 5", "tagCols: 0"), HasSubstr("tagCols"));
+  EXPECT_THAT(rejection_message("#gridtype", "\nrowSpacingMeters: 1"),
+              HasSubstr("'rowSpacingMeters'"));
 }
 
 Board squares(BoardKind kind) {
@@ -105,7 +106,7 @@ TEST(ReadBoard, ReadsBoardsOfSquares) {
       "format: vlp-board/1\nkind: chessboard\ncols: 10\nrows: 7\nsquare_size_m: 0.03\n";
   expect_same(read_board(folder.file("board.yaml", chessboard)), squares(BoardKind::chessboard));
   write_board(folder / "written.yaml", squares(BoardKind::chessboard));
-  EXPECT_EQ(folder.content_of(folder / "written.yaml"), chessboard);
+  EXPECT_EQ(folder.read_content(folder / "written.yaml"), chessboard);
 
   Board charuco = squares(BoardKind::charuco);
   charuco.family = "DICT_5X5_100";
@@ -116,22 +117,23 @@ TEST(ReadBoard, ReadsBoardsOfSquares) {
   const std::string all = std::string(kCharuco) + "first_id: 5\ntop_left: white\n";
   expect_same(read_board(folder.file("board.yaml", all)), charuco);
   write_board(folder / "written.yaml", charuco);
-  EXPECT_EQ(folder.content_of(folder / "written.yaml"), all);
+  EXPECT_EQ(folder.read_content(folder / "written.yaml"), all);
 }
 
 TEST(ReadBoard, RejectsInvalidBoardOfSquares) {
   const TemporaryFolder folder;
-  const auto refusal_of = [&](const std::string& from, const std::string& to) {
+  const auto rejection_message = [&](const std::string& from, const std::string& to) {
     return refusal(read_board, folder.file("board.yaml", changed(kCharuco, from, to)));
   };
-  EXPECT_THAT(refusal_of("charuco", "checkers"),
+  EXPECT_THAT(rejection_message("charuco", "checkers"),
               HasSubstr("board.yaml:2: kind: 'checkers' is unknown; the kinds of boards are: "
                         "apriltags, chessboard, charuco"));
-  EXPECT_THAT(refusal_of("charuco", "chessboard"), HasSubstr("'marker_size_m'"));
-  EXPECT_THAT(refusal_of("rows: 7", "rows: 3"), HasSubstr("within 4 and 100"));
-  EXPECT_THAT(refusal_of("0.02", "0.03"), HasSubstr("smaller than the square around it"));
-  EXPECT_THAT(refusal_of("DICT_5X5_100", "tag36h11"), HasSubstr("one of OpenCV's dictionaries"));
-  EXPECT_THAT(refusal_of("dictionary", "top_left: red\ndictionary"),
+  EXPECT_THAT(rejection_message("charuco", "chessboard"), HasSubstr("'marker_size_m'"));
+  EXPECT_THAT(rejection_message("rows: 7", "rows: 3"), HasSubstr("within 4 and 100"));
+  EXPECT_THAT(rejection_message("0.02", "0.03"), HasSubstr("smaller than the square around it"));
+  EXPECT_THAT(rejection_message("DICT_5X5_100", "tag36h11"),
+              HasSubstr("one of OpenCV's dictionaries"));
+  EXPECT_THAT(rejection_message("dictionary", "top_left: red\ndictionary"),
               HasSubstr("top_left: 'red' is unknown; the colours of a square are: black, white"));
 }
 

@@ -17,7 +17,7 @@ std::string calibration_refusal(const std::string& yaml) {
 }
 
 /// Returns "calibration.yaml:LINE: " for the line of the sample with `text`.
-std::string place_of(const std::string& text) {
+std::string line_prefix(const std::string& text) {
   const auto begin = kCalibrationYaml.begin();
   const auto end = begin + static_cast<std::ptrdiff_t>(kCalibrationYaml.find(text));
   return "calibration.yaml:" + std::to_string(std::count(begin, end, '\n') + 1) + ": ";
@@ -34,7 +34,7 @@ void expect_refused(const std::vector<Case>& cases) {
   for (const Case& c : cases) {
     SCOPED_TRACE(c.from + " -> " + c.to);
     EXPECT_THAT(calibration_refusal(changed(kCalibrationYaml, c.from, c.to)),
-                testing::StartsWith(place_of(c.at.empty() ? c.from : c.at) + c.problem));
+                testing::StartsWith(line_prefix(c.at.empty() ? c.from : c.at) + c.problem));
   }
 }
 

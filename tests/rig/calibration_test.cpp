@@ -23,7 +23,8 @@ void expect_kept(const Calibration& calibration) {
   const Calibration found = read_calibration(folder / "first.yaml");
   expect_same(found, calibration);
   write_calibration(folder / "second.yaml", found);
-  EXPECT_EQ(folder.content_of(folder / "second.yaml"), folder.content_of(folder / "first.yaml"));
+  EXPECT_EQ(folder.read_content(folder / "second.yaml"),
+            folder.read_content(folder / "first.yaml"));
 }
 
 TEST(ReadCalibration, ReadsEveryKey) {
@@ -36,7 +37,7 @@ TEST(ReadCalibration, ReadsEveryKey) {
 TEST(WriteCalibration, MatchesFormatByteForByte) {
   const TemporaryFolder folder;
   write_calibration(folder / "calibration.yaml", sample_calibration());
-  EXPECT_EQ(folder.content_of(folder / "calibration.yaml"), kCalibrationYaml);
+  EXPECT_EQ(folder.read_content(folder / "calibration.yaml"), kCalibrationYaml);
   EXPECT_EQ(calibration_text(sample_calibration()), kCalibrationYaml);
 }
 
@@ -69,7 +70,7 @@ TEST(ReadCalibration, RejectsMismatchedAdjustment) {
   calibration.adjustment =
       Adjustment{{{3, {1, 2, 3}}}, Eigen::MatrixXd::Identity(15, 15), {"rotation"}, 12, 70, 0.05};
   write_calibration(folder / "good.yaml", calibration);
-  const std::string good = folder.content_of(folder / "good.yaml");
+  const std::string good = folder.read_content(folder / "good.yaml");
   const auto refusal = [&](const std::string& from, const std::string& to) {
     const auto file = folder.file("bad.yaml", changed(good, from, to));
     try {
@@ -141,7 +142,7 @@ TEST(WriteCalibration, KeepsEachLensModelWithParameters) {
                                           {LensModel::opencv8, 12},
                                           {LensModel::opencv12, 16},
                                           {LensModel::fisheye, 8},
-                                          {splined_lens({3, 4, 5, 90}), 44}}) {
+                                          {lens_model_for({3, 4, 5, 90}), 44}}) {
     Calibration calibration = bare_calibration();
     calibration.camera.lens_model = model;
     for (int i = 4; i < parameters; ++i) calibration.camera.intrinsics.push_back(i * -1e-3);
@@ -164,7 +165,7 @@ TEST(WriteCalibration, KeepsErrorsOfSplinedLensCore) {
   }
   calibration.adjustment.reset();
   std::erase_if(calibration.history, [](const auto& entry) { return entry.part == "adjustment"; });
-  calibration.camera.lens_model = splined_lens({2, 3, 3, 120});
+  calibration.camera.lens_model = lens_model_for({2, 3, 3, 120});
   calibration.camera.intrinsics.resize(parameter_count(calibration.camera.lens_model), 0.25);
   expect_kept(calibration);
 }
@@ -190,15 +191,18 @@ TEST(WriteCalibration, KeepsAnyText) {
 TEST(WriteCalibration, KeepsRandomNumbersExactly) {
   std::mt19937_64 random(2);
   std::normal_distribution<double> normal(0, 1000);
-  const auto figure = [&] { return normal(random) * std::exp(normal(random) / 100); };
+  const auto random_number = [&] { return normal(random) * std::exp(normal(random) / 100); };
   for (int i = 0; i < 30; ++i) {
     Calibration calibration = sample_calibration();
-    for (std::size_t k = 2; k < 8; ++k) calibration.camera.intrinsics[k] = figure();
-    calibration.intrinsics_report->rms_px = std::abs(figure());
-    calibration.intrinsics_report->board_warp_m = {figure(), figure()};
-    calibration.rotation_center->center_px = {figure(), figure()};
-    calibration.dispersion = {
-        {figure(), figure()}, std::abs(figure()), {figure(), figure()}, 1, {}};
+    for (std::size_t k = 2; k < 8; ++k) calibration.camera.intrinsics[k] = random_number();
+    calibration.intrinsics_report->rms_px = std::abs(random_number());
+    calibration.intrinsics_report->board_warp_m = {random_number(), random_number()};
+    calibration.rotation_center->center_px = {random_number(), random_number()};
+    calibration.dispersion = {{random_number(), random_number()},
+                              std::abs(random_number()),
+                              {random_number(), random_number()},
+                              1,
+                              {}};
     expect_kept(calibration);
   }
 }

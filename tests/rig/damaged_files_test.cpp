@@ -35,7 +35,7 @@ TEST(ReadCalibration, RejectsEveryTruncation) {
     if ((parts & 8U) != 0) calibration.dispersion.reset(), calibration.history.resize(1);
     if (calibration.history.size() == 1) calibration.history = {{"camera", "p", "v", "o", {}}};
     write_calibration(folder / "whole.yaml", calibration);
-    expect_refused_when_cut(folder, read_calibration, folder.content_of(folder / "whole.yaml"));
+    expect_refused_when_cut(folder, read_calibration, folder.read_content(folder / "whole.yaml"));
   }
 }
 

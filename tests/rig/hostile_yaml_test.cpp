@@ -11,7 +11,7 @@ namespace {
 using testing::HasSubstr;
 
 const std::string kHead = "format: vlp-lamps/1\nlamps: ";
-constexpr std::size_t kMostBytes = 1 << 20;
+constexpr std::size_t kMaxBytes = 1 << 20;
 
 /// Returns the message for a map whose lamps are `value`.
 std::string refusal_of_lamps(const std::string& value) { return map_refusal(kHead + value + "\n"); }
@@ -63,8 +63,8 @@ TEST(ReadYaml, RejectsSelfReferencingHistory) {
 
 TEST(ReadYaml, RejectsFileAboveOneMebibyte) {
   std::string content = kLampsYaml + "#";
-  content += std::string(kMostBytes - content.size() - 1, 'x') + "\n";
-  ASSERT_EQ(content.size(), kMostBytes);
+  content += std::string(kMaxBytes - content.size() - 1, 'x') + "\n";
+  ASSERT_EQ(content.size(), kMaxBytes);
   EXPECT_EQ(map_refusal(content), "");
   const std::string refused = "lamps.yaml: is longer than 1 MiB: is it the right file?";
   EXPECT_EQ(map_refusal(content + "\n"), refused);
@@ -89,7 +89,7 @@ TEST(ReadYaml, ReportsLineForManySmallNodes) {
     const std::string lines = repeated(line, 100'000 / line.size());
     EXPECT_THAT(refusal_of_lamps("\n" + lines), testing::StartsWith("lamps.yaml:"));
   }
-  EXPECT_THAT(refusal_of_lamps("'" + std::string(kMostBytes - 100, 'a') + "'"),
+  EXPECT_THAT(refusal_of_lamps("'" + std::string(kMaxBytes - 100, 'a') + "'"),
               HasSubstr("lamps.yaml:2: lamps: should be a list, not 'aaaa"));
 }
 

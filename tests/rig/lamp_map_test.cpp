@@ -25,7 +25,7 @@ TEST(ReadLampMap, ReadsEveryKey) {
 TEST(WriteLampMap, MatchesFormatByteForByte) {
   const TemporaryFolder folder;
   write_lamp_map(folder / "lamps.yaml", sample_lamps());
-  EXPECT_EQ(folder.content_of(folder / "lamps.yaml"), kLampsYaml);
+  EXPECT_EQ(folder.read_content(folder / "lamps.yaml"), kLampsYaml);
 }
 
 TEST(ReadLampMap, ReadsStandardDeviationOfMapOrLamp) {
@@ -55,7 +55,7 @@ lamps:
   EXPECT_EQ(read_lamp_map(file).lamps.size(), 2U);
   EXPECT_EQ(read_lamps_with_rooms(file, "").rooms, (std::vector<std::string>{"hall", "office"}));
   EXPECT_EQ(read_lamps_with_rooms(file, "office").rooms, std::vector<std::string>{"office"});
-  EXPECT_THAT(refusal_of([&] { read_lamps_of_room(file, "attic"); }),
+  EXPECT_THAT(rejection_message([&] { read_lamps_of_room(file, "attic"); }),
               HasSubstr("has no lamp with 'room: attic'"));
 }
 
@@ -74,7 +74,7 @@ lamps:
   EXPECT_EQ(map.lamps[0].shape.yaw_rad, 0.3);
   EXPECT_EQ(map.lamps[2].shape.kind, ShapeKind::disc);
   write_lamp_map(folder / "written.yaml", map);
-  EXPECT_EQ(folder.content_of(folder / "written.yaml"), yaml);
+  EXPECT_EQ(folder.read_content(folder / "written.yaml"), yaml);
   const auto read_as = [&](const std::string& from, const std::string& to) {
     return read_lamp_map(folder.file("other.yaml", changed(yaml, from, to)));
   };
@@ -115,7 +115,7 @@ TEST(WriteLampMap, KeepsEveryDoubleExactly) {
 TEST(WriteLampMap, WritesPointInNumbersWithExponent) {
   const TemporaryFolder folder;
   write_lamp_map(folder / "lamps.yaml", {{{1, {1e-7, -2e300, 0}, {}, 1e5, {}}}});
-  EXPECT_THAT(folder.content_of(folder / "lamps.yaml"),
+  EXPECT_THAT(folder.read_content(folder / "lamps.yaml"),
               HasSubstr("{id: 1, position_m: [1.0e-07, -2.0e+300, 0], frequency_hz: 100000}"));
 }
 

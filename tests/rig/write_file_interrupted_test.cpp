@@ -42,7 +42,7 @@ TEST(WriteFileFailure, KeepsOldFileInReadOnlyFolder) {
   });
   fs::permissions(folder / "", fs::perms(0755));
   EXPECT_EQ(message, file.string() + ": cannot be written: Permission denied");
-  EXPECT_EQ(folder.content_of(file), kOld);
+  EXPECT_EQ(folder.read_content(file), kOld);
   EXPECT_EQ(count_in(folder / ""), 1U);
 }
 
@@ -56,7 +56,7 @@ TEST(WriteFileFailure, KeepsOldFileAfterPartialWrite) {
     write_file(file, kLarge);
   });
   EXPECT_EQ(message, file.string() + ": cannot be written: File too large");
-  EXPECT_EQ(folder.content_of(file), kOld);
+  EXPECT_EQ(folder.read_content(file), kOld);
   EXPECT_EQ(count_in(folder / ""), 1U);
 }
 
@@ -77,7 +77,7 @@ TEST(WriteFileFailure, KeepsOldFileOnFullDisk) {
     } catch (const InputError& error) {
       refused = error.what();
     }
-    const bool kept = folder.content_of(file) == kOld && count_in(folder / "") == 1;
+    const bool kept = folder.read_content(file) == kOld && count_in(folder / "") == 1;
     throw std::runtime_error(refused + (kept ? "; kept" : "; lost"));
   });
   if (message == cannot_mount) GTEST_SKIP() << "only the superuser can mount a small disk";
@@ -121,7 +121,7 @@ TEST(WriteFile, LeavesOldOrNewFileWhenKilled) {
     ::close(begun[0]);
     std::this_thread::sleep_for(time_of_two_writes * double(random() % 1000) / 1000);
     kill_child(child);
-    const std::string found = folder.content_of(file);
+    const std::string found = folder.read_content(file);
     ASSERT_TRUE(found == contents[0] || found == contents[1]) << found.size() << " bytes";
     const std::size_t now = found == contents[0] ? 0 : 1;
     times_changed += now != last ? 1 : 0;
@@ -136,7 +136,7 @@ TEST(WriteFile, LeavesOneCompleteContentFromManyThreads) {
   const TemporaryFolder folder;
   const auto file = folder.file("a.yaml", std::string(100'000, 'a'));
   const auto is_whole = [&] {
-    const std::string found = folder.content_of(file);
+    const std::string found = folder.read_content(file);
     return found.size() == 100'000 && found == std::string(100'000, found.front());
   };
   std::vector<std::thread> writers;

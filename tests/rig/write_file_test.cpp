@@ -31,12 +31,12 @@ TEST(WriteFile, ReplacesContent) {
   const TemporaryFolder folder;
   const auto file = folder.file("a.yaml", "old content that is longer\n");
   write_file(file, "new\n");
-  EXPECT_EQ(folder.content_of(file), "new\n");
+  EXPECT_EQ(folder.read_content(file), "new\n");
   const std::string with_zeros("\0\xff\n", 3);
   write_file(file, with_zeros);
-  EXPECT_EQ(folder.content_of(file), with_zeros);
+  EXPECT_EQ(folder.read_content(file), with_zeros);
   write_file(file, "");
-  EXPECT_EQ(folder.content_of(file), "");
+  EXPECT_EQ(folder.read_content(file), "");
   EXPECT_THAT(names_in(folder / ""), ElementsAre("a.yaml"));
 }
 
@@ -98,7 +98,7 @@ mode_t mode_after_another_user(const TemporaryFolder& folder, const std::vector<
   int status = -1;
   ::waitpid(child, &status, 0);
   EXPECT_EQ(status, 0);
-  EXPECT_EQ(TemporaryFolder::content_of(file), "new\n");
+  EXPECT_EQ(TemporaryFolder::read_content(file), "new\n");
   struct stat found {};
   EXPECT_EQ(::stat(file.c_str(), &found), 0);
   EXPECT_EQ(found.st_uid, writer);
@@ -121,7 +121,7 @@ TEST(WriteFile, WritesToStreamOfProcess) {
   write_file("/dev/fd/" + std::to_string(descriptor), "new\n");
   write_file("/proc/self/fd/" + std::to_string(descriptor), "newer\n");
   ::close(descriptor);
-  EXPECT_EQ(folder.content_of(file), "old\nnew\nnewer\n");
+  EXPECT_EQ(folder.read_content(file), "old\nnew\nnewer\n");
 }
 
 TEST(WriteFile, AcceptsPathInCurrentFolder) {
@@ -154,7 +154,7 @@ TEST(WriteFile, LeavesNoFileWhenWritingFails) {
   EXPECT_NE(write_refusal(""), "");
   EXPECT_THAT(names_in(folder / ""), ElementsAre("file", "folder"));
   EXPECT_THAT(names_in(folder / "folder"), ElementsAre());
-  EXPECT_EQ(folder.content_of(file), "old\n");
+  EXPECT_EQ(folder.read_content(file), "old\n");
 }
 
 TEST(WriteFile, FollowsSymbolicLinks) {
@@ -169,7 +169,7 @@ TEST(WriteFile, FollowsSymbolicLinks) {
   for (const std::string name : {"relative", "absolute", "of_a_link", "folder/a.yaml"}) {
     const std::string content = std::to_string(++number) + "\n";
     write_file(folder / name, content);
-    EXPECT_EQ(folder.content_of(file), content) << name;
+    EXPECT_EQ(folder.read_content(file), content) << name;
   }
   EXPECT_TRUE(fs::is_symlink(folder / "relative") && fs::is_symlink(folder / "absolute") &&
               fs::is_symlink(folder / "of_a_link") && fs::is_symlink(folder / "folder"));
@@ -182,7 +182,7 @@ TEST(WriteFile, FollowsLinkToMissingFile) {
   fs::create_symlink("real/new.yaml", folder / "link");
   write_file(folder / "link", "new\n");
   EXPECT_TRUE(fs::is_symlink(folder / "link"));
-  EXPECT_EQ(folder.content_of(folder / "real/new.yaml"), "new\n");
+  EXPECT_EQ(folder.read_content(folder / "real/new.yaml"), "new\n");
 }
 
 TEST(WriteFile, RejectsLinkToItself) {

@@ -21,8 +21,8 @@ LensInput views_with_edges(double shift_px) {
   input.camera.lens_model = LensModel::opencv8;
   Random random(8);
   for (int i = 0; i < 20; ++i) {
-    SeenBoard seen = views.random_view(random, 0.05);
-    for (SeenTag& tag : seen.tags) tag = shrunk(tag, shift_px);
+    BoardDetection seen = views.random_view(random, 0.05);
+    for (TagDetection& tag : seen.tags) tag = shrunk(tag, shift_px);
     input.seen.images.push_back(observed({std::to_string(i), views.imager_px, seen}));
   }
   return input;

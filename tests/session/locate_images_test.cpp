@@ -19,9 +19,9 @@ class LeaningRig {
  public:
   LeaningRig() { rig_.body.motion.inclination = lean_; }
 
-  LocateInput input(double lean_sd_rad) const {
+  LocateInput input(double roll_pitch_sd_rad) const {
     LocateInput input{{{"a", seen_in(Eigen::Matrix3d::Identity())}}, rig_.map, rig_.calibration};
-    input.lean_sd_rad = lean_sd_rad;
+    input.roll_pitch_sd_rad = roll_pitch_sd_rad;
     return input;
   }
   Redetector redetector() {

@@ -242,7 +242,7 @@ TEST(LocateFrames, LocatesTwoFramesOfTwoLampsJointly) {
   input.motion = KnownMotion::up_to(2, 0);
   const double alone_m = worst_error_m(input, 1);
   const double alone_sd_m = (*locate_frames(input).rows[2].fix->sd)[2];
-  input.frames_together = 2;
+  input.window_size = 2;
   const LocateResult found = locate_frames(input);
   EXPECT_GT(alone_m, 1e-3);
   EXPECT_LT(std::abs(found.rows[2].fix->pose.position_m.z()), 1e-4);
@@ -264,7 +264,7 @@ TEST(LocateFrames, EstimatesTiltWithoutSensor) {
   BodyRig rig{synthetic_lamps(), rolling_calibration(), {}, {}};
   rig.body.motion.inclination = {0.1, -0.08};
   LocateInput input{{{"a", seen_from(rig, 0.05)}}, rig.map, rig.calibration};
-  input.lean_sd_rad = 1.6;
+  input.roll_pitch_sd_rad = 1.6;
   const LocateResult found = locate_frames(input);
   ASSERT_TRUE(found.rows[0].fix);
   EXPECT_LT(found.rows[0].fix->pose.position_m.norm(), 1e-5);

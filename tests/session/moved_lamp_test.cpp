@@ -66,12 +66,12 @@ class MovedLamp : public testing::Test {
 
   static constexpr const char* kFile = "lamps.yaml";
   Random random{3};
-  SyntheticRig rig{lamp_map_of({{-0.6, -0.3, 1.6},
-                                {0, -0.32, 1.6},
-                                {0.6, -0.3, 1.6},
-                                {-0.6, 0.3, 1.6},
-                                {0, 0.28, 1.6},
-                                {0.6, 0.3, 1.6}}),
+  SyntheticRig rig{make_lamp_map({{-0.6, -0.3, 1.6},
+                                  {0, -0.32, 1.6},
+                                  {0.6, -0.3, 1.6},
+                                  {-0.6, 0.3, 1.6},
+                                  {0, 0.28, 1.6},
+                                  {0.6, 0.3, 1.6}}),
                    {synthetic_camera(), {}, tilted_by(synthetic_camera(), 0.01, 1), {}, {}},
                    {},
                    {}};
@@ -82,7 +82,7 @@ class MovedLamp : public testing::Test {
 };
 
 /// Returns the warnings and, of a step that failed, the reason.
-std::vector<std::string> lines_of(const StepResult& result) {
+std::vector<std::string> collect_lines(const StepResult& result) {
   std::vector<std::string> lines = result.warnings;
   if (!result.ok()) lines.push_back(message_of(result));
   return lines;
@@ -94,13 +94,13 @@ TEST_F(MovedLamp, IsReportedIdenticallyByAllSteps) {
       "lamp 2 hangs 30 mm from where the map has it (x -18 mm, y +24 mm): moved, or entered "
       "wrongly");
   for (const StepResult& result : {rotate(), disperse(), level(), locate(), adjust()}) {
-    SCOPED_TRACE(testing::PrintToString(lines_of(result)));
-    EXPECT_EQ(std::ranges::count_if(lines_of(result),
+    SCOPED_TRACE(testing::PrintToString(collect_lines(result)));
+    EXPECT_EQ(std::ranges::count_if(collect_lines(result),
                                     [](const std::string& line) {
                                       return line.find("lamp 2 ") != std::string::npos;
                                     }),
               1);
-    EXPECT_THAT(lines_of(result), Contains(names_it));
+    EXPECT_THAT(collect_lines(result), Contains(names_it));
   }
 }
 

@@ -13,17 +13,17 @@ namespace {
 
 using testing::HasSubstr;
 
-LensResult solved_with(const SplineGrid& grid) {
+LensResult solve_with_grid(const SplineGrid& grid) {
   constexpr std::size_t count = 20;
   constexpr double noise_px = 0.05;
   Random random(61);
   const SyntheticViews views = wide_views(false);
   const BoardLattice lattice(views.board);
   LensInput input{{}, views.board, "board.yaml", {}, 0, WarpChoice::off};
-  input.camera.lens_model = splined_lens(grid);
+  input.camera.lens_model = lens_model_for(grid);
   while (input.seen.images.size() < count) {
-    const SeenBoard seen = wide_view(views, random, noise_px);
-    if (!enough_of(seen, lattice)) continue;
+    const BoardDetection seen = wide_view(views, random, noise_px);
+    if (!has_enough_tags(seen, lattice)) continue;
     input.seen.images.push_back(
         observed({std::to_string(input.seen.images.size()) + ".png", kWideImager, seen}));
   }
@@ -31,7 +31,7 @@ LensResult solved_with(const SplineGrid& grid) {
 }
 
 TEST(SolveLensNarrowGrid, FailsWithProposedGrid) {
-  const LensResult result = solved_with({3, 12, 12, 100});
+  const LensResult result = solve_with_grid({3, 12, 12, 100});
   ASSERT_FALSE(result.ok());
   EXPECT_THAT(result.why,
               HasSubstr("control points of LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=12_Ny=12_"
@@ -41,7 +41,7 @@ TEST(SolveLensNarrowGrid, FailsWithProposedGrid) {
 }
 
 TEST(SolveLensNarrowGrid, ProposesMoreRowsForVerticalField) {
-  const LensResult result = solved_with({3, 12, 5, 230});
+  const LensResult result = solve_with_grid({3, 12, 5, 230});
   ASSERT_FALSE(result.ok());
   EXPECT_THAT(result.why, testing::ContainsRegex("take --lens LENSMODEL_SPLINED_"
                                                  "STEREOGRAPHIC_order=3_Nx=12_Ny=10_"
@@ -57,12 +57,12 @@ TEST(SolveLensWideGrid, FailsWithProposedGrid) {
   const BoardLattice lattice(views.board);
   LensInput input{{}, views.board, "board.yaml", {}, 0, WarpChoice::off};
   while (input.seen.images.size() < count) {
-    const SeenBoard seen = views.random_view(random, noise_px);
-    if (!lattice.enough(seen)) continue;
+    const BoardDetection seen = views.random_view(random, noise_px);
+    if (!lattice.sufficient(seen)) continue;
     input.seen.images.push_back(
         observed({std::to_string(input.seen.images.size()) + ".png", views.imager_px, seen}));
   }
-  input.camera.lens_model = splined_lens({3, 10, 10, 350});
+  input.camera.lens_model = lens_model_for({3, 10, 10, 350});
   const LensResult result = solve_lens(input, {});
   ASSERT_FALSE(result.ok());
   const std::string take =

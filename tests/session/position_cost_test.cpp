@@ -22,7 +22,7 @@ constexpr double kRowTime_s = 3e-5;
 constexpr double kRatio = 1.2;
 
 LampMap with_even_ratios(const std::vector<Eigen::Vector3d>& positions_m) {
-  LampMap map = lamp_map_of(positions_m);
+  LampMap map = make_lamp_map(positions_m);
   for (Lamp& lamp : map.lamps) lamp.frequency_hz = 2400 * std::pow(kRatio, lamp.id - 1);
   return map;
 }

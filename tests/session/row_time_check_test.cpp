@@ -43,7 +43,7 @@ Observation observe(const LampMap& map, const std::vector<double>& deviations, b
     light.stripes.period_lines = 1 / (frequency_hz * kTrueRowTime_s);
     light.stripes.clarity = 0.95;
     light.stripes.periods = 5;
-    light.stripes.regular = true;
+    light.stripes.is_regular = true;
     light.pixel = {100 + 120.0 * static_cast<double>(i), 300};
     light.sigma_px = 0.1;
     light.low = light.pixel - Eigen::Vector2d(40, 40);
@@ -63,10 +63,10 @@ TEST(CheckRowTime, ReportsRowTimeErrorOf5Percent) {
   EXPECT_THAT(check.error, StartsWith("row time is 19 us in camera_type.yaml, but the stripes of 5 "
                                       "lamps measure 20.00 +- 0.01 us; correct it"));
   const auto metrics = row_time_metrics(check);
-  ASSERT_TRUE(value_of(metrics, "row_time_us"));
-  EXPECT_NEAR(*value_of(metrics, "row_time_us"), 20, 1e-3);
-  ASSERT_TRUE(value_of(metrics, "row_time_sd_us"));
-  EXPECT_NEAR(*value_of(metrics, "row_time_sd_us"), 0.01, 0.005);
+  ASSERT_TRUE(find_metric_value(metrics, "row_time_us"));
+  EXPECT_NEAR(*find_metric_value(metrics, "row_time_us"), 20, 1e-3);
+  ASSERT_TRUE(find_metric_value(metrics, "row_time_sd_us"));
+  EXPECT_NEAR(*find_metric_value(metrics, "row_time_sd_us"), 0.01, 0.005);
 }
 
 TEST(CheckRowTime, AcceptsLampsWithinDrift) {

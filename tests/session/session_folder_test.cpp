@@ -16,11 +16,11 @@ using testing::SizeIs;
 
 TEST(CapturesIn, PrefersTruthToCaptures) {
   const TemporaryFolder folder;
-  EXPECT_THAT(captures_in(folder / ""), SizeIs(0));
+  EXPECT_THAT(read_captures_with_truth(folder / ""), SizeIs(0));
   folder.file("captures.csv",
               "image,x_m,y_m,roll_rad,pitch_rad\na.png,1,2,0.1,0.2\nb.png,3,4,0,0\n");
   folder.file("truth.csv", "image,x_m,y_m,z_m,yaw_rad\na.png,1.5,2.5,0.5,1\nc.png,5,6,0,0\n");
-  const CapturesTable captures = captures_in(folder / "");
+  const CapturesTable captures = read_captures_with_truth(folder / "");
   ASSERT_THAT(captures, SizeIs(3));
   const Capture& both = captures.at("a.png");
   EXPECT_EQ(both.x_m, 1.5);
@@ -35,34 +35,35 @@ TEST(CapturesIn, PrefersTruthToCaptures) {
 TEST(CapturesIn, NamesLineOfInvalidTable) {
   const TemporaryFolder folder;
   folder.file("captures.csv", "image,x_m,y_m\na.png,1,2\nb.png,1");
-  EXPECT_THAT(refusal_of([&] { captures_in(folder / ""); }), HasSubstr("captures.csv:3"));
+  EXPECT_THAT(rejection_message([&] { read_captures_with_truth(folder / ""); }),
+              HasSubstr("captures.csv:3"));
 }
 
 TEST(TruthFile, ReturnsTruthOrCapturesWithPlaces) {
   const TemporaryFolder folder;
-  EXPECT_FALSE(truth_file(folder / ""));
+  EXPECT_FALSE(find_truth_file(folder / ""));
   folder.file("captures.csv", "image,time_s\na.png,1\n");
-  EXPECT_FALSE(truth_file(folder / "")) << "captures.csv tells no place";
+  EXPECT_FALSE(find_truth_file(folder / "")) << "captures.csv tells no place";
   folder.file("captures.csv", "image,x_m,y_m\na.png,1,2\n");
-  EXPECT_EQ(truth_file(folder / "")->filename(), "captures.csv");
+  EXPECT_EQ(find_truth_file(folder / "")->filename(), "captures.csv");
   folder.file("truth.csv", "image,x_m,y_m\na.png,1,2\n");
-  EXPECT_EQ(truth_file(folder / "")->filename(), "truth.csv");
+  EXPECT_EQ(find_truth_file(folder / "")->filename(), "truth.csv");
 }
 
 TEST(TruthIn, ReadsPlacesOfCaptures) {
   const TemporaryFolder folder;
   folder.file("captures.csv", "image,x_m,y_m\nb.png,3,4\na.png,1,2\nc.png,,\n");
-  const auto places = truth_in(folder / "");
+  const auto places = read_truth_places(folder / "");
   ASSERT_THAT(places, SizeIs(2));
   EXPECT_EQ(places[0].image, "a.png");
   EXPECT_EQ(places[1].xy_m.y(), 4);
   folder.file("truth.csv", "image,x_m,y_m\nd.png,5,6\n");
-  EXPECT_EQ(truth_in(folder / "")[0].image, "d.png");
+  EXPECT_EQ(read_truth_places(folder / "")[0].image, "d.png");
 }
 
 TEST(SessionFolder, NamesMissingFile) {
   const TemporaryFolder folder;
-  const auto refusal = [&] { return refusal_of([&] { SessionFolder(folder / "unit"); }); };
+  const auto refusal = [&] { return rejection_message([&] { SessionFolder(folder / "unit"); }); };
   EXPECT_THAT(refusal(), HasSubstr("unit: is not a folder of captures"));
   fs::create_directories(folder / "unit");
   EXPECT_THAT(refusal(), HasSubstr("unit/lamps.yaml: is missing"));
@@ -92,17 +93,17 @@ TEST(SessionFolder, FindsDrivesWithPlaces) {
   ASSERT_THAT(lines, SizeIs(2));
   EXPECT_EQ(lines[0].filename(), "line-x");
   EXPECT_EQ(lines[1].filename(), "line-y");
-  EXPECT_TRUE(holds_captures(folder / "unit", folder / "unit"));
-  EXPECT_TRUE(holds_captures(folder / "unit", folder / "unit/line-x"));
-  EXPECT_FALSE(holds_captures(folder / "unit", folder / "unit/results"));
+  EXPECT_TRUE(is_captures_folder(folder / "unit", folder / "unit"));
+  EXPECT_TRUE(is_captures_folder(folder / "unit", folder / "unit/line-x"));
+  EXPECT_FALSE(is_captures_folder(folder / "unit", folder / "unit/results"));
 }
 
 TEST(EndsOf, ReturnsFirstAndLastPlace) {
   const std::vector<TruthRow> drive{
       {"a", {0, 1}, {}, {}}, {"b", {2, 1}, {}, {}}, {"c", {3, 1}, {}, {}}};
-  EXPECT_EQ(ends_of("t.csv", drive)[1].x(), 3);
-  EXPECT_THAT(refusal_of([&] {
-                ends_of("t.csv", {drive[0], drive[0]});
+  EXPECT_EQ(find_drive_ends("t.csv", drive)[1].x(), 3);
+  EXPECT_THAT(rejection_message([&] {
+                find_drive_ends("t.csv", {drive[0], drive[0]});
               }),
               HasSubstr("t.csv: the drive ends where it begins"));
 }

@@ -17,12 +17,12 @@ using testing::ThrowsMessage;
 class SessionResultsTest : public testing::Test {
  protected:
   /// A folder in which lens and rotation have ended, with an output each.
-  void keep_two_steps(SessionResults& kept) const {
-    kept.plan(kPlan);
+  void keep_two_steps(SessionResults& cached_result) const {
+    cached_result.plan(kPlan);
     folder.file("results/lens.yaml", "lens");
-    kept.keep("lens", "key of the lens", StepResult());
+    cached_result.store_result("lens", "key of the lens", StepResult());
     folder.file("results/rotated.yaml", "rotated");
-    kept.keep("rotation", "key of the rotation", StepResult());
+    cached_result.store_result("rotation", "key of the rotation", StepResult());
   }
   const std::vector<StepOutputs> kPlan{{"lens", {"lens.yaml"}}, {"rotation", {"rotated.yaml"}}};
   const TemporaryFolder folder;
@@ -30,29 +30,29 @@ class SessionResultsTest : public testing::Test {
 };
 
 TEST_F(SessionResultsTest, KeepsStepsWithUnchangedInputsAndOutputs) {
-  SessionResults kept(results, session);
-  EXPECT_FALSE(kept.kept("lens", "key of the lens"));
-  keep_two_steps(kept);
-  EXPECT_TRUE(kept.kept("lens", "key of the lens"));
-  EXPECT_FALSE(kept.kept("lens", "another key"));
+  SessionResults cached_result(results, session);
+  EXPECT_FALSE(cached_result.cached_result("lens", "key of the lens"));
+  keep_two_steps(cached_result);
+  EXPECT_TRUE(cached_result.cached_result("lens", "key of the lens"));
+  EXPECT_FALSE(cached_result.cached_result("lens", "another key"));
   folder.file("results/lens.yaml", "changed");
-  EXPECT_FALSE(kept.kept("lens", "key of the lens"));
-  EXPECT_TRUE(kept.kept("rotation", "key of the rotation"));
+  EXPECT_FALSE(cached_result.cached_result("lens", "key of the lens"));
+  EXPECT_TRUE(cached_result.cached_result("rotation", "key of the rotation"));
   fs::remove(results / "rotated.yaml");
-  EXPECT_FALSE(kept.kept("rotation", "key of the rotation"));
+  EXPECT_FALSE(cached_result.cached_result("rotation", "key of the rotation"));
 }
 
 TEST_F(SessionResultsTest, RepeatsStepAfterBadInput) {
-  SessionResults kept(results, session);
-  kept.plan(kPlan);
+  SessionResults cached_result(results, session);
+  cached_result.plan(kPlan);
   StepResult bad, undetermined;
   bad.fail(StepFailure::bad_input, "cut");
   undetermined.fail(StepFailure::undetermined, "too few");
-  kept.keep("lens", "key", bad);
-  EXPECT_FALSE(kept.kept("lens", "key"));
-  kept.keep("lens", "key", undetermined);
-  ASSERT_TRUE(kept.kept("lens", "key"));
-  EXPECT_EQ(kept.kept("lens", "key")->why, "too few");
+  cached_result.store_result("lens", "key", bad);
+  EXPECT_FALSE(cached_result.cached_result("lens", "key"));
+  cached_result.store_result("lens", "key", undetermined);
+  ASSERT_TRUE(cached_result.cached_result("lens", "key"));
+  EXPECT_EQ(cached_result.cached_result("lens", "key")->why, "too few");
 }
 
 TEST_F(SessionResultsTest, RemovesOutputsOfEarlierRuns) {
@@ -63,12 +63,12 @@ TEST_F(SessionResultsTest, RemovesOutputsOfEarlierRuns) {
     with_drive.push_back({"line-x", {"line-x-fixes.csv"}});
     before.plan(with_drive);
     folder.file("results/line-x-fixes.csv", "of a drive");
-    before.keep("line-x", "key", StepResult());
+    before.store_result("line-x", "key", StepResult());
     folder.file("results/mine.txt", "of somebody");
   }
   SessionResults now(results, session);
   now.plan({{"lens", {"lens.yaml"}}});
-  EXPECT_TRUE(now.kept("lens", "key of the lens"));
+  EXPECT_TRUE(now.cached_result("lens", "key of the lens"));
   EXPECT_FALSE(fs::exists(results / "rotated.yaml"));
   EXPECT_FALSE(fs::exists(results / "steps/rotation.json"));
   EXPECT_FALSE(fs::exists(results / "line-x-fixes.csv"));
@@ -85,11 +85,11 @@ TEST_F(SessionResultsTest, KeepsForeignFiles) {
     first.plan(kPlan);
     folder.file("results/lens.svg", "mine, beside results");
     first.plan(kPlan);
-    first.forget_evaluation();
-    first.forget_all();
+    first.remove_evaluation();
+    first.remove_all_steps();
   }
   for (const std::string& name : mine) {
-    EXPECT_EQ(TemporaryFolder::content_of(results / name), "mine") << name;
+    EXPECT_EQ(TemporaryFolder::read_content(results / name), "mine") << name;
   }
   EXPECT_TRUE(fs::exists(results / "lens.svg"));
   SessionResults next(results, session);
@@ -107,7 +107,7 @@ TEST_F(SessionResultsTest, ForgedListRemovesNothingOutside) {
                                            (folder / "outside.txt").string() + "\n..\n");
   SessionResults taken(results, session);
   taken.plan(kPlan);
-  taken.forget_all();
+  taken.remove_all_steps();
   EXPECT_TRUE(fs::exists(folder / "outside.txt"));
 }
 
@@ -121,7 +121,7 @@ TEST_F(SessionResultsTest, RemovesOnlyOutputsOfRunsByForeignList) {
               "steps/lock\nsteps/session\nsteps/outputs\nmine.txt\nline-x\nreport.html\nline-x" +
                   end_of_name);
   const SessionResults taken(results, session);
-  taken.forget_all();
+  taken.remove_all_steps();
   EXPECT_FALSE(fs::exists(results / "report.html"));
   for (const char* name : {"steps/lock", "steps/session", "steps/outputs", "mine.txt", "line-x"}) {
     EXPECT_TRUE(fs::exists(results / name)) << name;
@@ -176,7 +176,7 @@ TEST_F(SessionResultsTest, RejectsLinkedOutputs) {
   SessionResults taken(results, session);
   EXPECT_THAT([&] { taken.plan(kPlan); },
               ThrowsMessage<InputError>(HasSubstr("holds lens.yaml, which is not of")));
-  EXPECT_EQ(TemporaryFolder::content_of(folder / "mine.txt"), "mine");
+  EXPECT_EQ(TemporaryFolder::read_content(folder / "mine.txt"), "mine");
 }
 
 TEST_F(SessionResultsTest, AdoptsResultsOfEarlierVersion) {
@@ -188,26 +188,26 @@ TEST_F(SessionResultsTest, AdoptsResultsOfEarlierVersion) {
     keep_two_steps(before);
     before.plan(with_drive);
     folder.file("results/line-x-fixes.csv", "of a drive");
-    before.keep("line-x", "key", StepResult());
+    before.store_result("line-x", "key", StepResult());
   }
   fs::remove(results / "steps/outputs");
   folder.file("results/line-y-fixes.csv", "mine");
   SessionResults now(results, session);
   now.plan(kPlan);
-  EXPECT_TRUE(now.kept("lens", "key of the lens"));
+  EXPECT_TRUE(now.cached_result("lens", "key of the lens"));
   EXPECT_FALSE(fs::exists(results / "line-x-fixes.csv"));
   EXPECT_TRUE(fs::exists(results / "line-y-fixes.csv"));
 }
 
 TEST_F(SessionResultsTest, RemovesStepsAfterFailedStep) {
-  SessionResults kept(results, session);
-  keep_two_steps(kept);
-  kept.forget_behind("lens");
-  EXPECT_TRUE(kept.kept("lens", "key of the lens"));
+  SessionResults cached_result(results, session);
+  keep_two_steps(cached_result);
+  cached_result.remove_later_steps("lens");
+  EXPECT_TRUE(cached_result.cached_result("lens", "key of the lens"));
   EXPECT_FALSE(fs::exists(results / "rotated.yaml"));
-  kept.forget("lens");
+  cached_result.remove_step("lens");
   EXPECT_FALSE(fs::exists(results / "lens.yaml"));
-  EXPECT_FALSE(kept.kept("lens", "key of the lens"));
+  EXPECT_FALSE(cached_result.cached_result("lens", "key of the lens"));
 }
 
 TEST_F(SessionResultsTest, AllowsOneSessionAndOneRun) {

@@ -29,8 +29,8 @@ StepResult sample() {
 
 TEST(StepFile, RoundTripIsExact) {
   const TemporaryFolder folder;
-  write_step(folder / "s.json", {"key", "outputs", sample()});
-  const auto kept = read_step(folder / "s.json");
+  write_step_record(folder / "s.json", {"key", "outputs", sample()});
+  const auto kept = read_step_record(folder / "s.json");
   ASSERT_TRUE(kept);
   EXPECT_EQ(kept->key, "key");
   EXPECT_EQ(kept->outputs, "outputs");
@@ -54,11 +54,11 @@ TEST(StepFile, RoundTripIsExact) {
 TEST(StepFile, MatchesSchema) {
   const TemporaryFolder folder;
   std::vector<std::filesystem::path> files;
-  for (int failure = 0; !name_of(static_cast<StepFailure>(failure)).empty(); ++failure) {
+  for (int failure = 0; !to_string(static_cast<StepFailure>(failure)).empty(); ++failure) {
     StepResult result = sample();
     result.failure = static_cast<StepFailure>(failure);
     files.push_back(folder / (std::to_string(failure) + ".json"));
-    write_step(files.back(), {"key", "outputs", result});
+    write_step_record(files.back(), {"key", "outputs", result});
   }
   EXPECT_EQ(files.size(), 6U);
   EXPECT_EQ(problems_by_schema("step", files), "");
@@ -66,22 +66,22 @@ TEST(StepFile, MatchesSchema) {
 
 TEST(ReadStep, ReturnsNulloptForTruncatedFileOrOtherVersion) {
   const TemporaryFolder folder;
-  EXPECT_FALSE(read_step(folder / "none.json"));
-  write_step(folder / "s.json", {"key", "outputs", sample()});
-  const std::string text = TemporaryFolder::content_of(folder / "s.json");
+  EXPECT_FALSE(read_step_record(folder / "none.json"));
+  write_step_record(folder / "s.json", {"key", "outputs", sample()});
+  const std::string text = TemporaryFolder::read_content(folder / "s.json");
   for (std::size_t length = 0; length + 2 < text.size(); ++length) {
-    EXPECT_FALSE(read_step(folder.file("cut.json", text.substr(0, length)))) << length;
+    EXPECT_FALSE(read_step_record(folder.file("cut.json", text.substr(0, length)))) << length;
   }
   std::string other = text;
   other.replace(other.find("vlp-step/1"), 10, "vlp-step/2");
-  EXPECT_FALSE(read_step(folder.file("other.json", other)));
+  EXPECT_FALSE(read_step_record(folder.file("other.json", other)));
 }
 
 TEST(StepFailure, HasNameForEachEnumerator) {
   for (const auto failure :
        {StepFailure::none, StepFailure::bad_input, StepFailure::undetermined,
         StepFailure::wrong_board, StepFailure::wrong_map, StepFailure::wrong_place}) {
-    EXPECT_EQ(step_failure_from_name(name_of(failure)), failure);
+    EXPECT_EQ(step_failure_from_name(to_string(failure)), failure);
   }
   EXPECT_FALSE(step_failure_from_name("odd"));
 }

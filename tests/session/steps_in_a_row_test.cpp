@@ -22,12 +22,12 @@ constexpr double kExactMap_m = 1e-9;
 
 /// Rotation in place at two heights, and captures at a known place of the camera or of the axis, at
 /// yaws over a quarter turn: errors of the lever arm do not average out.
-struct Row {
+struct CalibrationChain {
   Survey survey{kExactMap_m};
   LampCaptures turns;
   KnownPlaces known;
 
-  Row(Random& random, double lens_px, PlaceOf of = PlaceOf::camera) {
+  CalibrationChain(Random& random, double lens_px, PlaceOf of = PlaceOf::camera) {
     for (const double z_m : {0.0, 0.4}) survey.turn({0.1, -0.05, z_m}, 9);
     const std::size_t on_the_spot = survey.input.captures.size();
     const Eigen::Vector3d place_m(-0.2, 0.1, 0);
@@ -72,14 +72,14 @@ struct Row {
 
 TEST(SequentialCalibration, HasNoLensJacobianWithoutLensCovariance) {
   Random random(1);
-  const Calibration calibration = Row(random, 0).calibrated();
+  const Calibration calibration = CalibrationChain(random, 0).calibrated();
   EXPECT_FALSE(calibration.rotation_center->by_intrinsics);
   EXPECT_FALSE(calibration.dispersion->by_intrinsics);
 }
 
 TEST(SequentialCalibration, LensJacobianPredictsChange) {
   Random random(2);
-  Row row(random, 0);
+  CalibrationChain row(random, 0);
   Calibration& calibration = row.turns.calibration;
   const Eigen::MatrixXd covariance = lens_covariance(calibration.camera, 0.1, 8);
   calibration.intrinsics_report = IntrinsicsReport{40, 4000, 0, 0.1, {}, {}, covariance};
@@ -131,12 +131,12 @@ TEST(SolveRotation, CircleLensJacobianMatchesJointFit) {
     ASSERT_TRUE(circle.ok());
     ASSERT_TRUE(joint.fit.center.by_intrinsics);
     ASSERT_TRUE(circle.fit.center.by_intrinsics);
-    const auto sd_of = [&](const RotationFit& fit) {
+    const auto compute_sd = [&](const RotationFit& fit) {
       const auto& jacobian = *fit.center.by_intrinsics;
       return std::sqrt((jacobian * covariance * jacobian.transpose()).trace());
     };
-    EXPECT_LT(sd_of(circle.fit), 1.5 * sd_of(joint.fit)) << seed;
-    EXPECT_GT(sd_of(circle.fit), 0.5 * sd_of(joint.fit)) << seed;
+    EXPECT_LT(compute_sd(circle.fit), 1.5 * compute_sd(joint.fit)) << seed;
+    EXPECT_GT(compute_sd(circle.fit), 0.5 * compute_sd(joint.fit)) << seed;
   }
 }
 
@@ -180,10 +180,10 @@ class SequentialCalibrationFixes : public testing::TestWithParam<PlaceOf> {};
 TEST_P(SequentialCalibrationFixes, CovarianceMatchesErrors) {
   constexpr int trials = 40;
   Random random(3);
-  Judged whole, common;
+  NeesStatistics whole, common;
   double zenith = 0, offset = 0, offset_alone = 0;  // e' cov^-1 e per coordinate
   for (int trial = 0; trial < trials; ++trial) {
-    Row row(random, 0.1, GetParam());
+    CalibrationChain row(random, 0.1, GetParam());
     const Calibration calibration = row.calibrated();
     const Eigen::Vector2d zenith_error =
         zenith_point(*calibration.rotation_center) -
@@ -192,8 +192,8 @@ TEST_P(SequentialCalibrationFixes, CovarianceMatchesErrors) {
     const auto squared = [](const Eigen::Vector2d& error, const Eigen::Matrix2d& covariance) {
       return error.dot(covariance.inverse() * error) / (2 * trials);
     };
-    zenith += squared(zenith_error, *whole_zenith_covariance(calibration));
-    offset += squared(offset_px, *whole_offset_covariance(calibration));
+    zenith += squared(zenith_error, *compute_zenith_covariance(calibration));
+    offset += squared(offset_px, *compute_offset_covariance(calibration));
     offset_alone += squared(offset_px, *calibration.dispersion->covariance);
     const Positioner positioner(row.survey.truth.map, calibration);
     for (int k = 0; k < 5; ++k) {
@@ -204,15 +204,15 @@ TEST_P(SequentialCalibrationFixes, CovarianceMatchesErrors) {
       const Fix fix = positioner.locate(with_noise(exact, random));
       const Fix without_noise = positioner.locate(exact);
       ASSERT_TRUE(fix.ok() && without_noise.ok());
-      whole.add(error_of(fix, row.survey.truth.camera), fix.estimate.covariance);
-      common.add(error_of(without_noise, row.survey.truth.camera),
+      whole.add(compute_pose_error(fix, row.survey.truth.camera), fix.estimate.covariance);
+      common.add(compute_pose_error(without_noise, row.survey.truth.camera),
                  without_noise.estimate.covariance - without_noise.noise_covariance);
     }
   }
   // Fixes of one trial are correlated: three standard errors for `trials` trials.
-  for (const Judged& judged : {whole, common}) {
+  for (const NeesStatistics& judged : {whole, common}) {
     EXPECT_NEAR(judged.mean(), 1, 0.3);
-    EXPECT_GT(judged.share(), 0.88);
+    EXPECT_GT(judged.fraction(), 0.88);
   }
   EXPECT_NEAR(zenith, 1, 0.45);
   EXPECT_NEAR(offset, 1, 0.45);
@@ -223,8 +223,8 @@ TEST_P(SequentialCalibrationFixes, CovarianceMatchesErrors) {
   }
   std::printf("zenith %.2f, offset %.2f (%.2f of its captures alone)\n", zenith, offset,
               offset_alone);
-  std::printf("whole %.3f, %.1f %%; common %.3f, %.1f %%\n", whole.mean(), 100 * whole.share(),
-              common.mean(), 100 * common.share());
+  std::printf("whole %.3f, %.1f %%; common %.3f, %.1f %%\n", whole.mean(), 100 * whole.fraction(),
+              common.mean(), 100 * common.fraction());
 }
 
 INSTANTIATE_TEST_SUITE_P(Places, SequentialCalibrationFixes,

@@ -37,7 +37,7 @@ struct Places {
 /// Kind of an insufficient set of views: its places, used cyclically, and views of each place.
 struct Thin {
   const char* name;
-  int least_places, most_places;
+  int min_places, max_places;
   std::vector<Places> places;
   int copies = 1;
   /// Variation of the views of a place, in degrees and in hundredths of the image.
@@ -90,9 +90,8 @@ inline ThinSet thin_set(const Thin& thin, bool kalibr, bool shrinks, Random& ran
   input.camera.lens_model = LensModel::opencv8;
   const BoardLattice lattice(views.board);
   const double fill_m = lens.focal_px().x() * tag_field_m(views.board).x() / views.imager_px[0];
-  const auto places =
-      static_cast<std::size_t>(thin.least_places) +
-      random.index(static_cast<std::size_t>(thin.most_places - thin.least_places + 1));
+  const auto places = static_cast<std::size_t>(thin.min_places) +
+                      random.index(static_cast<std::size_t>(thin.max_places - thin.min_places + 1));
   for (std::size_t place = 0; place < places;) {
     const Places& from = thin.places[place % thin.places.size()];
     const double u = from.u.any(random), v = from.v.any(random);
@@ -110,10 +109,10 @@ inline ThinSet thin_set(const Thin& thin, bool kalibr, bool shrinks, Random& ran
           Eigen::AngleAxisd(roll_rad, Eigen::Vector3d::UnitZ()).toRotationMatrix();
       const Eigen::Vector3d middle((u + du) * views.imager_px[0], (v + dv) * views.imager_px[1],
                                    lens.focal_px().x());
-      SeenBoard seen = views.view(rotation, middle * (z_m / middle.z()), random, noise_px);
-      if (!lattice.enough(seen)) continue;
+      BoardDetection seen = views.view(rotation, middle * (z_m / middle.z()), random, noise_px);
+      if (!lattice.sufficient(seen)) continue;
       any = true;
-      for (SeenTag& tag : seen.tags) tag = shrunk(tag, shift_px);
+      for (TagDetection& tag : seen.tags) tag = shrunk(tag, shift_px);
       std::string name = std::to_string(place);
       name.append("-").append(std::to_string(copy)).append(".png");
       input.seen.images.push_back(observed({name, views.imager_px, seen}));
@@ -128,10 +127,11 @@ inline ThinSet thin_set(const Thin& thin, bool kalibr, bool shrinks, Random& ran
 /// std::nullopt if no lens is found or a gate fails.
 inline std::optional<double> error_over_stated(const ThinSet& set) {
   const LensResult result = solve_lens(set.input, {});
-  if (!result.ok() || !words_of_missed(check_gates(lens_gates(), result.metrics)).empty()) {
+  if (!result.ok() ||
+      !describe_failed_gates(check_gates(default_lens_gates(), result.metrics)).empty()) {
     return {};
   }
-  const auto difference = projection_difference(
+  const auto difference = compute_projection_difference(
       set.lens, result.lens.solution.lens(), result.lens.solution.problem.imager_px,
       [&](const Eigen::Vector2d& pixel) {
         return polygon_contains(result.lens.report.region, pixel) ? 1.0 : INFINITY;

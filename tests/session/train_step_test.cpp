@@ -17,17 +17,17 @@ const std::string kSample = VLP_SOURCE_DIR "/datasets/paper-rig/rendered/sample"
 /// Two labeled images, repeated as several folders.
 struct Training {
   LampMap lamps = read_lamp_map(VLP_SOURCE_DIR "/datasets/paper-rig/rendered/lamps.yaml");
-  SeenLights seen;
+  DetectedLights seen;
   std::vector<std::vector<Frame>> labels;
 
   explicit Training(std::size_t folders) {
     FrontendOptions options;
     options.readout = Readout::rows;
-    const SeenLights one = see_lights({kSample}, lamps, {}, false, options);
+    const DetectedLights one = detect_lights({kSample}, lamps, {}, false, options);
     seen.folders.assign(folders, one.folders[0]);
     labels.assign(folders, read_detections(kSample + "/true_detections.csv"));
   }
-  TrainStepResult trained() const { return train_lamps(seen, labels, lamps, "sample"); }
+  TrainStepResult trained() const { return train_lamp_classifier(seen, labels, lamps, "sample"); }
 };
 
 TEST(TrainLamps, RequiresSeveralLightsOfEachLamp) {
@@ -48,10 +48,10 @@ TEST(TrainLamps, ReportsCrossValidatedConfusion) {
 TEST(TrainLamps, ThrowsForUnknownImageOrLamp) {
   Training training(1);
   training.lamps.lamps.pop_back();
-  EXPECT_THAT(refusal_of<std::invalid_argument>([&] { training.trained(); }),
+  EXPECT_THAT(rejection_message<std::invalid_argument>([&] { training.trained(); }),
               HasSubstr("the labels name lamp 6, which is not in the lamp map"));
   for (Frame& frame : training.labels[0]) frame.image += ".png";
-  EXPECT_THAT(refusal_of([&] { training.trained(); }),
+  EXPECT_THAT(rejection_message([&] { training.trained(); }),
               HasSubstr("sample: the table names none of the images"));
 }
 

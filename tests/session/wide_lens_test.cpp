@@ -18,7 +18,7 @@ using testing::HasSubstr;
 using testing::Not;
 
 /// Views of the board up to `reach_deg` off the axis of a 190-degree lens.
-LensInput wide_set(double reach_deg, LensModel model) {
+LensInput make_wide_set(double reach_deg, LensModel model) {
   constexpr std::size_t count = 30;
   constexpr double noise_px = 0.05;
   const SyntheticViews views = wide_views(true);
@@ -29,8 +29,8 @@ LensInput wide_set(double reach_deg, LensModel model) {
   WideBoards boards;
   boards.reach_rad = rad_from_deg(reach_deg);
   while (input.seen.images.size() < count) {
-    const SeenBoard seen = wide_view(views, random, noise_px, boards);
-    if (!enough_of(seen, lattice)) continue;
+    const BoardDetection seen = wide_view(views, random, noise_px, boards);
+    if (!has_enough_tags(seen, lattice)) continue;
     input.seen.images.push_back(
         observed({std::to_string(input.seen.images.size()), views.imager_px, seen}));
   }
@@ -40,11 +40,11 @@ LensInput wide_set(double reach_deg, LensModel model) {
 class SolveLensWideField : public testing::TestWithParam<LensModel> {};
 
 TEST_P(SolveLensWideField, FailsWhereModelHasNoRays) {
-  const LensResult result = solve_lens(wide_set(180, GetParam()), {});
+  const LensResult result = solve_lens(make_wide_set(180, GetParam()), {});
   EXPECT_EQ(result.failure, StepFailure::undetermined);
   EXPECT_THAT(result.why,
               AllOf(HasSubstr("30 views with the board: it is seen up to 10"),
-                    HasSubstr("degrees off the axis, where " + std::string(name_of(GetParam())) +
+                    HasSubstr("degrees off the axis, where " + std::string(to_string(GetParam())) +
                               " has no rays: take --lens OPENCV_FISHEYE"),
                     Not(HasSubstr("add views"))));
 }
@@ -55,7 +55,7 @@ TEST_P(SolveLensWideField, WarnsAndCoversErrorsNearLimitOfModel) {
   constexpr double sigmas = 3;
   int compared = 0;
   for (const double reach_deg : {60, 75, 87}) {
-    const LensResult result = solve_lens(wide_set(reach_deg, GetParam()), {});
+    const LensResult result = solve_lens(make_wide_set(reach_deg, GetParam()), {});
     if (!result.ok()) {
       EXPECT_THAT(result.why, HasSubstr("take --lens OPENCV_FISHEYE"));
       continue;
@@ -64,8 +64,8 @@ TEST_P(SolveLensWideField, WarnsAndCoversErrorsNearLimitOfModel) {
       EXPECT_THAT(result.warnings, Contains(HasSubstr("take --lens OPENCV_FISHEYE")));
       EXPECT_EQ(result.lens.better_model, LensModel::fisheye);
     }
-    if (!words_of_missed(check_gates(lens_gates(), result.metrics)).empty()) continue;
-    const auto difference = projection_difference(
+    if (!describe_failed_gates(check_gates(default_lens_gates(), result.metrics)).empty()) continue;
+    const auto difference = compute_projection_difference(
         wide_lens(), result.lens.solution.lens(), kWideImager, [&](const Eigen::Vector2d& pixel) {
           return polygon_contains(result.lens.report.region, pixel) ? 1.0 : INFINITY;
         });
@@ -86,7 +86,7 @@ INSTANTIATE_TEST_SUITE_P(Models, SolveLensWideField,
 
 /// OPENCV5 does not fit a lens of this width; detecting this takes seconds.
 TEST(SolveLens, DoesNotBlameBoardForUnsuitableModel) {
-  const LensResult result = solve_lens(wide_set(87, LensModel::opencv5), {});
+  const LensResult result = solve_lens(make_wide_set(87, LensModel::opencv5), {});
   ASSERT_EQ(result.failure, StepFailure::undetermined);
   EXPECT_THAT(result.why, AllOf(HasSubstr("OPENCV_FISHEYE fits to 0.05 px"),
                                 HasSubstr("take --lens OPENCV_FISHEYE"),
@@ -105,10 +105,10 @@ TEST(SolveLens, KeepsMarginAroundCornersForOwnModel) {
   }
   const LensResult result = solve_lens(input, {});
   ASSERT_TRUE(result.ok()) << result.why;
-  EXPECT_FALSE(result.lens.solution.another_fits);
+  EXPECT_FALSE(result.lens.solution.other_model_fits);
   EXPECT_FALSE(result.lens.better_model);
   EXPECT_THAT(result.warnings, testing::IsEmpty());
-  EXPECT_GT(result.lens.report.region_share, 0.95);
+  EXPECT_GT(result.lens.report.region_fraction, 0.95);
 }
 
 }  // namespace

@@ -18,27 +18,27 @@ const std::string kSpreads =
     "archive: {sessions_per_camera: 2, focal_share: 0.01, center_px: 3, distortion_share: 0.05, "
     "tilt_deg: 1, lever_arm_m: 0.003, map_error_m: 0.001, fault_share: 0.1, damage_share: 0.05}\n";
 
-Scene archive_scene(const std::string& spreads = kSpreads) {
-  return scene_of(scene_with("captures:", spreads + "captures:"));
+Scene archive_scene(const std::string& variation = kSpreads) {
+  return read_scene_text(scene_with("captures:", variation + "captures:"));
 }
 
 double tilt_rad(const Scene& scene) { return std::acos(scene.mount.level_from_camera(2, 2)); }
 
 TEST(ReadScene, ReadsArchiveVariation) {
-  const auto spreads = archive_scene().archive;
-  ASSERT_TRUE(spreads);
-  EXPECT_EQ(spreads->sessions_per_camera, 2);
-  EXPECT_EQ(spreads->focal_share, 0.01);
-  EXPECT_NEAR(spreads->tilt_rad, std::numbers::pi / 180, 1e-12);
-  EXPECT_EQ(spreads->damage_share, 0.05);
-  EXPECT_FALSE(scene_of(kSceneYaml).archive);
+  const auto variation = archive_scene().archive;
+  ASSERT_TRUE(variation);
+  EXPECT_EQ(variation->sessions_per_camera, 2);
+  EXPECT_EQ(variation->focal_share, 0.01);
+  EXPECT_NEAR(variation->tilt_rad, std::numbers::pi / 180, 1e-12);
+  EXPECT_EQ(variation->damage_share, 0.05);
+  EXPECT_FALSE(read_scene_text(kSceneYaml).archive);
 }
 
 TEST(ReadScene, RejectsInvalidArchiveVariation) {
   const auto refusal = [](const std::string& from, const std::string& to) {
-    std::string spreads = kSpreads;
-    spreads.replace(spreads.find(from), from.size(), to);
-    return scene_refusal(scene_with("captures:", spreads + "captures:"));
+    std::string variation = kSpreads;
+    variation.replace(variation.find(from), from.size(), to);
+    return scene_refusal(scene_with("captures:", variation + "captures:"));
   };
   EXPECT_THAT(refusal("damage_share: 0.05", "damage_share: 1.5"), HasSubstr("damage_share"));
   EXPECT_THAT(refusal("sessions_per_camera: 2", "sessions_per_camera: 0"),
@@ -52,15 +52,15 @@ TEST(ArchiveSession, DamagesGivenFractionOfSessions) {
   std::size_t damaged = 0, faulty = 0;
   std::set<std::string> kinds, faults;
   for (std::size_t i = 0; i < 200; ++i) {
-    const ArchiveSession session = archive_session(scene, i);
+    const ArchiveSession session = make_archive_session(scene, i);
     if (session.damage != ArchiveDamage::none) {
       ++damaged;
-      kinds.insert(std::string(name_of(session.damage)) + " " + session.damaged);
+      kinds.insert(std::string(to_string(session.damage)) + " " + session.damaged);
       EXPECT_EQ(session.fault, ArchiveFault::none);
     }
     if (session.fault != ArchiveFault::none) {
       ++faulty;
-      faults.insert(std::string(name_of(session.fault)));
+      faults.insert(std::string(to_string(session.fault)));
     }
   }
   EXPECT_EQ(damaged, 10U);
@@ -74,7 +74,8 @@ TEST(ArchiveSession, VariesCamerasWithinLimitsAndKeepsThemAcrossSessions) {
   std::set<double> focal_lengths;
   std::set<std::uint64_t> seeds;
   for (std::size_t i = 0; i < 100; i += 2) {
-    const ArchiveSession first = archive_session(scene, i), second = archive_session(scene, i + 1);
+    const ArchiveSession first = make_archive_session(scene, i),
+                         second = make_archive_session(scene, i + 1);
     EXPECT_EQ(first.camera, second.camera);
     EXPECT_NE(first.session, second.session);
     EXPECT_EQ(first.scene.camera.intrinsics, second.scene.camera.intrinsics);
@@ -87,7 +88,7 @@ TEST(ArchiveSession, VariesCamerasWithinLimitsAndKeepsThemAcrossSessions) {
     EXPECT_NEAR(first.scene.camera.intrinsics[2], 80, 3);
     EXPECT_LE((first.scene.mount.lever_arm_m - scene.mount.lever_arm_m).lpNorm<Eigen::Infinity>(),
               0.003);
-    if (first.fault != ArchiveFault::leaning) {
+    if (first.fault != ArchiveFault::tilted) {
       EXPECT_NEAR(tilt_rad(first.scene), tilt_rad(scene), std::numbers::pi / 180 + 1e-9);
     }
   }
@@ -98,9 +99,9 @@ TEST(ArchiveSession, VariesCamerasWithinLimitsAndKeepsThemAcrossSessions) {
 TEST(ArchiveSession, AppliesFaultToScene) {
   const Scene scene = archive_scene();
   for (std::size_t i = 0; i < 60; ++i) {
-    const ArchiveSession session = archive_session(scene, i);
+    const ArchiveSession session = make_archive_session(scene, i);
     EXPECT_EQ(tilt_rad(session.scene) > tilt_rad(scene) + 0.021,
-              session.fault == ArchiveFault::leaning)
+              session.fault == ArchiveFault::tilted)
         << "2 degrees as the scene has, 1 more in any direction; 4 across";
     EXPECT_EQ(session.scene.optics.blur_px > 1, session.fault == ArchiveFault::out_of_focus);
     EXPECT_EQ(session.scene.lamps[0].map_error_m.x() > 0.02,
@@ -117,7 +118,7 @@ TEST(SimulateArchive, RejectsSceneThatCannotBeCalibrated) {
     }
     return "";
   };
-  EXPECT_THAT(refusal(scene_of(kSceneYaml)), HasSubstr("no key 'archive'"));
+  EXPECT_THAT(refusal(read_scene_text(kSceneYaml)), HasSubstr("no key 'archive'"));
   EXPECT_THAT(refusal(archive_scene()), HasSubstr("folders boards and rotation"));
 }
 

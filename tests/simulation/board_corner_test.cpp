@@ -31,15 +31,16 @@ struct EdgeCurve {
 /// Measures the black border's edge from `corner` to `next`, which runs more along x than along y.
 /// Counts the white pixels between two rows in each column, which is exact for a straight edge.
 /// `image` is 0 for black and 1 for white.
-EdgeCurve edge_of(const cv::Mat1d& image, const Eigen::Vector2d& corner,
-                  const Eigen::Vector2d& next) {
+EdgeCurve fit_edge(const cv::Mat1d& image, const Eigen::Vector2d& corner,
+                   const Eigen::Vector2d& next) {
   constexpr int reach_px = 2, skipped_px = 2;  // the black border is 3.5 px wide or more
-  const Eigen::Vector2d way = next - corner;
+  const Eigen::Vector2d displacement = next - corner;
   std::vector<Eigen::Vector2d> points;
   const int first = int(std::ceil(std::min(corner.x(), next.x()))) + skipped_px;
   const int last = int(std::floor(std::max(corner.x(), next.x()))) - skipped_px;
   for (int column = first; column <= last; ++column) {
-    const int row = int(std::lround(corner.y() + way.y() * (column - corner.x()) / way.x()));
+    const int row =
+        int(std::lround(corner.y() + displacement.y() * (column - corner.x()) / displacement.x()));
     double white = 0;
     for (int y = row - reach_px; y <= row + reach_px; ++y) white += image(y, column);
     const bool white_above = image(row - reach_px, column) > image(row + reach_px, column);
@@ -61,8 +62,8 @@ EdgeCurve edge_of(const cv::Mat1d& image, const Eigen::Vector2d& corner,
 Eigen::Vector2d measured_corner(const cv::Mat1d& image, const cv::Mat1d& transposed,
                                 const Eigen::Vector2d& corner, const Eigen::Vector2d& a,
                                 const Eigen::Vector2d& b) {
-  const EdgeCurve along_x = edge_of(image, corner, a);
-  const EdgeCurve along_y = edge_of(transposed, corner.reverse(), b.reverse());
+  const EdgeCurve along_x = fit_edge(image, corner, a);
+  const EdgeCurve along_y = fit_edge(transposed, corner.reverse(), b.reverse());
   Eigen::Vector2d meeting = corner;
   for (int i = 0; i < 20; ++i) {
     meeting.y() = along_x.at(meeting.x());
@@ -98,11 +99,11 @@ TEST_P(FrameRendererBoard, RenderedCornersMatchTrueCorners) {
   double worst_px = 0, squares = 0;
   int corners = 0;
   for (std::size_t index = 0; index < 6; ++index) {
-    const BoardShot shot = board_shot(scene_, views_, index);
+    const BoardShot shot = make_board_shot(scene_, views_, index);
     const cv::Mat1d image(renderer.board_electrons(shot) / 1e3);
     const cv::Mat1d transposed(image.t());
     std::map<int, std::map<int, Eigen::Vector2d>> tags;
-    for (const auto& [tag, corner, pixel] : true_corners(scene_, renderer, shot)) {
+    for (const auto& [tag, corner, pixel] : find_true_corners(scene_, renderer, shot)) {
       constexpr double edge_px = 8;
       if (pixel.minCoeff() > edge_px && pixel.x() < 799 - edge_px && pixel.y() < 599 - edge_px) {
         tags[*tag][corner] = pixel;
@@ -128,15 +129,16 @@ TEST_P(FrameRendererBoard, RenderedCornersMatchTrueCorners) {
 
 TEST_P(FrameRendererBoard, TrueCornersMatchMrcalProjection) {
   const FrameRenderer renderer(scene_);
-  const MrcalOracle mrcal(std::string(name_of(scene_.camera.lens_model)), scene_.camera.intrinsics);
-  const BoardShot shot = board_shot(scene_, views_, 1);
-  const auto layout = board_layout(scene_.board->print);
+  const MrcalOracle mrcal(std::string(to_string(scene_.camera.lens_model)),
+                          scene_.camera.intrinsics);
+  const BoardShot shot = make_board_shot(scene_, views_, 1);
+  const auto layout = compute_board_layout(scene_.board->print);
   const Eigen::Vector2d field_m = tag_field_m(scene_.board->print);
-  for (const auto& [tag, corner, pixel] : true_corners(scene_, renderer, shot)) {
+  for (const auto& [tag, corner, pixel] : find_true_corners(scene_, renderer, shot)) {
     const Eigen::Vector2d at_m = layout.at(std::size_t(*tag)).corners_m.at(std::size_t(corner));
-    const Eigen::Vector2d share = 2 * at_m.cwiseQuotient(field_m) - Eigen::Vector2d(1, 1);
+    const Eigen::Vector2d fraction = 2 * at_m.cwiseQuotient(field_m) - Eigen::Vector2d(1, 1);
     const double depth_m = scene_.board->warp_m.dot(
-        Eigen::Vector2d(1 - share.x() * share.x(), 1 - share.y() * share.y()));
+        Eigen::Vector2d(1 - fraction.x() * fraction.x(), 1 - fraction.y() * fraction.y()));
     const Eigen::Vector3d point =
         shot.camera_from_board(0) * Eigen::Vector3d(at_m.x(), at_m.y(), depth_m);
     EXPECT_LT((mrcal.project(std::vector{point})[0] - pixel).norm(), 1e-6);
@@ -169,12 +171,12 @@ TEST(FrameRenderer, BlursBoardEdgeBeforePixelIntegration) {
   scene.optics.blur_px = sigma_px;
   scene.board = plain_board();
   const FrameRenderer renderer(scene);
-  const BoardShot shot = board_shot(scene, board_views(1, 0.171, 0, 0, 0), 0);
+  const BoardShot shot = make_board_shot(scene, board_views(1, 0.171, 0, 0, 0), 0);
   const cv::Mat1f image(renderer.board_electrons(shot) / 1e3);
   double worst = 0;
   int edges = 0;
   // Left of a tag there is white, and its black border is seven pixels wide.
-  for (const auto& [tag, corner, pixel] : true_corners(scene, renderer, shot)) {
+  for (const auto& [tag, corner, pixel] : find_true_corners(scene, renderer, shot)) {
     constexpr int reach_px = 4, down_px = 20;
     if (corner != 3 || pixel.x() < reach_px || pixel.y() + down_px > 599) continue;
     const int row = static_cast<int>(pixel.y()) + down_px;
@@ -198,7 +200,7 @@ double level_at(const Eigen::Vector2d& pixel, double vignetting_power) {
   scene.optics.vignetting_power = vignetting_power;
   scene.board = plain_board();
   const cv::Mat1f image =
-      FrameRenderer(scene).board_electrons(board_shot(scene, board_views(1, 5, 0, 0, 0), 0));
+      FrameRenderer(scene).board_electrons(make_board_shot(scene, board_views(1, 5, 0, 0, 0), 0));
   return image(static_cast<int>(pixel.y()), static_cast<int>(pixel.x()));
 }
 

@@ -24,7 +24,7 @@ class FrameRendererClutter : public testing::Test {
   }
   double in_view() {
     const FrameRenderer renderer(scene_);
-    return true_lamps(scene_, renderer, shot_at(scene_, {0, 0, 0.1}, 0)).at(0).in_view;
+    return find_true_lamps(scene_, renderer, shot_at(scene_, {0, 0, 0.1}, 0)).at(0).in_view;
   }
   Scene scene_ = plain_scene();
 };
@@ -33,10 +33,10 @@ TEST_F(FrameRendererClutter, AmbientLightCoversWholeImage) {
   scene_.lamps.clear();
   scene_.ambient_e_per_s = 2e7;
   const cv::Mat1f image = rendered();
-  double least = 0, most = 0;
-  cv::minMaxLoc(image, &least, &most);
-  EXPECT_NEAR(least, 1000, 1e-2);
-  EXPECT_NEAR(most, 1000, 1e-2);
+  double darkest = 0, brightest = 0;
+  cv::minMaxLoc(image, &darkest, &brightest);
+  EXPECT_NEAR(darkest, 1000, 1e-2);
+  EXPECT_NEAR(brightest, 1000, 1e-2);
 }
 
 TEST_F(FrameRendererClutter, VignettingIsPowerOfCosine) {
@@ -58,7 +58,7 @@ TEST_F(FrameRendererClutter, WindowIsRectangleOfItsRadiance) {
   EXPECT_NEAR(image(370, 520), 2500, 1e-2);
   EXPECT_NEAR(image(250, 520), 50, 1e-3);
   // 50 x 100 px of 2450 electrons more than the ceiling.
-  EXPECT_NEAR(brightness_of(cv::Mat1f(image - 50)).sum, 5000 * 2450, 5000 * 2450 * 1e-4);
+  EXPECT_NEAR(measure_brightness(cv::Mat1f(image - 50)).sum, 5000 * 2450, 5000 * 2450 * 1e-4);
 }
 
 TEST_F(FrameRendererClutter, ReflectionHasStripesOfItsLampAndSteadyLampNone) {
@@ -82,7 +82,7 @@ TEST_F(FrameRendererClutter, RectangularReflectionFadesTowardsItsSides) {
   scene_.clutter.reflections = {{glow, 0}};
   const cv::Mat1f image = rendered();
   // 20 px wide and 40 px high; a parabola keeps two thirds along each axis.
-  EXPECT_NEAR(brightness_of(image).sum, 800 * 1000 * 4 / 9.0, 1500);
+  EXPECT_NEAR(measure_brightness(image).sum, 800 * 1000 * 4 / 9.0, 1500);
   EXPECT_NEAR(image(299, 499), 1000, 4);
   EXPECT_NEAR(image(299, 504) / image(299, 499), 0.75, 0.06) << "half way to a long side";
   EXPECT_NEAR(image(309, 499) / image(299, 499), 0.75, 0.03) << "half way to a short side";
@@ -92,10 +92,10 @@ TEST_F(FrameRendererClutter, RectangularReflectionFadesTowardsItsSides) {
 }
 
 TEST_F(FrameRendererClutter, OccluderHidesLampBehindIt) {
-  const double whole = brightness_of(rendered()).sum;
+  const double whole = measure_brightness(rendered()).sum;
   // From the lamp's middle to the left, half way up.
   scene_.clutter.occluders = {{{-0.2, -0.2, 0.85}, {0.2, 0, 0}, {0, 0.4, 0}, 0}};
-  const Brightness half = brightness_of(rendered());
+  const Brightness half = measure_brightness(rendered());
   EXPECT_NEAR(half.sum / whole, 0.5, 0.002);
   // The centroid of half a disc of 30 px.
   EXPECT_NEAR(half.centroid_px.x() - 399.5, 4 * 30 / (3 * M_PI), 0.1);

@@ -18,7 +18,7 @@ int times_read_when_cut(const std::string& whole, std::size_t step) {
     if (bytes % step != 0 && (bytes == 0 || whole[bytes - 1] != '\n')) continue;
     SCOPED_TRACE(bytes);
     std::filesystem::resize_file(file, bytes);
-    const std::string message = refusal_of([&] { read_scene(file); });
+    const std::string message = rejection_message([&] { read_scene(file); });
     EXPECT_EQ(message.find('\n'), std::string::npos) << message;
     times_read += message.empty() ? 1 : 0;
   }
@@ -34,7 +34,7 @@ TEST(ReadScene, HandlesTruncatedScenesOfDatasets) {
   for (const std::string name :
        {"paper-rig", "paper-rig-faulty", "wide", "clutter", "downlights", "recessed", "foreign"}) {
     const std::string whole =
-        TemporaryFolder::content_of(VLP_SOURCE_DIR "/datasets/" + name + "/scene.yaml");
+        TemporaryFolder::read_content(VLP_SOURCE_DIR "/datasets/" + name + "/scene.yaml");
     EXPECT_GE(times_read_when_cut(whole, 47), 3) << name;
   }
 }
@@ -55,7 +55,7 @@ TEST(ReadScene, HandlesAnyReplacedNumber) {
       const std::string yaml = std::string(kSceneYaml).replace(begin, end - begin, other);
       SCOPED_TRACE(yaml);
       const auto file = folder.file("scene.yaml", yaml);
-      ++(refusal_of([&] { read_scene(file); }).empty() ? read : refused);
+      ++(rejection_message([&] { read_scene(file); }).empty() ? read : refused);
       std::filesystem::remove(file);  // or the file system is slow to write it anew
     }
   }

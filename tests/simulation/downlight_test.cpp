@@ -52,12 +52,12 @@ TEST_F(FrameRendererDownlight, SourceIsOffsetByDepthTimesSlope) {
   const Eigen::Vector3d eye_m(0.31, -0.155, 0.1);
   const Eigen::Vector3d slope(-0.2, 0.1, 0);  // of the ray to the source, 1.55 m above
   const LampShot shot = shot_at(scene_, eye_m, 0);
-  const Eigen::Vector2d core_px = brightness_of(rendered(eye_m)).centroid_px;
+  const Eigen::Vector2d core_px = measure_brightness(rendered(eye_m)).centroid_px;
   const Eigen::Vector2d rim_px = projected(glow().position_m, shot);
   EXPECT_LT((core_px - projected(glow().position_m - 0.05 * slope, shot)).norm(), 0.002);
   EXPECT_NEAR((core_px - rim_px).norm(), 0.05 * slope.norm() / 1.5 * 500, 0.002);
   const FrameRenderer renderer(scene_);
-  EXPECT_LT((true_lamps(scene_, renderer, shot).at(0).pixel - rim_px).norm(), 1e-6)
+  EXPECT_LT((find_true_lamps(scene_, renderer, shot).at(0).pixel - rim_px).norm(), 1e-6)
       << "the truth is the rim's centre";
 }
 
@@ -94,7 +94,7 @@ TEST_F(FrameRendererDownlight, HaloMatchesItsEquation) {
   EXPECT_EQ(image(299, 399), without(299, 399)) << "not inside the rim";
   EXPECT_EQ(image(299, 399 + 30 + 82), 0) << "8 lengths are 80 px";
   EXPECT_GT(image(299, 399 + 30 + 78), 0);
-  EXPECT_NEAR(reach_m(glow()), 0.09 + 0.24, 1e-12);
+  EXPECT_NEAR(light_radius_m(glow()), 0.09 + 0.24, 1e-12);
 }
 
 TEST_F(FrameRendererDownlight, HaloFlickersWithLamp) {
@@ -103,11 +103,11 @@ TEST_F(FrameRendererDownlight, HaloFlickersWithLamp) {
   const cv::Mat1f always = rendered(), switched = rendered({0, 0, 0.1}, 0.5);
   bool dark = false, lit = false;
   for (int line = 285; line < 315; ++line) {
-    const double share = switched(line, 399) / always(line, 399);
-    EXPECT_NEAR(switched(line, 380) / always(line, 380), share, 1e-5);
-    EXPECT_NEAR(switched(line, 440) / always(line, 440), share, 1e-5) << "on the ceiling";
-    dark = dark || share < 0.1;
-    lit = lit || share > 0.9;
+    const double fraction = switched(line, 399) / always(line, 399);
+    EXPECT_NEAR(switched(line, 380) / always(line, 380), fraction, 1e-5);
+    EXPECT_NEAR(switched(line, 440) / always(line, 440), fraction, 1e-5) << "on the ceiling";
+    dark = dark || fraction < 0.1;
+    lit = lit || fraction > 0.9;
   }
   EXPECT_TRUE(dark && lit);
 }
@@ -169,13 +169,13 @@ TEST_F(FrameRendererDownlight, RendersCrescentWhereRimHidesSource) {
   glow().recess = Recess{0.2, 0.05, 0, {}};
   const Eigen::Vector3d eye_m(0.75, 0, 0.1);  // the source is 0.1 m beyond the rim's centre
   const Eigen::Vector2d rim_px = projected(glow().position_m, shot_at(scene_, eye_m, 0));
-  const Brightness crescent = brightness_of(rendered(eye_m));
+  const Brightness crescent = measure_brightness(rendered(eye_m));
   ASSERT_GT(crescent.sum, 0);
   EXPECT_GT(crescent.centroid_px.x() - rim_px.x(), 0.75 * 30) << "at the near rim, 30 px away";
   EXPECT_LT(crescent.centroid_px.x() - rim_px.x(), 30);
   EXPECT_NEAR(crescent.centroid_px.y(), rim_px.y(), 0.01);
   const FrameRenderer renderer(scene_);
-  const auto lamps = true_lamps(scene_, renderer, shot_at(scene_, eye_m, 0));
+  const auto lamps = find_true_lamps(scene_, renderer, shot_at(scene_, eye_m, 0));
   ASSERT_EQ(lamps.size(), 1U);
   EXPECT_LT((lamps[0].pixel - rim_px).norm(), 1e-6) << "the truth is the rim's centre";
 }

@@ -35,8 +35,8 @@ double mean_over_line(int line, double exposure_s, const Function& function) {
   constexpr int samples = 2000;
   double sum = 0;
   for (int i = 0; i < samples; ++i) {
-    const double share = (i + 0.5) / samples - 0.5;
-    sum += function((line - 299.5) * 3e-5 + share * exposure_s);
+    const double fraction = (i + 0.5) / samples - 0.5;
+    sum += function((line - 299.5) * 3e-5 + fraction * exposure_s);
   }
   return sum / samples;
 }
@@ -53,7 +53,7 @@ TEST(RectifiedSine, MeanMatchesNumericalIntegral) {
     return sum / samples;
   };
   for (const double end_s : {-0.0039, 0.002, 0.013, 0.1}) {
-    EXPECT_NEAR(wave.lit_share(-0.004, end_s), mean_until(end_s), 1e-7);
+    EXPECT_NEAR(wave.lit_fraction(-0.004, end_s), mean_until(end_s), 1e-7);
   }
 }
 
@@ -94,7 +94,7 @@ TEST_F(FrameRendererForeignLight, RowBrightnessMatchesMainsEquation) {
 TEST_F(FrameRendererForeignLight, RendersRectangle) {
   const Glow tube{{0.1, 0, 1.6}, {ShapeKind::rectangle, Eigen::Vector2d(0.9, 0.06)}, 1e9, 1};
   scene_.clutter.foreign_lights = {{tube, RectifiedSine{120, 0, 0}, {}}};
-  EXPECT_NEAR(brightness_of(rendered()).sum, 300 * 20 * 5e4, 1e-4 * 300 * 20 * 5e4);
+  EXPECT_NEAR(measure_brightness(rendered()).sum, 300 * 20 * 5e4, 1e-4 * 300 * 20 * 5e4);
 }
 
 TEST_F(FrameRendererForeignLight, AmbientFlickerVariesByRowOnly) {
@@ -124,7 +124,7 @@ TEST_F(FrameRendererForeignLight, BlindRendersBarsOfWindow) {
     EXPECT_NEAR(image(first + 10 * slat + 2, u), 3000, 0.1);
     EXPECT_NEAR(image(first + 10 * slat + 7, u), 50, 0.1);
   }
-  EXPECT_NEAR(brightness_of(cv::Mat1f(image - 50)).sum, 4000 * 2950, 4000 * 2950 * 1e-4);
+  EXPECT_NEAR(measure_brightness(cv::Mat1f(image - 50)).sum, 4000 * 2950, 4000 * 2950 * 1e-4);
 }
 
 TEST_F(FrameRendererForeignLight, SlantedBlindRendersBarsAlongFirstEdge) {
@@ -158,7 +158,7 @@ TEST_F(FrameRendererForeignLight, SignRendersSeededLettersOfItsRadiance) {
     const int v = int(std::lround(299.5 + (middle.y() - 0.5) * 100));
     EXPECT_NEAR(image(v, u), 3000, 0.1);
   }
-  const double lit = brightness_of(cv::Mat1f(image - 50)).sum / 2950 / (200 * 100);
+  const double lit = measure_brightness(cv::Mat1f(image - 50)).sum / 2950 / (200 * 100);
   EXPECT_GT(lit, 0.05);
   EXPECT_LT(lit, 0.6) << "dark between the strokes";
   const auto first = strokes;
@@ -178,15 +178,15 @@ TEST_F(FrameRendererForeignLight, IsListedInTrueOtherLightsOnly) {
       {{{-0.3, 0, 1.6}, make_disc(0.12), 1e9, 1}, RectifiedSine{100, 1, 0}, {}},
       {{{5, 0, 1.6}, make_disc(0.12), 1e9, 1}, RectifiedSine{100, 1, 0}, {}}};
   const FrameRenderer renderer(scene_);
-  const auto lights = true_other_lights(scene_, renderer, shot());
+  const auto lights = find_true_other_lights(scene_, renderer, shot());
   ASSERT_EQ(lights.size(), 2U) << "the third is out of view";
   EXPECT_EQ(lights[0].kind, OtherLightKind::pwm);
   EXPECT_EQ(lights[1].kind, OtherLightKind::mains);
   EXPECT_FALSE(lights[0].lamp);
   EXPECT_NEAR(lights[0].pixel.x(), 499.5, 1e-6);
   EXPECT_EQ(lights[0].in_view, 1);
-  EXPECT_EQ(true_lamps(scene_, renderer, shot()).size(), 1U);
-  EXPECT_EQ(lamp_map_of(scene_, true).lamps.size(), 1U);
+  EXPECT_EQ(find_true_lamps(scene_, renderer, shot()).size(), 1U);
+  EXPECT_EQ(make_lamp_map(scene_, true).lamps.size(), 1U);
 }
 
 TEST_F(FrameRendererForeignLight, WriteTruthListsItInTrueOtherLightsTable) {
@@ -205,7 +205,7 @@ TEST_F(FrameRendererForeignLight, WriteTruthListsItInTrueOtherLightsTable) {
       {{{0.3, 0, 1.6}, make_disc(0.12), 1e9, 1}, SquareWave{500, 0.3, 0}, {}}};
   scene_.clutter.mirrors = {{{{0.4, -1, 0}, {0, 2, 0}, {0, 0, 1.7}, 0}, 0.2}};
   write_truth(scene_, FrameRenderer(scene_), set, folder / "");
-  const std::string table = TemporaryFolder::content_of(folder / "true_other_lights.csv");
+  const std::string table = TemporaryFolder::read_content(folder / "true_other_lights.csv");
   EXPECT_EQ(table,
             "image,kind,lamp,u_px,v_px,in_view\n"
             "0000.png,mirror_image,1,666.166667,299.500000,1\n"
@@ -222,12 +222,12 @@ TEST(LampShot, ForeignLightPhasesDoNotChangeOtherRandomValues) {
   set.lamps->yaw_jitter_rad = set.lamps->turn_rate_rad_per_s = 0;
   set.lamps->repeat = 3;
   set.lamps->interval_s = 0.25;
-  const LampShot without = lamp_shot(scene, set, 1);
+  const LampShot without = make_lamp_shot(scene, set, 1);
   scene.clutter.foreign_lights = {
       {{{0.3, 0, 1.6}, make_disc(0.12), 1e9, 1}, SquareWave{500, 0.3, 0}, {}},
       {{{0, 0.3, 1.6}, make_disc(0.12), 1e9, 1}, RectifiedSine{101, 1, 0}, 0.5}};
   scene.clutter.ambient_flicker = RectifiedSine{100, 0.5, 0};
-  const LampShot with = lamp_shot(scene, set, 1), next = lamp_shot(scene, set, 2);
+  const LampShot with = make_lamp_shot(scene, set, 1), next = make_lamp_shot(scene, set, 2);
   EXPECT_EQ(with.waves.at(0).phase, without.waves.at(0).phase);
   EXPECT_EQ(with.noise_seed, without.noise_seed);
   ASSERT_EQ(with.foreign_waves.size(), 2U);

@@ -23,15 +23,15 @@ Camera splined() {
   return camera;
 }
 
-struct Seen {
+struct LensCase {
   Camera camera;
   double tilt_rad, blur_px;
   const char* name;
 
-  friend void PrintTo(const Seen& seen, std::ostream* out) { *out << seen.name; }
+  friend void PrintTo(const LensCase& lens_case, std::ostream* out) { *out << lens_case.name; }
 };
 
-class FrameRendererDisc : public testing::TestWithParam<Seen> {
+class FrameRendererDisc : public testing::TestWithParam<LensCase> {
  protected:
   FrameRendererDisc() {
     scene_.camera = GetParam().camera;
@@ -41,13 +41,13 @@ class FrameRendererDisc : public testing::TestWithParam<Seen> {
   }
 
   /// Returns the image of a capture, with blur and quantization.
-  cv::Mat1f image_of(const FrameRenderer& renderer, const LampShot& shot) const {
+  cv::Mat1f render_image(const FrameRenderer& renderer, const LampShot& shot) const {
     const cv::Mat image = expose(scene_.sensor, renderer.lamp_electrons(shot), 1);
     return cv::Mat1f(image);
   }
   std::vector<Eigen::Vector2d> projected(const LampShot& shot,
                                          const std::vector<Eigen::Vector3d>& points_m) const {
-    const MrcalOracle mrcal(std::string(name_of(scene_.camera.lens_model)),
+    const MrcalOracle mrcal(std::string(to_string(scene_.camera.lens_model)),
                             scene_.camera.intrinsics);
     const Eigen::Isometry3d camera_from_world = shot.motion.world_from_camera(0).inverse();
     std::vector<Eigen::Vector3d> rays;
@@ -61,7 +61,7 @@ class FrameRendererDisc : public testing::TestWithParam<Seen> {
     for (const double x_m : {-0.7, -0.31, 0.003, 0.45, 0.8}) {
       for (const double y_m : {-0.6, 0.0, 0.37}) {
         const LampShot shot = shot_at(scene_, {x_m, y_m, 0.1}, 0.3 + x_m);
-        const auto lamps = true_lamps(scene_, renderer, shot);
+        const auto lamps = find_true_lamps(scene_, renderer, shot);
         constexpr double radius_px = 40;
         const Eigen::AlignedBox2d inside(Eigen::Vector2d(radius_px, radius_px),
                                          Eigen::Vector2d(800 - radius_px, 600 - radius_px));
@@ -95,7 +95,7 @@ TEST_P(FrameRendererDisc, CentroidMatchesProjectedOutline) {
       twice_area += cross(p, q);
       moment += cross(p, q) * (p + q) / 3;
     }
-    const Brightness rendered = brightness_of(image_of(renderer, shot));
+    const Brightness rendered = measure_brightness(render_image(renderer, shot));
     EXPECT_LT((rendered.centroid_px - moment / twice_area).norm(), 0.001);
     const double level = glow.radiance_e_per_s * shot.exposure_s;
     EXPECT_NEAR(rendered.sum / level / std::abs(twice_area / 2), 1, 1e-4);
@@ -107,10 +107,10 @@ TEST_P(FrameRendererDisc, CentroidOnCeilingMatchesLampPosition) {
   const Eigen::Vector3d lamp_m = scene_.lamps[0].glow.position_m;
   for (const LampShot& shot : shots(renderer)) {
     const Eigen::Vector2d truth = projected(shot, {lamp_m})[0];
-    EXPECT_LT((true_lamps(scene_, renderer, shot)[0].pixel - truth).norm(), 1e-6);
+    EXPECT_LT((find_true_lamps(scene_, renderer, shot)[0].pixel - truth).norm(), 1e-6);
 
     // The weight of a pixel is the area of the ceiling that it covers.
-    const cv::Mat1f image = image_of(renderer, shot);
+    const cv::Mat1f image = render_image(renderer, shot);
     const Eigen::Isometry3d world_from_camera = shot.motion.world_from_camera(0);
     const auto ceiling_m = [&](double u, double v) {
       const Eigen::Vector3d ray =
@@ -137,11 +137,12 @@ TEST_P(FrameRendererDisc, CentroidOnCeilingMatchesLampPosition) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Lenses, FrameRendererDisc,
-                         testing::Values(Seen{paper_rig_camera(), 0, 0, "PaperRig"},
-                                         Seen{paper_rig_camera(), 0.03, 0.7, "PaperRigTilted"},
-                                         Seen{wide_camera(), 0.05, 0, "Wide"},
-                                         Seen{stereographic_camera(), 0.1, 0.5, "Stereographic"},
-                                         Seen{splined(), 0.05, 0.5, "Splined"}),
+                         testing::Values(LensCase{paper_rig_camera(), 0, 0, "PaperRig"},
+                                         LensCase{paper_rig_camera(), 0.03, 0.7, "PaperRigTilted"},
+                                         LensCase{wide_camera(), 0.05, 0, "Wide"},
+                                         LensCase{stereographic_camera(), 0.1, 0.5,
+                                                  "Stereographic"},
+                                         LensCase{splined(), 0.05, 0.5, "Splined"}),
                          [](const auto& instance) { return std::string(instance.param.name); });
 
 }  // namespace

@@ -37,7 +37,7 @@ class FrameRendererMirror : public testing::Test {
   }
   std::vector<TrueOtherLight> truth() const {
     const FrameRenderer renderer(scene_);
-    return true_other_lights(scene_, renderer, shot_at(scene_, {0, 0, 0.1}, 0));
+    return find_true_other_lights(scene_, renderer, shot_at(scene_, {0, 0, 0.1}, 0));
   }
   Scene scene_ = plain_scene();
 };
@@ -52,8 +52,8 @@ TEST(ReflectionAbout, MovesPointsByTwiceTheirDistance) {
 
 TEST_F(FrameRendererMirror, ReflectsLampAtMirroredPositionTimesReflectance) {
   // The mirror image of the lamp over the camera is 0.8 m aside: 266.7 px.
-  const Brightness lamp = brightness_of(cv::Mat1f(rendered().colRange(0, 480)));
-  const Brightness image = brightness_of(behind_pane(rendered()));
+  const Brightness lamp = measure_brightness(cv::Mat1f(rendered().colRange(0, 480)));
+  const Brightness image = measure_brightness(behind_pane(rendered()));
   ASSERT_GT(image.sum, 0);
   EXPECT_NEAR(image.centroid_px.x(), 399.5 + 500 * 0.8 / 1.5, 0.01);
   EXPECT_NEAR(image.centroid_px.y(), 299.5, 0.001);
@@ -77,15 +77,15 @@ TEST_F(FrameRendererMirror, ReflectsNothingOutsidePane) {
   // The rays to the mirror image cross the plane of the pane half way up, at 0.85 m, from y = -4.5
   // to 4.5 cm: a pane from y = 0 reflects half of it.
   pane() = {{0.4, 0, 0}, {0, 1, 0}, {0, 0, 1.7}, 0};
-  const Brightness half = brightness_of(behind_pane(rendered()));
+  const Brightness half = measure_brightness(behind_pane(rendered()));
   const auto lights = truth();
   pane() = {{0.4, -1, 0}, {0, 2, 0}, {0, 0, 1.7}, 0};
-  EXPECT_NEAR(half.sum / brightness_of(behind_pane(rendered())).sum, 0.5, 0.002);
+  EXPECT_NEAR(half.sum / measure_brightness(behind_pane(rendered())).sum, 0.5, 0.002);
   EXPECT_NEAR(half.centroid_px.y() - 299.5, 4 * 30 / (3 * M_PI), 0.2);
   ASSERT_EQ(lights.size(), 1U);
   EXPECT_NEAR(lights[0].in_view, 0.5, 0.02);
   pane() = {{0.4, -1, 0}, {0, 2, 0}, {0, 0, 0.7}, 0};
-  EXPECT_EQ(brightness_of(behind_pane(rendered())).sum, 0) << "below the rays";
+  EXPECT_EQ(measure_brightness(behind_pane(rendered())).sum, 0) << "below the rays";
   EXPECT_TRUE(truth().empty());
 }
 
@@ -108,7 +108,7 @@ TEST_F(FrameRendererMirror, ReflectsDarkSideOfRecess) {
   scene_.lamps[0].glow.position_m.x() = 0.8;
   scene_.lamps[0].glow.recess->dark_side->azimuth_rad = M_PI - dark_azimuth_rad;
   const cv::Mat1f moved = behind_pane(rendered());
-  ASSERT_GT(brightness_of(image).sum, 0);
+  ASSERT_GT(measure_brightness(image).sum, 0);
   EXPECT_LT(cv::norm(image, cv::Mat1f(0.2 * moved), cv::NORM_INF), 0.01);
 }
 
@@ -133,7 +133,7 @@ TEST_F(FrameRendererMirror, MirrorImageIsListedInTrueOtherLightsOnly) {
   EXPECT_LT((lights[0].pixel - Eigen::Vector2d(399.5 + 500 * 0.8 / 1.5, 299.5)).norm(), 1e-6);
   EXPECT_EQ(lights[0].in_view, 1);
   const FrameRenderer renderer(scene_);
-  const auto lamps = true_lamps(scene_, renderer, shot_at(scene_, {0, 0, 0.1}, 0));
+  const auto lamps = find_true_lamps(scene_, renderer, shot_at(scene_, {0, 0, 0.1}, 0));
   ASSERT_EQ(lamps.size(), 1U);
   EXPECT_NEAR(lamps[0].pixel.x(), 399.5, 1e-6);
 }

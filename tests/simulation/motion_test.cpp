@@ -14,13 +14,13 @@ namespace {
 std::vector<double> middles(const cv::Mat1f& image, int first, int count) {
   std::vector<double> middles;
   for (int line = first; line < first + count; ++line) {
-    const Brightness row = brightness_of(image.row(line));
+    const Brightness row = measure_brightness(image.row(line));
     middles.push_back(row.centroid_px.x());
   }
   return middles;
 }
 
-double slope_of(const std::vector<double>& values) {
+double fit_slope(const std::vector<double>& values) {
   const auto count = static_cast<double>(values.size());
   double moment = 0, square = 0;
   for (std::size_t i = 0; i < values.size(); ++i) {
@@ -37,12 +37,12 @@ TEST(FrameRendererMotion, SkewMatchesRowTimeTimesSpeed) {
   scene.lamps[0].glow.shape = make_disc(0.3);  // 100 px
   const FrameRenderer renderer(scene);
   LampShot shot = shot_at(scene, {0, 0, 0.1}, 0);
-  ASSERT_NEAR(slope_of(middles(renderer.lamp_electrons(shot), 260, 80)), 0, 1e-6);
+  ASSERT_NEAR(fit_slope(middles(renderer.lamp_electrons(shot), 260, 80)), 0, 1e-6);
   for (const double speed_m_per_s : {0.04, 1.0, -3.0}) {
     shot.motion.velocity_m_per_s = {speed_m_per_s, 0};
     // The lamp moves in the opposite direction, by f / H = 500 / 1.5 pixels per meter.
     const double expected = -speed_m_per_s * 3e-5 * 500 / 1.5;
-    EXPECT_NEAR(slope_of(middles(renderer.lamp_electrons(shot), 260, 80)) / expected, 1, 0.01);
+    EXPECT_NEAR(fit_slope(middles(renderer.lamp_electrons(shot), 260, 80)) / expected, 1, 0.01);
   }
 }
 
@@ -65,9 +65,9 @@ TEST(FrameRendererMotion, SkewMatchesRowTimeTimesYawRate) {
       const double turned = rad_from_deg(90) * (line - 299.5) * 3e-5;
       theory.push_back(100 * std::sin(turned));
     }
-    expected = slope_of(theory);
+    expected = fit_slope(theory);
   }
-  EXPECT_NEAR(slope_of(at) / expected, 1, 0.01);
+  EXPECT_NEAR(fit_slope(at) / expected, 1, 0.01);
 }
 
 TEST(FrameRendererMotion, TrueLampMovesWithRenderedLamp) {
@@ -77,13 +77,14 @@ TEST(FrameRendererMotion, TrueLampMovesWithRenderedLamp) {
   for (const Eigen::Vector2d& velocity : {Eigen::Vector2d(2, 0), Eigen::Vector2d(-1, 2)}) {
     LampShot shot = shot_at(scene, {0.05, -0.4, 0.1}, 0.2);
     const auto offset = [&] {
-      const Brightness seen = brightness_of(renderer.lamp_electrons(shot));
-      return Eigen::Vector2d(seen.centroid_px - true_lamps(scene, renderer, shot).at(0).pixel);
+      const Brightness brightness = measure_brightness(renderer.lamp_electrons(shot));
+      return Eigen::Vector2d(brightness.centroid_px -
+                             find_true_lamps(scene, renderer, shot).at(0).pixel);
     };
     const Eigen::Vector2d at_rest = offset();
-    const Eigen::Vector2d centre = true_lamps(scene, renderer, shot)[0].pixel;
+    const Eigen::Vector2d centre = find_true_lamps(scene, renderer, shot)[0].pixel;
     shot.motion.velocity_m_per_s = velocity;
-    EXPECT_GT((true_lamps(scene, renderer, shot)[0].pixel - centre).norm(), 1);
+    EXPECT_GT((find_true_lamps(scene, renderer, shot)[0].pixel - centre).norm(), 1);
     EXPECT_LT((offset() - at_rest).norm(), 0.01);
   }
 }
@@ -94,12 +95,12 @@ TEST(FrameRendererMotion, KeepsTotalLightUnderRotation) {
   scene.lamps[0].glow.position_m = {0.55, 0, 1.6};  // 183 px from the middle
   const FrameRenderer renderer(scene);
   LampShot shot = shot_at(scene, {0, 0, 0.1}, 0.33);
-  const double at_rest = brightness_of(renderer.lamp_electrons(shot)).sum;
+  const double at_rest = measure_brightness(renderer.lamp_electrons(shot)).sum;
   // Full rotation: lines are lit longer where the lamp moves with the readout, shorter where it
   // moves against it.
   shot.motion.turn_rate_rad_per_s = rad_from_deg(720);
   shot.exposure_s = 0.5;
-  const double smeared = brightness_of(renderer.lamp_electrons(shot)).sum;
+  const double smeared = measure_brightness(renderer.lamp_electrons(shot)).sum;
   EXPECT_NEAR(smeared / at_rest, 0.5 / 5e-5, 0.5 / 5e-5 * 3e-3);
 }
 
@@ -126,14 +127,14 @@ TEST(FrameRendererMotion, SmearVarianceMatchesDisplacement) {
   const FrameRenderer renderer(scene);
   const auto variance = [&] {
     const cv::Mat1f image = renderer.lamp_electrons(shot);
-    const Brightness seen = brightness_of(image);
+    const Brightness brightness = measure_brightness(image);
     double sum = 0;
     for (int v = 0; v < image.rows; ++v) {
       for (int u = 0; u < image.cols; ++u) {
-        sum += image(v, u) * std::pow(u - seen.centroid_px.x(), 2);
+        sum += image(v, u) * std::pow(u - brightness.centroid_px.x(), 2);
       }
     }
-    return sum / seen.sum;
+    return sum / brightness.sum;
   };
   const double at_rest = variance();
   shot.motion.velocity_m_per_s = {3, 0};
@@ -147,11 +148,11 @@ TEST(FrameRendererMotion, KeepsTotalLightOfMovingBoard) {
   scene.board = plain_board();
   scene.board->surround_e_per_s = 0;
   const FrameRenderer renderer(scene);
-  BoardShot shot = board_shot(scene, board_views(1, 0.5, 0, 0, 0), 0);
+  BoardShot shot = make_board_shot(scene, board_views(1, 0.5, 0, 0, 0), 0);
   shot.exposure_s = 0.01;
-  const Brightness at_rest = brightness_of(renderer.board_electrons(shot));
+  const Brightness at_rest = measure_brightness(renderer.board_electrons(shot));
   shot.velocity_in_camera_m_per_s = {0.01, 0, 0};
-  const Brightness moving = brightness_of(renderer.board_electrons(shot));
+  const Brightness moving = measure_brightness(renderer.board_electrons(shot));
   EXPECT_NEAR(moving.sum / at_rest.sum, 1, 1e-4);
   EXPECT_LT((moving.centroid_px - at_rest.centroid_px).norm(), 0.02);
 }

@@ -26,7 +26,7 @@ cv::Mat1f step(double left, double right) {
 bool same(const cv::Mat& a, const cv::Mat& b) { return cv::norm(a, b, cv::NORM_INF) == 0; }
 
 TEST(Expose, AppliesToneCurveToStep) {
-  const cv::Mat image = expose(kSensor, step(20, 200), 1, Picture{2.2, {}, {}});
+  const cv::Mat image = expose(kSensor, step(20, 200), 1, ImageProcessing{2.2, {}, {}});
   EXPECT_EQ(image.at<std::uint8_t>(10, 19), std::lround(255 * std::pow(10 / 255.0, 1 / 2.2)));
   EXPECT_EQ(image.at<std::uint8_t>(10, 20), std::lround(255 * std::pow(100 / 255.0, 1 / 2.2)));
 }
@@ -34,22 +34,23 @@ TEST(Expose, AppliesToneCurveToStep) {
 TEST(ApplyToneCurve, MapsBlackLevelToZeroAndClipsAtWhite) {
   Sensor sensor = kSensor;
   sensor.black_level_dn = 15;
-  const Picture picture{2, {}, {}};
-  EXPECT_EQ(coded_level(picture, sensor, 15), 0);
-  EXPECT_EQ(coded_level(picture, sensor, 3), 0) << "noise below it";
-  EXPECT_EQ(coded_level(picture, sensor, 15 + 60), 255 * 0.5);
-  EXPECT_EQ(coded_level(picture, sensor, 300), 255);
+  const ImageProcessing picture{2, {}, {}};
+  EXPECT_EQ(apply_tone_curve(picture, sensor, 15), 0);
+  EXPECT_EQ(apply_tone_curve(picture, sensor, 3), 0) << "noise below it";
+  EXPECT_EQ(apply_tone_curve(picture, sensor, 15 + 60), 255 * 0.5);
+  EXPECT_EQ(apply_tone_curve(picture, sensor, 300), 255);
   sensor.bits = 16;
-  EXPECT_EQ(coded_level(picture, sensor, 65535), 65535);
+  EXPECT_EQ(apply_tone_curve(picture, sensor, 65535), 65535);
 }
 
 TEST(Expose, IsUnchangedByGammaOne) {
   const Sensor noisy{16, 0.5, 0, 60000, 0, true, {}};
   const cv::Mat1f electrons = step(300, 3000);
-  EXPECT_TRUE(same(expose(noisy, electrons, 1, Picture{1, {}, {}}), expose(noisy, electrons, 1)));
+  EXPECT_TRUE(
+      same(expose(noisy, electrons, 1, ImageProcessing{1, {}, {}}), expose(noisy, electrons, 1)));
 }
 
-const Picture kBayer{1, {}, {}, Bayer{0.5, 0.25}};
+const ImageProcessing kBayer{1, {}, {}, Bayer{0.5, 0.25}};
 
 TEST(ExposeBayer, ReturnsGrayForUniformLight) {
   const cv::Mat image = expose(kSensor, cv::Mat1f(20, 40, 200), 1, kBayer);
@@ -59,23 +60,23 @@ TEST(ExposeBayer, ReturnsGrayForUniformLight) {
 
 TEST(ExposeBayer, LitPixelAppearsInColorOfItsFilter) {
   struct Lit {
-    int line, place, colour;
+    int line, place, color;
     float electrons;
   };
   // Red filters pass half of the light, blue ones a quarter.
-  for (const auto& [line, place, colour, electrons] :
+  for (const auto& [line, place, color, electrons] :
        {Lit{10, 20, 2, 80.F}, {10, 21, 1, 80.F}, {11, 20, 1, 80.F}, {11, 21, 0, 80.F}}) {
     cv::Mat1f light(20, 40, 0.F);
     light(line, place) = electrons;
     cv::Mat channels[3];
     cv::split(expose(kSensor, light, 1, kBayer), channels);
     for (int i = 0; i < 3; ++i) {
-      EXPECT_EQ(cv::countNonZero(channels[i]) > 0, i == colour) << line << ", " << place;
+      EXPECT_EQ(cv::countNonZero(channels[i]) > 0, i == color) << line << ", " << place;
     }
-    const cv::Mat& own = channels[colour];
-    EXPECT_EQ(own.at<std::uint8_t>(line, place), 40);
-    EXPECT_EQ(own.at<std::uint8_t>(line, place + 1), colour == 1 ? 10 : 20) << "of 4, or of 2";
-    EXPECT_EQ(own.at<std::uint8_t>(line + 1, place + 1), colour == 1 ? 0 : 10);
+    const cv::Mat& channel = channels[color];
+    EXPECT_EQ(channel.at<std::uint8_t>(line, place), 40);
+    EXPECT_EQ(channel.at<std::uint8_t>(line, place + 1), color == 1 ? 10 : 20) << "of 4, or of 2";
+    EXPECT_EQ(channel.at<std::uint8_t>(line + 1, place + 1), color == 1 ? 0 : 10);
   }
 }
 
@@ -100,7 +101,7 @@ TEST(ExposeBayer, ReproducesLinearGradient) {
 
 TEST(Develop, OvershootsStepLikeUnsharpMask) {
   const double amount = 0.8, radius_px = 1.5, low = 50, high = 100;
-  const Picture picture{1, Sharpening{amount, radius_px}, {}};
+  const ImageProcessing picture{1, Sharpening{amount, radius_px}, {}};
   cv::Mat1f levels = step(low, high);
   develop(picture, kSensor, levels);
   // Next to the edge the blurred image has (1 + g) / 2 of the step, with g the kernel's largest
@@ -115,10 +116,11 @@ TEST(Develop, OvershootsStepLikeUnsharpMask) {
 }
 
 TEST(Expose, SharpensAfterToneCurveAndBeforeRounding) {
-  const Picture curve{2, {}, {}}, both{2, Sharpening{1, 1}, {}};
-  const double low = coded_level(curve, kSensor, 10), high = coded_level(curve, kSensor, 100);
-  const cv::Mat image = expose(kSensor, step(20, 200), 1, both);
-  const Picture sharpening{1, Sharpening{1, 1}, {}};
+  const ImageProcessing curve{2, {}, {}}, curve_and_sharpening{2, Sharpening{1, 1}, {}};
+  const double low = apply_tone_curve(curve, kSensor, 10),
+               high = apply_tone_curve(curve, kSensor, 100);
+  const cv::Mat image = expose(kSensor, step(20, 200), 1, curve_and_sharpening);
+  const ImageProcessing sharpening{1, Sharpening{1, 1}, {}};
   cv::Mat1f levels = step(low, high);
   develop(sharpening, kSensor, levels);
   for (const int u : {18, 19, 20, 21}) {
@@ -129,27 +131,28 @@ TEST(Expose, SharpensAfterToneCurveAndBeforeRounding) {
 TEST(EncodeImage, ReturnsLosslessPngWithoutJpegQuality) {
   const Sensor noisy{8, 0.5, 5, 60000, 8, true, {}};
   const cv::Mat image = expose(noisy, step(50, 400), 1);
-  for (const auto& picture : {std::optional<Picture>(), std::optional<Picture>({2.2, {}, {}})}) {
-    EXPECT_EQ(image_ending(picture), ".png");
-    EXPECT_TRUE(same(cv::imdecode(encoded(image, picture), cv::IMREAD_UNCHANGED), image));
+  for (const auto& picture :
+       {std::optional<ImageProcessing>(), std::optional<ImageProcessing>({2.2, {}, {}})}) {
+    EXPECT_EQ(image_extension(picture), ".png");
+    EXPECT_TRUE(same(cv::imdecode(encode_image(image, picture), cv::IMREAD_UNCHANGED), image));
   }
 }
 
 TEST(EncodeImage, ReturnsJpegOfGivenQuality) {
   const Sensor noisy{8, 0.5, 5, 60000, 8, true, {}};
   const cv::Mat image = expose(noisy, step(50, 400), 1);
-  const Picture coarse{1, {}, 30}, fine{1, {}, 95};
-  EXPECT_EQ(image_ending(fine), ".jpg");
-  const auto bytes = encoded(image, fine);
+  const ImageProcessing coarse{1, {}, 30}, fine{1, {}, 95};
+  EXPECT_EQ(image_extension(fine), ".jpg");
+  const auto bytes = encode_image(image, fine);
   EXPECT_EQ(bytes.at(0), 0xff);
   EXPECT_EQ(bytes.at(1), 0xd8);
-  EXPECT_EQ(encoded(image, fine), bytes);
-  EXPECT_GT(bytes.size(), encoded(image, coarse).size());
+  EXPECT_EQ(encode_image(image, fine), bytes);
+  EXPECT_GT(bytes.size(), encode_image(image, coarse).size());
   const cv::Mat found = cv::imdecode(bytes, cv::IMREAD_UNCHANGED);
   EXPECT_EQ(found.type(), CV_8U);
   const double loss = cv::norm(found, image),
                coarse_loss =
-                   cv::norm(cv::imdecode(encoded(image, coarse), cv::IMREAD_UNCHANGED), image);
+                   cv::norm(cv::imdecode(encode_image(image, coarse), cv::IMREAD_UNCHANGED), image);
   EXPECT_GT(loss, 0);
   EXPECT_LT(loss, 0.5 * coarse_loss);
 }
@@ -158,9 +161,9 @@ TEST(LampShot, ImageNameHasExtensionOfPictureFormat) {
   Scene scene = plain_scene();
   const LampShots captures{{0}, {{0, 0}}, {}, {0}, 0, 0, 1, 0.5, false};
   const CaptureSet set{"one", 5e-5, captures, {}};
-  EXPECT_EQ(lamp_shot(scene, set, 0).image, "0000.png");
-  scene.picture = Picture{2.2, {}, 90};
-  EXPECT_EQ(lamp_shot(scene, set, 0).image, "0000.jpg");
+  EXPECT_EQ(make_lamp_shot(scene, set, 0).image, "0000.png");
+  scene.picture = ImageProcessing{2.2, {}, 90};
+  EXPECT_EQ(make_lamp_shot(scene, set, 0).image, "0000.jpg");
 }
 
 }  // namespace

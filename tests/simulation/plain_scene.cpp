@@ -67,7 +67,7 @@ CaptureSet board_views(int count, double distance_m, double tilt_rad, double rol
           count, {distance_m, distance_m}, tilt_rad, roll_rad, spread, Eigen::Vector3d::Zero()}};
 }
 
-Brightness brightness_of(const cv::Mat1f& image) {
+Brightness measure_brightness(const cv::Mat1f& image) {
   Brightness brightness{0, Eigen::Vector2d::Zero()};
   for (int v = 0; v < image.rows; ++v) {
     for (int u = 0; u < image.cols; ++u) {

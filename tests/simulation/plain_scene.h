@@ -36,6 +36,6 @@ struct Brightness {
   double sum;
   Eigen::Vector2d centroid_px;
 };
-Brightness brightness_of(const cv::Mat1f& image);
+Brightness measure_brightness(const cv::Mat1f& image);
 
 }  // namespace vlp

@@ -23,7 +23,7 @@ class FrameRendererRectangle : public testing::TestWithParam<LampShape> {
   }
   std::vector<Eigen::Vector2d> projected(const LampShot& shot,
                                          const std::vector<Eigen::Vector3d>& points_m) const {
-    const MrcalOracle mrcal(std::string(name_of(scene_.camera.lens_model)),
+    const MrcalOracle mrcal(std::string(to_string(scene_.camera.lens_model)),
                             scene_.camera.intrinsics);
     const Eigen::Isometry3d camera_from_world = shot.motion.world_from_camera(0).inverse();
     std::vector<Eigen::Vector3d> rays;
@@ -69,7 +69,7 @@ TEST_P(FrameRendererRectangle, CoversProjectedOutline) {
       moment += cross(p, q) * (p + q) / 3;
     }
     const cv::Mat1f image(expose(scene_.sensor, renderer.lamp_electrons(shot), 1));
-    const Brightness rendered = brightness_of(image);
+    const Brightness rendered = measure_brightness(image);
     EXPECT_LT((rendered.centroid_px - moment / twice_area).norm(), 0.001);
     const double level = glow.radiance_e_per_s * shot.exposure_s;
     EXPECT_NEAR(rendered.sum / level / std::abs(twice_area / 2), 1, 1e-4);
@@ -93,7 +93,7 @@ TEST_P(FrameRendererRectangle, CoversProjectedOutline) {
 TEST_P(FrameRendererRectangle, TrueLampIsImageOfCenter) {
   const FrameRenderer renderer(scene_);
   const LampShot shot = shot_at(scene_, {0.35, -0.2, 0.1}, 0.4);
-  const auto truth = true_lamps(scene_, renderer, shot);
+  const auto truth = find_true_lamps(scene_, renderer, shot);
   ASSERT_EQ(truth.size(), 1U);
   EXPECT_EQ(truth[0].in_view, 1);
   const auto center = projected(shot, {scene_.lamps[0].glow.position_m})[0];
@@ -103,7 +103,7 @@ TEST_P(FrameRendererRectangle, TrueLampIsImageOfCenter) {
 TEST_P(FrameRendererRectangle, TrueLampIsPartlyInViewAtImageEdge) {
   const FrameRenderer renderer(scene_);
   const LampShot shot = shot_at(scene_, {1.2, 0, 0.1}, 0);
-  const auto truth = true_lamps(scene_, renderer, shot);
+  const auto truth = find_true_lamps(scene_, renderer, shot);
   ASSERT_EQ(truth.size(), 1U);
   EXPECT_GT(truth[0].in_view, 0);
   EXPECT_LT(truth[0].in_view, 1);

@@ -124,8 +124,8 @@ TEST(ReadScene, RejectsInvalidRecessOrHalo) {
 }
 
 TEST(ReadScene, RejectsInvalidColorFilters) {
-  const auto with = [](const std::string& shares) {
-    return refusal_with("jpeg_quality: 90}", "jpeg_quality: 90, bayer: {" + shares + "}}");
+  const auto with = [](const std::string& filters) {
+    return refusal_with("jpeg_quality: 90}", "jpeg_quality: 90, bayer: {" + filters + "}}");
   };
   EXPECT_EQ(with("red_share: 0.6, blue_share: 0.5"), "");
   EXPECT_THAT(with("red_share: 0, blue_share: 0.5"),

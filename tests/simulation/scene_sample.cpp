@@ -46,7 +46,7 @@ std::string scene_with(const std::string& from, const std::string& to) {
   return yaml.replace(at, from.size(), to);
 }
 
-Scene scene_of(const std::string& yaml) {
+Scene read_scene_text(const std::string& yaml) {
   const TemporaryFolder folder;
   return read_scene(folder.file("scene.yaml", yaml));
 }
@@ -54,7 +54,7 @@ Scene scene_of(const std::string& yaml) {
 std::string scene_refusal(const std::string& yaml) {
   const TemporaryFolder folder;
   const auto file = folder.file("scene.yaml", yaml);
-  const std::string message = refusal_of([&] { read_scene(file); });
+  const std::string message = rejection_message([&] { read_scene(file); });
   const std::string parent = (folder / "").string();
   return message.starts_with(parent) ? message.substr(parent.size()) : message;
 }

@@ -16,7 +16,7 @@ extern const std::string kSceneYaml;
 /// Returns kSceneYaml with the first `from` replaced; throws if there is none.
 std::string scene_with(const std::string& from, const std::string& to);
 
-Scene scene_of(const std::string& yaml);
+Scene read_scene_text(const std::string& yaml);
 
 /// Returns the error message for a scene, as from scene.yaml in no folder; "" if it is valid.
 std::string scene_refusal(const std::string& yaml);

@@ -20,7 +20,7 @@ using testing::Pointwise;
 constexpr double kRounding = 1e-12;
 
 TEST(ReadScene, ReadsCameraAndSensor) {
-  const Scene scene = scene_of(kSceneYaml);
+  const Scene scene = read_scene_text(kSceneYaml);
   EXPECT_EQ(scene.seed, 7U);
   EXPECT_EQ(scene.camera.id, "small");
   EXPECT_EQ(scene.camera.imager_px[1], 120);
@@ -36,19 +36,19 @@ TEST(ReadScene, ReadsCameraAndSensor) {
   EXPECT_EQ(scene.sensor.full_well_e, 13000);
   EXPECT_EQ(scene.sensor.read_noise_e, 8);
   EXPECT_TRUE(scene.sensor.shot_noise);
-  EXPECT_EQ(scene.sensor.bloom->share, 0.3);
+  EXPECT_EQ(scene.sensor.bloom->fraction, 0.3);
   EXPECT_EQ(scene.sensor.bloom->sigma_px, 2.5);
 }
 
 TEST(ReadScene, ConvertsMountToRadians) {
-  const Mount mount = scene_of(kSceneYaml).mount;
+  const Mount mount = read_scene_text(kSceneYaml).mount;
   EXPECT_THAT(mount.level_from_camera,
               IsNear(level_from_zenith({0, std::tan(rad_from_deg(2)), 1}), kRounding));
   EXPECT_EQ(mount.lever_arm_m, Vector2d(0.03, -0.04));
 }
 
 TEST(ReadScene, ReadsLampsInOrderOfFile) {
-  const Scene scene = scene_of(kSceneYaml);
+  const Scene scene = read_scene_text(kSceneYaml);
   ASSERT_EQ(scene.lamps.size(), 2U);
   EXPECT_EQ(scene.ambient_e_per_s, 1e6);
   EXPECT_EQ(scene.lamps[0].id, 1);
@@ -67,7 +67,7 @@ TEST(ReadScene, ReadsLampsInOrderOfFile) {
 }
 
 TEST(ReadScene, ReadsClutterAndBoard) {
-  const Scene scene = scene_of(kSceneYaml);
+  const Scene scene = read_scene_text(kSceneYaml);
   const Clutter& clutter = scene.clutter;
   EXPECT_EQ(clutter.steady_lamps.at(0).edge_share, 0.7);
   EXPECT_EQ(clutter.windows.at(0).edge_b_m, Vector3d(0, 0.3, 0));
@@ -84,7 +84,7 @@ TEST(ReadScene, ReadsClutterAndBoard) {
 }
 
 TEST(ReadScene, ReadsReflectionOfRectangle) {
-  const Scene scene = scene_of(
+  const Scene scene = read_scene_text(
       scene_with("diameter_m: 0.22", "shape: rectangle, size_m: [0.6, 0.1], yaw_rad: 0.2"));
   const Glow& glow = scene.clutter.reflections.at(0).glow;
   EXPECT_EQ(glow.shape.kind, ShapeKind::rectangle);
@@ -94,10 +94,10 @@ TEST(ReadScene, ReadsReflectionOfRectangle) {
 }
 
 TEST(ReadScene, ReadsRecessesAndHalos) {
-  const Scene scene = scene_of(kSceneYaml);
+  const Scene scene = read_scene_text(kSceneYaml);
   EXPECT_FALSE(scene.lamps[0].glow.recess);
   EXPECT_FALSE(scene.lamps[0].glow.halo);
-  EXPECT_EQ(scene.lamps[1].glow.halo->share, 0.02);
+  EXPECT_EQ(scene.lamps[1].glow.halo->fraction, 0.02);
   EXPECT_EQ(scene.lamps[1].glow.halo->length_m, 0.015);
   const Recess recess = scene.clutter.steady_lamps.at(1).recess.value();
   EXPECT_EQ(recess.depth_m, 0.07);
@@ -108,16 +108,16 @@ TEST(ReadScene, ReadsRecessesAndHalos) {
 }
 
 TEST(ReadScene, ReadsPicture) {
-  const Picture picture = scene_of(kSceneYaml).picture.value();
+  const ImageProcessing picture = read_scene_text(kSceneYaml).picture.value();
   EXPECT_EQ(picture.gamma, 2.2);
   EXPECT_EQ(picture.sharpening->amount, 0.6);
   EXPECT_EQ(picture.sharpening->radius_px, 1.5);
   EXPECT_EQ(picture.jpeg_quality, 90);
-  EXPECT_FALSE(scene_of(scene_with("picture: ", "# ")).picture);
+  EXPECT_FALSE(read_scene_text(scene_with("picture: ", "# ")).picture);
 }
 
 TEST(ReadScene, ReadsSpotsInOrderOfFile) {
-  const CaptureSet set = scene_of(kSceneYaml).sets.at(0);
+  const CaptureSet set = read_scene_text(kSceneYaml).sets.at(0);
   EXPECT_EQ(set.folder, "spots");
   EXPECT_EQ(set.exposure_s, 5e-5);
   EXPECT_FALSE(set.board);
@@ -129,11 +129,11 @@ TEST(ReadScene, ReadsSpotsInOrderOfFile) {
   EXPECT_EQ(set.lamps->interval_s, 0.5);
   EXPECT_EQ(set.lamps->turn_rate_rad_per_s, 0);
   EXPECT_TRUE(set.lamps->known);
-  EXPECT_EQ(shots_in(set), 2U * 2 * 2 * 3);
+  EXPECT_EQ(count_shots(set), 2U * 2 * 2 * 3);
 }
 
 TEST(ReadScene, OrdersGridRowByRowFromFirstCorner) {
-  const LampShots captures = *scene_of(kSceneYaml).sets.at(1).lamps;
+  const LampShots captures = *read_scene_text(kSceneYaml).sets.at(1).lamps;
   const std::vector<Vector2d> expected{{-0.6, 0.3},  {0, 0.3},  {0.6, 0.3},
                                        {-0.6, -0.3}, {0, -0.3}, {0.6, -0.3}};
   ASSERT_EQ(captures.spots_m.size(), expected.size());
@@ -150,7 +150,7 @@ TEST(ReadScene, OrdersGridRowByRowFromFirstCorner) {
 }
 
 TEST(ReadScene, ComputesPositionsAlongDriveUpToItsEnd) {
-  const LampShots captures = *scene_of(kSceneYaml).sets.at(2).lamps;
+  const LampShots captures = *read_scene_text(kSceneYaml).sets.at(2).lamps;
   EXPECT_EQ(captures.drive->speed_m_per_s, 0.5);
   // 0.894 m in steps of 0.125 m.
   ASSERT_EQ(captures.spots_m.size(), 8U);
@@ -160,14 +160,14 @@ TEST(ReadScene, ComputesPositionsAlongDriveUpToItsEnd) {
                 IsNear(Vector2d(-0.3, 0) + i * step_m, kRounding));
   }
   const std::string whole_steps = scene_with("to_m: [0.5, 0.4]", "to_m: [0.7, 0]");
-  EXPECT_THAT(scene_of(whole_steps).sets.at(2).lamps->spots_m.back(),
+  EXPECT_THAT(read_scene_text(whole_steps).sets.at(2).lamps->spots_m.back(),
               IsNear(Vector2d(0.7, 0), kRounding));
 }
 
 TEST(ReadScene, ReadsBoardViews) {
-  const CaptureSet set = scene_of(kSceneYaml).sets.at(3);
+  const CaptureSet set = read_scene_text(kSceneYaml).sets.at(3);
   EXPECT_FALSE(set.lamps);
-  EXPECT_EQ(shots_in(set), 5U);
+  EXPECT_EQ(count_shots(set), 5U);
   EXPECT_EQ(set.board->distance_m, std::pair(0.2, 0.4));
   EXPECT_NEAR(set.board->tilt_rad, std::numbers::pi / 4, kRounding);
   EXPECT_NEAR(set.board->roll_rad, std::numbers::pi, kRounding);
@@ -178,7 +178,7 @@ TEST(ReadScene, ReadsBoardViews) {
 TEST(ReadScene, ReadsForeignLightsMirrorsBlindsAndSigns) {
   const std::string panel = "corner_m: [0.9, 0.1, 1.5], edges_m: [[0, 0.3, 0], [0, 0, 0.2]], ";
   const Clutter clutter =
-      scene_of(
+      read_scene_text(
           scene_with(
               "clutter:\n",
               "clutter:\n"
@@ -227,7 +227,7 @@ TEST(ReadScene, ReadsForeignLightsMirrorsBlindsAndSigns) {
 }
 
 TEST(ReadScene, ReadsRandomChipsAndRecessExponents) {
-  const Scene chips = scene_of(scene_with(
+  const Scene chips = read_scene_text(scene_with(
       "edge_share: 0.8}",
       "edge_share: 0.8, random_chips: {count: 7, sigma_fraction: 0.12, within_fraction: 0.75, "
       "excess: [0.3, 0.8]}}"));
@@ -235,7 +235,7 @@ TEST(ReadScene, ReadsRandomChipsAndRecessExponents) {
   EXPECT_EQ(chips.lamps[0].glow.random_chips->within_fraction, 0.75);
   EXPECT_EQ(chips.lamps[0].glow.random_chips->max_excess, 0.8);
   EXPECT_EQ(chips.lamps[0].glow.hot_spots.size(), 7U) << "drawn";
-  const Scene recess = scene_of(scene_with(
+  const Scene recess = read_scene_text(scene_with(
       "depth_m: 0.07,",
       "depth_m: 0.07, source_power: 1.5, rim_power: 6, beam_power: 7, far_side_slope: 0.06,"));
   ASSERT_TRUE(recess.clutter.steady_lamps.at(1).recess);

@@ -16,7 +16,7 @@ template <typename Shape>
 double integral_over(const Shape& shape, const std::array<Eigen::Vector2d, 3>& triangle) {
   double sum = 0;
   for (std::size_t i = 0; i < 3; ++i) {
-    sum += shape.edge_integral(triangle[i], triangle[(i + 1) % 3]);
+    sum += shape.integrate_edge(triangle[i], triangle[(i + 1) % 3]);
   }
   return sum;
 }

@@ -22,9 +22,13 @@ CaptureSet turning() {
 TEST(LampShot, IteratesRepeatsThenYawsThenSpotsThenHeights) {
   const Scene scene = plain_scene();
   const CaptureSet set = turning();
-  ASSERT_EQ(shots_in(set), 2 * 2 * 3 * 2);
-  const auto axis = [&](std::size_t index) { return lamp_shot(scene, set, index).motion.axis_m; };
-  const auto yaw = [&](std::size_t index) { return lamp_shot(scene, set, index).motion.yaw_rad; };
+  ASSERT_EQ(count_shots(set), 2 * 2 * 3 * 2);
+  const auto axis = [&](std::size_t index) {
+    return make_lamp_shot(scene, set, index).motion.axis_m;
+  };
+  const auto yaw = [&](std::size_t index) {
+    return make_lamp_shot(scene, set, index).motion.yaw_rad;
+  };
   EXPECT_EQ(axis(0), Eigen::Vector3d(0.1, 0.2, 0));
   EXPECT_EQ(axis(5), Eigen::Vector3d(0.1, 0.2, 0));
   EXPECT_EQ(axis(6), Eigen::Vector3d(0.3, 0.4, 0));
@@ -33,20 +37,20 @@ TEST(LampShot, IteratesRepeatsThenYawsThenSpotsThenHeights) {
   EXPECT_NEAR(yaw(1), 0, 0.2);
   EXPECT_NEAR(yaw(2), 2, 0.2);
   EXPECT_NE(yaw(0), yaw(1));
-  EXPECT_EQ(lamp_shot(scene, set, 7).time_s, 3.5);
-  EXPECT_EQ(lamp_shot(scene, set, 7).image, "0007.png");
+  EXPECT_EQ(make_lamp_shot(scene, set, 7).time_s, 3.5);
+  EXPECT_EQ(make_lamp_shot(scene, set, 7).image, "0007.png");
 }
 
 TEST(LampShot, DependsOnSeedFolderAndIndexOnly) {
   Scene scene = plain_scene();
   CaptureSet set = turning();
-  std::set<double> yaws{lamp_shot(scene, set, 3).motion.yaw_rad};
-  EXPECT_TRUE(yaws.contains(lamp_shot(scene, set, 3).motion.yaw_rad));
-  yaws.insert(lamp_shot(scene, set, 9).motion.yaw_rad);
+  std::set<double> yaws{make_lamp_shot(scene, set, 3).motion.yaw_rad};
+  EXPECT_TRUE(yaws.contains(make_lamp_shot(scene, set, 3).motion.yaw_rad));
+  yaws.insert(make_lamp_shot(scene, set, 9).motion.yaw_rad);
   set.folder = "other";
-  yaws.insert(lamp_shot(scene, set, 3).motion.yaw_rad);
+  yaws.insert(make_lamp_shot(scene, set, 3).motion.yaw_rad);
   scene.seed = 2;
-  yaws.insert(lamp_shot(scene, set, 3).motion.yaw_rad);
+  yaws.insert(make_lamp_shot(scene, set, 3).motion.yaw_rad);
   EXPECT_EQ(yaws.size(), 4);
 }
 
@@ -55,10 +59,10 @@ TEST(LampShot, KeepsGivenPhaseAndDrawsMissingOnes) {
   scene.lamps[0].frequency_hz = 1000.5;
   scene.lamps[0].phase = 0.25;
   const CaptureSet set = turning();
-  EXPECT_NEAR(lamp_shot(scene, set, 1).waves[0].phase, 0.5, 1e-9);  // 500.25 + 0.25 periods on
+  EXPECT_NEAR(make_lamp_shot(scene, set, 1).waves[0].phase, 0.5, 1e-9);  // 500.25 + 0.25 periods on
   scene.lamps[0].phase.reset();
   std::set<double> phases;
-  for (std::size_t i = 0; i < 24; ++i) phases.insert(lamp_shot(scene, set, i).waves[0].phase);
+  for (std::size_t i = 0; i < 24; ++i) phases.insert(make_lamp_shot(scene, set, i).waves[0].phase);
   EXPECT_EQ(phases.size(), 24);
   EXPECT_LT(*phases.begin(), 0.3);
   EXPECT_GT(*phases.rbegin(), 0.7);
@@ -68,8 +72,8 @@ TEST(LampShot, MovesAlongDriveAtItsSpeed) {
   const Scene scene = plain_scene();
   CaptureSet set = turning();
   set.lamps->drive = StraightDrive{{0, 0}, {0.3, 0.4}, 0.1};
-  const Pose before = lamp_shot(scene, set, 0).motion.pose(-1);
-  const Pose after = lamp_shot(scene, set, 0).motion.pose(1);
+  const Pose before = make_lamp_shot(scene, set, 0).motion.pose(-1);
+  const Pose after = make_lamp_shot(scene, set, 0).motion.pose(1);
   EXPECT_TRUE((after.position_m - before.position_m).isApprox(Eigen::Vector3d(0.12, 0.16, 0)));
 }
 
@@ -79,22 +83,23 @@ TEST(LampShot, ContinuesMotionOfPreviousCaptureOnDrive) {
   LampShots captures{{0, 0.3}, {}, drive, {0, 2}, 0, 0.4, 2, 0.5, false};
   for (int i = 0; i <= 10; ++i) captures.spots_m.emplace_back(0.03 * i, 0.04 * i);
   const CaptureSet set{"drive", 5e-5, captures, {}};
-  ASSERT_EQ(shots_in(set), 88);
+  ASSERT_EQ(count_shots(set), 88);
   for (std::size_t i = 0; i + 1 < 88; ++i) {
     if (i % 11 == 10) continue;  // the next pass begins
-    const LampShot before = lamp_shot(scene, set, i), after = lamp_shot(scene, set, i + 1);
+    const LampShot before = make_lamp_shot(scene, set, i),
+                   after = make_lamp_shot(scene, set, i + 1);
     const Pose expected = before.motion.pose(after.time_s - before.time_s);
     EXPECT_TRUE(after.motion.pose(0).position_m.isApprox(expected.position_m, 1e-12));
     EXPECT_NEAR(after.motion.yaw_rad, expected.yaw_rad, 1e-12);
   }
-  EXPECT_EQ(lamp_shot(scene, set, 11).motion.axis_m, Eigen::Vector3d(0, 0, 0));
-  EXPECT_EQ(lamp_shot(scene, set, 22).motion.yaw_rad, 2);
-  EXPECT_EQ(lamp_shot(scene, set, 44).motion.axis_m, Eigen::Vector3d(0, 0, 0.3));
+  EXPECT_EQ(make_lamp_shot(scene, set, 11).motion.axis_m, Eigen::Vector3d(0, 0, 0));
+  EXPECT_EQ(make_lamp_shot(scene, set, 22).motion.yaw_rad, 2);
+  EXPECT_EQ(make_lamp_shot(scene, set, 44).motion.axis_m, Eigen::Vector3d(0, 0, 0.3));
 }
 
 TEST(BaseMotion, PoseRotatesCameraAboutAxis) {
   const Mount mount{Eigen::Matrix3d::Identity(), {0.1, 0}};
-  const CarrierMotion motion{{1, 2, 0.5}, {0, 0}, 0, rad_from_deg(90), mount};
+  const BaseMotion motion{{1, 2, 0.5}, {0, 0}, 0, rad_from_deg(90), mount};
   EXPECT_TRUE(motion.pose(0).position_m.isApprox(Eigen::Vector3d(1.1, 2, 0.5)));
   EXPECT_TRUE(motion.pose(1).position_m.isApprox(Eigen::Vector3d(1, 2.1, 0.5)));
   EXPECT_NEAR(motion.pose(1).yaw_rad, rad_from_deg(90), 1e-15);
@@ -106,9 +111,9 @@ TEST(BoardShot, StaysWithinLimitsOfViews) {
   CaptureSet set = board_views(300, 0, rad_from_deg(40), rad_from_deg(30), 0.5);
   set.board->distance_m = {0.2, 0.5};
   const Lens lens(scene.camera.lens_model, scene.camera.intrinsics);
-  double farthest_m = 0, most_tilt = 0, most_off = 0;
+  double farthest_m = 0, max_tilt = 0, max_offset = 0;
   for (std::size_t i = 0; i < 300; ++i) {
-    const Eigen::Isometry3d camera_from_board = board_shot(scene, set, i).camera_from_board(0);
+    const Eigen::Isometry3d camera_from_board = make_board_shot(scene, set, i).camera_from_board(0);
     EXPECT_NEAR(camera_from_board.linear().determinant(), 1, 1e-12);
     Eigen::Vector3d middle_m(0, 0, 0);
     middle_m.head<2>() = tag_field_m(scene.board->print) / 2;
@@ -119,13 +124,14 @@ TEST(BoardShot, StaysWithinLimitsOfViews) {
     EXPECT_LE(middle.norm(), 0.5);
     EXPECT_LE(tilt, rad_from_deg(40) + 1e-6);
     farthest_m = std::max(farthest_m, middle.norm());
-    most_tilt = std::max(most_tilt, tilt);
+    max_tilt = std::max(max_tilt, tilt);
     const Eigen::Vector2d pixel = lens.project(middle).value();
-    most_off = std::max({most_off, std::abs(pixel.x() / 400 - 1), std::abs(pixel.y() / 300 - 1)});
+    max_offset =
+        std::max({max_offset, std::abs(pixel.x() / 400 - 1), std::abs(pixel.y() / 300 - 1)});
   }
   EXPECT_GT(farthest_m, 0.49);
-  EXPECT_GT(most_tilt, rad_from_deg(39));
-  EXPECT_NEAR(most_off, 0.5, 0.01);
+  EXPECT_GT(max_tilt, rad_from_deg(39));
+  EXPECT_NEAR(max_offset, 0.5, 0.01);
 }
 
 // A circle of 353 px in an image of 800 x 600, whose corners have no ray.
@@ -142,7 +148,7 @@ TEST(BoardShot, UsesLastRayWhereLensHasNone) {
   for (std::size_t i = 0; i < 300; ++i) {
     Eigen::Vector3d middle_m(0, 0, 0);
     middle_m.head<2>() = tag_field_m(scene.board->print) / 2;
-    const Eigen::Vector3d sight = board_shot(scene, set, i).camera_from_board(0) * middle_m;
+    const Eigen::Vector3d sight = make_board_shot(scene, set, i).camera_from_board(0) * middle_m;
     const double off_axis_rad = std::atan2(sight.head<2>().norm(), sight.z());
     EXPECT_LE(off_axis_rad, last_rad + 1e-6);
     if (off_axis_rad > last_rad - 1e-3) ++at_the_rim;
@@ -154,7 +160,7 @@ TEST(BoardShot, UsesLastRayWhereLensHasNone) {
 
 TEST(BaseMotion, AddsRollPitchAndVibration) {
   const Mount mount{Eigen::Matrix3d::Identity(), {0.1, 0}};
-  CarrierMotion motion{{1, 2, 0.5}, {0.5, 0}, 0.3, 0.2, mount};
+  BaseMotion motion{{1, 2, 0.5}, {0.5, 0}, 0.3, 0.2, mount};
   EXPECT_TRUE(motion.is_level());
   motion.lean = {0.2, -0.1};
   EXPECT_FALSE(motion.is_level());
@@ -172,7 +178,7 @@ TEST(BaseMotion, AddsRollPitchAndVibration) {
 }
 
 TEST(BaseMotion, CameraVelocityMatchesDerivativeOfPose) {
-  const CarrierMotion motion{
+  const BaseMotion motion{
       {1, 2, 0.5}, {0.5, -1}, 0.3, 0.7, {Eigen::Matrix3d::Identity(), {0.1, 0.2}}};
   constexpr double step_s = 1e-6;
   const Eigen::Vector3d moved_m = motion.pose(step_s).position_m - motion.pose(-step_s).position_m;

@@ -31,7 +31,7 @@ std::vector<double> lit_lines(Scene scene, double frequency_hz, double duty, dou
 }
 
 /// Returns the positions at which the lit fraction rises through one half.
-std::vector<double> rises_of(const std::vector<double>& lit) {
+std::vector<double> find_rises(const std::vector<double>& lit) {
   std::vector<double> rises;
   for (std::size_t i = 1; i < lit.size(); ++i) {
     if (lit[i - 1] < 0.5 && lit[i] >= 0.5) {
@@ -50,7 +50,7 @@ class FrameRendererStripes : public testing::TestWithParam<Wave> {};
 TEST_P(FrameRendererStripes, PeriodAndDutyMatchWave) {
   const auto [frequency_hz, duty] = GetParam();
   const auto lit = lit_lines(plain_scene(), frequency_hz, duty, 2e-5);
-  const auto rises = rises_of(lit);
+  const auto rises = find_rises(lit);
   ASSERT_GE(rises.size(), 5);
   const double period = (rises.back() - rises.front()) / double(rises.size() - 1);
   const double expected = 1 / (frequency_hz * 3e-5);
@@ -127,7 +127,7 @@ TEST(FrameRenderer, StripesFollowReadoutDirection) {
   // Lines of the electrons are columns of the image.
   const cv::Mat1f electrons = renderer.lamp_electrons(shot_at(scene, {0, 0, 0.1}, 0));
   EXPECT_EQ(electrons.size(), cv::Size(600, 800));
-  const Brightness brightness = brightness_of(electrons);
+  const Brightness brightness = measure_brightness(electrons);
   EXPECT_NEAR(brightness.centroid_px.y(), 402.3, 6);
   EXPECT_NEAR(brightness.centroid_px.x(), 297.4, 0.5);
 }

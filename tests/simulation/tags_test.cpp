@@ -43,9 +43,9 @@ void expect_all_read(const Scene& scene, apriltag_family_t* family) {
   const FrameRenderer renderer(scene);
   const CaptureSet views = board_views(4, 0.28, rad_from_deg(35), rad_from_deg(180), 0);
   for (std::size_t index = 0; index < 4; ++index) {
-    const BoardShot shot = board_shot(scene, views, index);
+    const BoardShot shot = make_board_shot(scene, views, index);
     const Corners found = detected(expose(scene.sensor, renderer.board_electrons(shot), 1), family);
-    const auto truth = true_corners(scene, renderer, shot);
+    const auto truth = find_true_corners(scene, renderer, shot);
     EXPECT_EQ(found.size(), truth.size());
     for (const auto& [tag, corner, pixel] : truth) {
       ASSERT_TRUE(tag);
@@ -82,7 +82,8 @@ TEST_F(FrameRendererTags, TagsWithOuterBitsAreDetectedAtTrueCorners) {
 }
 
 TEST(TagPattern, HasSecondBlackRingForTwoBorderBits) {
-  const TagPattern plain = tag_pattern("tag36h11", 17, 1), wide = tag_pattern("tag36h11", 17, 2);
+  const TagPattern plain = make_tag_pattern("tag36h11", 17, 1),
+                   wide = make_tag_pattern("tag36h11", 17, 2);
   ASSERT_EQ(plain.width(), 8);
   ASSERT_EQ(wide.width(), 10);
   for (int row = 0; row < 10; ++row) {
@@ -95,10 +96,10 @@ TEST(TagPattern, HasSecondBlackRingForTwoBorderBits) {
 }
 
 TEST(TagPattern, ThrowsForUnknownIdOrBorder) {
-  EXPECT_THROW(tag_pattern("tag36h11", 587, 1), std::invalid_argument);
-  EXPECT_NO_THROW(tag_pattern("tag36h11", 586, 1));
-  EXPECT_THROW(tag_pattern("tag36h11", -1, 1), std::invalid_argument);
-  EXPECT_THROW(tag_pattern("tagStandard41h12", 0, 2), std::invalid_argument);
+  EXPECT_THROW(make_tag_pattern("tag36h11", 587, 1), std::invalid_argument);
+  EXPECT_NO_THROW(make_tag_pattern("tag36h11", 586, 1));
+  EXPECT_THROW(make_tag_pattern("tag36h11", -1, 1), std::invalid_argument);
+  EXPECT_THROW(make_tag_pattern("tagStandard41h12", 0, 2), std::invalid_argument);
 }
 
 }  // namespace

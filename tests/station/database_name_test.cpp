@@ -19,8 +19,8 @@ using testing::Not;
 using testing::StartsWith;
 
 /// Defaults of libpq for missing parts of a connection string.
-struct IdentityOfDatabase : testing::Test {
-  IdentityOfDatabase() {
+struct DatabaseIdentity : testing::Test {
+  DatabaseIdentity() {
     for (const char* name : {"PGHOST", "PGHOSTADDR", "PGPORT", "PGDATABASE", "PGSERVICE"}) {
       ::unsetenv(name);
     }
@@ -29,17 +29,17 @@ struct IdentityOfDatabase : testing::Test {
     EXPECT_EQ(::gethostname(name.data(), name.size() - 1), 0);
     here = std::string(name.data()) + ":";
   }
-  ~IdentityOfDatabase() override { ::unsetenv("PGUSER"); }
+  ~DatabaseIdentity() override { ::unsetenv("PGUSER"); }
   std::string here;
 };
 
-TEST_F(IdentityOfDatabase, ReturnsMachineAndAbsolutePathForFile) {
-  EXPECT_EQ(identity_of_database("/var/lib/vlp/records.db"), here + "/var/lib/vlp/records.db");
-  EXPECT_EQ(identity_of_database("/var/lib/../lib/records.db"), here + "/var/lib/records.db");
+TEST_F(DatabaseIdentity, ReturnsMachineAndAbsolutePathForFile) {
+  EXPECT_EQ(make_database_identity("/var/lib/vlp/records.db"), here + "/var/lib/vlp/records.db");
+  EXPECT_EQ(make_database_identity("/var/lib/../lib/records.db"), here + "/var/lib/records.db");
 }
 
-TEST_F(IdentityOfDatabase, DiffersBetweenServers) {
-  const auto of = [](const std::string& where) { return identity_of_database(where); };
+TEST_F(DatabaseIdentity, DiffersBetweenServers) {
+  const auto of = [](const std::string& where) { return make_database_identity(where); };
   EXPECT_EQ(of("postgresql://u@db/vlp"), "postgresql://db/vlp");
   EXPECT_EQ(of("postgres://other:secret@db:5432/vlp?connect_timeout=2"), of("postgresql://db/vlp"));
   EXPECT_NE(of("postgresql://db:5433/vlp"), of("postgresql://db/vlp"));
@@ -54,20 +54,20 @@ TEST_F(IdentityOfDatabase, DiffersBetweenServers) {
 }
 
 /// Two machines that share a folder, each with its own server.
-TEST_F(IdentityOfDatabase, IncludesMachineForLocalServer) {
+TEST_F(DatabaseIdentity, IncludesMachineForLocalServer) {
   for (const char* where :
        {"postgresql:///vlp", "postgresql://localhost/vlp", "postgresql://127.0.0.1:5544/vlp",
         "postgresql:///vlp?host=/run/postgresql", "postgresql://db/vlp?hostaddr=127.0.0.1"}) {
-    EXPECT_THAT(identity_of_database(where), StartsWith(here + "postgresql://")) << where;
+    EXPECT_THAT(make_database_identity(where), StartsWith(here + "postgresql://")) << where;
   }
-  EXPECT_THAT(identity_of_database("postgresql:///vlp?hostaddr=10.0.0.1"), Not(StartsWith(here)));
+  EXPECT_THAT(make_database_identity("postgresql:///vlp?hostaddr=10.0.0.1"), Not(StartsWith(here)));
 }
 
-TEST_F(IdentityOfDatabase, OmitsPassword) {
+TEST_F(DatabaseIdentity, OmitsPassword) {
   for (const char* where : {"postgresql://u:secret@db", "postgresql://u@db/vlp?password=secret"}) {
-    EXPECT_THAT(identity_of_database(where), Not(HasSubstr("secret")));
+    EXPECT_THAT(make_database_identity(where), Not(HasSubstr("secret")));
   }
-  EXPECT_THAT(refusal_of([] { identity_of_database("postgresql://u:a@secret@/db"); }),
+  EXPECT_THAT(rejection_message([] { make_database_identity("postgresql://u:a@secret@/db"); }),
               testing::AllOf(HasSubstr("is not of the form"), Not(HasSubstr("secret"))));
 }
 

@@ -13,7 +13,8 @@
 
 namespace vlp {
 
-inline RunRecord sample(const std::string& run, const std::string& camera, double rms_px) {
+inline RunRecord make_sample_record(const std::string& run, const std::string& camera,
+                                    double rms_px) {
   RunRecord record;
   record.run = run;
   record.kind = "unit";
@@ -27,20 +28,20 @@ inline RunRecord sample(const std::string& run, const std::string& camera, doubl
   record.libraries = "none";
   record.config_sha256 = std::string(64, 'a');
   record.calibration = "format: vlp-calibration/1\ncamera: {id: \"it's\"}\n";
-  record.figures = check_all({{"rms_px", 1, GuardBand{0.1 + 0.2, 1.5}}, {"tilt_deg", 2}},
+  record.metrics = check_all({{"rms_px", 1, GuardBand{0.1 + 0.2, 1.5}}, {"tilt_deg", 2}},
                              {{"rms_px", rms_px}, {"coverage", 0.75}}, unit_metrics());
   record.images = {{"boards", "0000.png", std::string(64, 'b'), ""},
                    {"check", "0000.png", std::string(64, 'c'), "too dark"}};
   return record;
 }
 
-inline std::string run_of(int number) {
+inline std::string numbered_run_id(int number) {
   return "20261121T13450" + std::to_string(number % 10) + "Z-" + std::to_string(1000 + number);
 }
 
 /// Returns the output of a database client that is independent of Records. `sql` has one statement
 /// per line; lines that begin with "\! " are shell commands.
-inline std::string answer_of(const std::string& where, const std::string& sql) {
+inline std::string run_database_client(const std::string& where, const std::string& sql) {
   const TemporaryFolder folder;
   const std::string script = folder.file("script.sql", sql).string();
   const std::string answer = (folder / "answer").string();
@@ -55,11 +56,12 @@ for line in open(sys.argv[2]):
             print(*row, sep="|")
 )")
                                  .string();
-  const bool is_server = where.starts_with("postgresql://");
-  const std::string client = is_server ? "psql -X -q -A -t -v ON_ERROR_STOP=1 '" + where + "' -f "
-                                       : "python3 " + sqlite + " '" + where + "' ";
+  const bool is_server_address = where.starts_with("postgresql://");
+  const std::string client = is_server_address
+                                 ? "psql -X -q -A -t -v ON_ERROR_STOP=1 '" + where + "' -f "
+                                 : "python3 " + sqlite + " '" + where + "' ";
   EXPECT_EQ(std::system((client + script + " >" + answer).c_str()), 0) << sql;
-  return TemporaryFolder::content_of(answer);
+  return TemporaryFolder::read_content(answer);
 }
 
 /// Empties a database of PostgreSQL.

@@ -21,18 +21,18 @@ class ReadStation : public testing::Test {
  protected:
   ReadStation() {
     for (const char* name : {"station.yaml", "camera_type.yaml", "board.yaml", "lamps.yaml"}) {
-      folder.file(name, TemporaryFolder::content_of(std::filesystem::path(VLP_SOURCE_DIR) /
-                                                    "datasets/station" / name));
+      folder.file(name, TemporaryFolder::read_content(std::filesystem::path(VLP_SOURCE_DIR) /
+                                                      "datasets/station" / name));
     }
   }
   void change(const std::string& name, const std::string& from, const std::string& to) const {
-    std::string text = TemporaryFolder::content_of(folder / name);
+    std::string text = TemporaryFolder::read_content(folder / name);
     const auto at = text.find(from);
     ASSERT_NE(at, std::string::npos) << from;
     folder.file(name, text.replace(at, from.size(), to));
   }
   std::string refusal() const {
-    return refusal_of([&] { read_station(folder / "station.yaml"); });
+    return rejection_message([&] { read_station(folder / "station.yaml"); });
   }
   TemporaryFolder folder;
 };
@@ -43,18 +43,18 @@ TEST_F(ReadStation, ReadsReferencedFiles) {
   EXPECT_EQ(config.type.imager_px[0], 800);
   EXPECT_THAT(config.lamps.lamps, SizeIs(6));
   EXPECT_EQ(config.board.cols, 6);
-  EXPECT_EQ(config.enough.dispersion_captures, 40);
+  EXPECT_EQ(config.sufficient.dispersion_captures, 40);
   EXPECT_EQ(config.records, (folder / "records.db").string());
   EXPECT_FALSE(config.golden);
 }
 
 /// The keys commented out with '#' are valid.
 TEST_F(ReadStation, AcceptsOptionalKeysOfExample) {
-  folder.file("golden.yaml", TemporaryFolder::content_of(kExample + "calibration.yaml"));
+  folder.file("golden.yaml", TemporaryFolder::read_content(kExample + "calibration.yaml"));
   folder.file(
       "station.yaml",
       std::regex_replace(
-          TemporaryFolder::content_of(folder / "station.yaml"),
+          TemporaryFolder::read_content(folder / "station.yaml"),
           std::regex("\n# (golden:|verify_due:|serial_pattern:|void_operators:|hook:|keep:| {9})"),
           "\n$1"));
   const StationConfig config = read_station(folder / "station.yaml");
@@ -98,7 +98,7 @@ TEST_F(ReadStation, ReadsGuardBands) {
     EXPECT_EQ(gate.guard->k, 1.645);
   }
   const auto refused = [&](const std::string& from, const std::string& to) {
-    const std::string before = TemporaryFolder::content_of(folder / "station.yaml");
+    const std::string before = TemporaryFolder::read_content(folder / "station.yaml");
     change("station.yaml", from, to);
     const std::string why = refusal();
     folder.file("station.yaml", before);
@@ -162,7 +162,7 @@ TEST_F(ReadStation, ReadsVerifyDueAndRetention) {
   change("station.yaml", "records: records.db",
          "records: records.db\nkeep: {images_days: 90}\nverify_due: {hours: 24, units: 200}");
   EXPECT_THAT(refusal(), HasSubstr("verify_due: needs a golden unit"));
-  folder.file("golden.yaml", TemporaryFolder::content_of(kExample + "calibration.yaml"));
+  folder.file("golden.yaml", TemporaryFolder::read_content(kExample + "calibration.yaml"));
   change("station.yaml", "records: records.db",
          "records: records.db\n"
          "golden: {camera_id: g, calibration: golden.yaml, gates: {tilt_deg: 1}}");
@@ -183,7 +183,7 @@ TEST_F(ReadStation, ReadsVerifyDueAndRetention) {
 }
 
 TEST_F(ReadStation, RejectsGoldenUnitWithoutRowTime) {
-  folder.file("golden.yaml", TemporaryFolder::content_of(kExample + "calibration.yaml"));
+  folder.file("golden.yaml", TemporaryFolder::read_content(kExample + "calibration.yaml"));
   change("station.yaml", "records: records.db",
          "records: records.db\n"
          "golden: {camera_id: g, calibration: golden.yaml, gates: {tilt_deg: 1}}");

@@ -90,10 +90,10 @@ inline std::vector<Detection> seen_from(const BodyRig& rig, double sigma_px, dou
   return detections;
 }
 
-/// Draws lamps all over the image that the camera takes at time 0, at least `least_rad` above the
+/// Draws lamps all over the image that the camera takes at time 0, at least `min_rad` above the
 /// horizon. The ceiling has one height or many.
-inline LampMap lamps_in_view(const BodyRig& rig, std::size_t count, bool one_height,
-                             double least_rad, Random& random) {
+inline LampMap draw_lamps_in_view(const BodyRig& rig, std::size_t count, bool one_height,
+                                  double min_rad, Random& random) {
   const Camera& camera = rig.calibration.camera;
   const Lens lens(camera.lens_model, camera.intrinsics);
   const Eigen::Isometry3d world_from_camera = world_from_body(rig.body, 0) * body_from_camera(rig);
@@ -103,7 +103,7 @@ inline LampMap lamps_in_view(const BodyRig& rig, std::size_t count, bool one_hei
     const double ceiling_m = one_height ? 1.6 : random.uniform(1.4, 2.2);
     const Eigen::Vector3d ray =
         world_from_camera.linear() * lens.unproject({u, v})->direction.normalized();
-    if (ray.z() < std::sin(least_rad)) continue;
+    if (ray.z() < std::sin(min_rad)) continue;
     const Eigen::Vector3d from_m = world_from_camera.translation();
     const Eigen::Vector3d lamp_m = from_m + ray * ((ceiling_m - from_m.z()) / ray.z());
     // Far apart in the image, so that they determine the state.
@@ -114,7 +114,7 @@ inline LampMap lamps_in_view(const BodyRig& rig, std::size_t count, bool one_hei
     }
     if (apart) positions_m.push_back(lamp_m);
   }
-  return lamp_map_of(positions_m);
+  return make_lamp_map(positions_m);
 }
 
 }  // namespace vlp

@@ -30,7 +30,7 @@ pid_t start_child(Action action) {
 }
 
 /// Waits until a child has ended. Returns its status; 0 for success.
-inline int status_of(pid_t child) {
+inline int wait_for_child(pid_t child) {
   int status = 0;
   ::waitpid(child, &status, 0);
   return status;
@@ -39,14 +39,14 @@ inline int status_of(pid_t child) {
 /// Waits until all children have ended. Returns true if all succeeded.
 inline bool end_well(const std::vector<pid_t>& children) {
   bool well = true;
-  for (const pid_t child : children) well = status_of(child) == 0 && well;
+  for (const pid_t child : children) well = wait_for_child(child) == 0 && well;
   return well;
 }
 
 /// Kills a child with SIGKILL, which it cannot handle, and waits until it has ended.
 inline void kill_child(pid_t child) {
   ::kill(child, SIGKILL);
-  status_of(child);
+  wait_for_child(child);
 }
 
 /// Runs `action` in a child process, for changes of the process: its user, limits or mounts.
@@ -71,7 +71,7 @@ std::string thrown_in_child(Action action) {
     message.append(block, static_cast<std::size_t>(size));
   }
   ::close(channel[0]);
-  return status_of(child) == 0 ? message : "the child did not end well";
+  return wait_for_child(child) == 0 ? message : "the child did not end well";
 }
 
 }  // namespace vlp

@@ -13,7 +13,7 @@ namespace vlp {
 /// Statistics of errors of fixes against their covariances: the mean of e' cov^-1 e per state, and
 /// the fraction within the 95 % quantile. The quantile is that of chi-squared with four degrees of
 /// freedom.
-struct Judged {
+struct NeesStatistics {
   double sum = 0;
   int count = 0, inside = 0;
 
@@ -25,14 +25,14 @@ struct Judged {
     inside += d <= chi_squared_95 ? 1 : 0;
   }
   double mean() const { return sum / count; }
-  double share() const { return static_cast<double>(inside) / count; }
+  double fraction() const { return static_cast<double>(inside) / count; }
 };
 
 /// Returns the error of X, Y, Z in meters and of the yaw in radians.
-inline Eigen::Vector4d error_of(const Fix& fix, const Pose& truth) {
+inline Eigen::Vector4d compute_pose_error(const Fix& fix, const Pose& truth) {
   Eigen::Vector4d error;
   error << fix.estimate.pose.position_m - truth.position_m,
-      wrapped_rad(fix.estimate.pose.yaw_rad - truth.yaw_rad);
+      wrap_rad(fix.estimate.pose.yaw_rad - truth.yaw_rad);
   return error;
 }
 

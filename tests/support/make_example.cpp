@@ -17,7 +17,7 @@ namespace vlp {
 namespace {
 
 LampMap example_lamps() {
-  LampMap map = lamp_map_of(
+  LampMap map = make_lamp_map(
       {{-0.6, -0.35, 1.6}, {0.6, -0.35, 1.6}, {0.6, 0.35, 1.6}, {-0.6, 0.35, 1.6}, {0.05, 0, 1.5}});
   for (Lamp& lamp : map.lamps) {
     lamp.shape = make_disc(0.1);
@@ -30,10 +30,10 @@ LampMap example_lamps() {
 constexpr double kNoise_px = 0.05;
 
 /// Returns the detections of the lamps that are fully in the image, as the frame `image`.
-Frame frame_of(const SyntheticRig& rig, const char* name, int number, Random& random) {
+Frame make_frame(const SyntheticRig& rig, const char* name, int number, Random& random) {
   std::array<char, 32> image{};
   std::snprintf(image.data(), image.size(), "%s_%02d.png", name, number);
-  const auto visible = visible_lamps(rig.map, rig.calibration.camera, rig.camera);
+  const auto visible = find_visible_lamps(rig.map, rig.calibration.camera, rig.camera);
   auto detections = seen_from(rig, kNoise_px);
   std::erase_if(detections, [&](const Detection& detection) {
     const auto& lamp = rig.map.lamps[static_cast<std::size_t>(detection.lamp - 1)];
@@ -50,8 +50,8 @@ std::vector<Frame> turn(SyntheticRig rig, Random& random) {
   for (int i = 0; i < 24; ++i) {
     const double yaw_rad = rad_from_deg(30 * i + random.uniform(-8, 8));
     const Eigen::Vector3d at_m(axis_m.x(), axis_m.y(), i < 12 ? 0 : 0.3);
-    rig.camera = {at_m + rotation_about_z(yaw_rad) * lever_arm_m, wrapped_rad(yaw_rad)};
-    frames.push_back(frame_of(rig, "turn", i, random));
+    rig.camera = {at_m + rotation_about_z(yaw_rad) * lever_arm_m, wrap_rad(yaw_rad)};
+    frames.push_back(make_frame(rig, "turn", i, random));
   }
   return frames;
 }
@@ -60,8 +60,8 @@ std::vector<Frame> turn(SyntheticRig rig, Random& random) {
 std::vector<Frame> at_station(SyntheticRig rig, Random& random) {
   std::vector<Frame> frames;
   for (int i = 0; i < 12; ++i) {
-    rig.camera = {{0.1, 0, 0}, wrapped_rad(rad_from_deg(30 * i + random.uniform(-8, 8)))};
-    frames.push_back(frame_of(rig, "station", i, random));
+    rig.camera = {{0.1, 0, 0}, wrap_rad(rad_from_deg(30 * i + random.uniform(-8, 8)))};
+    frames.push_back(make_frame(rig, "station", i, random));
   }
   return frames;
 }
@@ -79,8 +79,8 @@ void make_example(const std::filesystem::path& folder) {
   CsvWriter truth(folder / "truth.csv", {"image", "x_m", "y_m", "z_m", "yaw_rad"});
   for (int i = 0; i < 36; ++i) {
     rig.camera = {{-0.35 + 0.14 * (i % 6), -0.35 + 0.14 * (i / 6), 0.1 * (i % 4)},
-                  wrapped_rad(rad_from_deg(100 * i))};
-    frames.push_back(frame_of(rig, "spot", i, random));
+                  wrap_rad(rad_from_deg(100 * i))};
+    frames.push_back(make_frame(rig, "spot", i, random));
     const Eigen::Vector3d& p = rig.camera.position_m;
     truth.row({frames.back().image, fixed(p.x(), 6), fixed(p.y(), 6), fixed(p.z(), 6),
                fixed(rig.camera.yaw_rad, 9)});

@@ -27,8 +27,8 @@ ProgramResult run_program(const std::string& command) {
                            output.string() + "' 2>'" + errors.string() + "' </dev/null";
   const int status = std::system(line.c_str());
   const int exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-  return {exit_code, TemporaryFolder::content_of(output),
-          without_progress(TemporaryFolder::content_of(errors))};
+  return {exit_code, TemporaryFolder::read_content(output),
+          without_progress(TemporaryFolder::read_content(errors))};
 }
 
 }  // namespace vlp

@@ -9,8 +9,8 @@ namespace vlp {
 /// Returns a folder of real captures; empty if it does not exist.
 inline std::filesystem::path real_data(const char* folder) {
   const std::filesystem::path all = VLP_REAL_DATA_DIR;
-  const bool there = !all.empty() && std::filesystem::is_directory(all / folder);
-  return there ? all / folder : std::filesystem::path();
+  const bool exists = !all.empty() && std::filesystem::is_directory(all / folder);
+  return exists ? all / folder : std::filesystem::path();
 }
 
 }  // namespace vlp

@@ -12,7 +12,7 @@ namespace vlp {
 
 /// Returns the message of the exception that `read` throws; empty if it does not throw.
 template <typename Error = InputError, typename Read>
-std::string refusal_of(const Read& read) {
+std::string rejection_message(const Read& read) {
   try {
     read();
   } catch (const Error& error) {

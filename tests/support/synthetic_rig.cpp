@@ -21,7 +21,7 @@ Camera synthetic_camera() {
 
 Camera splined_camera() {
   Camera camera = synthetic_camera();
-  camera.lens_model = splined_lens({3, 12, 10, 130});
+  camera.lens_model = lens_model_for({3, 12, 10, 130});
   camera.intrinsics.resize(4);
   camera.intrinsics.resize(parameter_count(camera.lens_model));
   for (std::size_t i = 4; i < camera.intrinsics.size(); ++i) {
@@ -37,7 +37,7 @@ Camera fisheye_camera() {
   return camera;
 }
 
-LampMap lamp_map_of(const std::vector<Eigen::Vector3d>& positions_m) {
+LampMap make_lamp_map(const std::vector<Eigen::Vector3d>& positions_m) {
   LampMap map;
   for (const auto& position_m : positions_m) {
     map.lamps.push_back({static_cast<int>(map.lamps.size()) + 1, position_m, {}, {}, {}});
@@ -46,14 +46,14 @@ LampMap lamp_map_of(const std::vector<Eigen::Vector3d>& positions_m) {
 }
 
 LampMap synthetic_lamps() {
-  return lamp_map_of({{-0.8, -0.4, 1.6},
-                      {0.8, -0.4, 1.6},
-                      {0.8, 0.4, 1.6},
-                      {-0.8, 0.4, 1.6},
-                      {0.1, 0.5, 1.6},
-                      {-0.3, -0.5, 1.6},
-                      {0.5, 0.05, 1.6},
-                      {-0.4, 0.1, 1.6}});
+  return make_lamp_map({{-0.8, -0.4, 1.6},
+                        {0.8, -0.4, 1.6},
+                        {0.8, 0.4, 1.6},
+                        {-0.8, 0.4, 1.6},
+                        {0.1, 0.5, 1.6},
+                        {-0.3, -0.5, 1.6},
+                        {0.5, 0.05, 1.6},
+                        {-0.4, 0.1, 1.6}});
 }
 
 RotationCenter tilted_by(const Camera& camera, double tilt_rad, double azimuth_rad) {

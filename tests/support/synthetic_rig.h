@@ -27,7 +27,7 @@ Camera splined_camera();
 Camera fisheye_camera();
 
 /// Returns lamps with ids 1, 2, ...
-LampMap lamp_map_of(const std::vector<Eigen::Vector3d>& positions_m);
+LampMap make_lamp_map(const std::vector<Eigen::Vector3d>& positions_m);
 
 /// Returns eight lamps over 2 x 1.1 m at 1.6 m; the first four are the corners.
 LampMap synthetic_lamps();

@@ -39,7 +39,7 @@ class TemporaryFolder {
     return path_ / name;
   }
 
-  static std::string content_of(const std::filesystem::path& file) {
+  static std::string read_content(const std::filesystem::path& file) {
     std::ostringstream content;
     content << std::ifstream(file, std::ios::binary).rdbuf();
     return content.str();

@@ -34,22 +34,22 @@ constexpr double kInfinite = std::numeric_limits<double>::infinity();
 constexpr double kMovedChiSquared = 21.1;
 /// Number of standard deviations beyond which a known position is wrong, and a detection an
 /// outlier.
-constexpr double kWrongPlace = 5, kOutlier = 4.5;
+constexpr double kMaxPlaceSigmas = 5, kDetectionOutlierSigmas = 4.5;
 /// Smallest noise of detections without sigma_px, in pixels.
 constexpr double kMinNoise_px = 1e-4;
 
 /// Problem with the constant data of the input.
-struct Assembled {
+struct AssembledProblem {
   AdjustmentProblem problem;
   Eigen::Vector3d origin_m;
   std::vector<AdjustmentResult::Place> places = {};
   std::vector<double> place_sd_m = {};
   std::vector<bool> lamp_seen = {};
-  int captures_left_out = 0;
+  int rejected_captures = 0;
   bool noise_is_stated = true;
 };
 
-Eigen::Vector3d mean_of(const LampMap& map) {
+Eigen::Vector3d compute_mean_position(const LampMap& map) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const Lamp& lamp : map.lamps) sum += lamp.position_m - map.lamps.front().position_m;
   return map.lamps.front().position_m + sum / static_cast<double>(map.lamps.size());
@@ -58,13 +58,13 @@ Eigen::Vector3d mean_of(const LampMap& map) {
 /// Estimates an approximate pose from two lamps or more, even if the map has small errors. With
 /// more than three lamps, tries the lamps that agree with each other first. Returns std::nullopt
 /// for fewer than two lamps, or if there is no pose.
-std::optional<Pose> rough_pose(const std::vector<Sighting>& sightings,
-                               const std::vector<std::size_t>& lamps,
-                               const std::vector<Eigen::Vector3d>& lamps_m) {
+std::optional<Pose> estimate_rough_pose(const std::vector<Sighting>& sightings,
+                                        const std::vector<std::size_t>& lamps,
+                                        const std::vector<Eigen::Vector3d>& lamps_m) {
   if (sightings.size() < 2) return std::nullopt;
-  constexpr double usual_share = 0.1;
+  constexpr double max_residual_fraction = 0.1;
   if (sightings.size() > 3) {
-    SightedFrame frame;
+    FrameObservations frame;
     frame.noise_is_stated = false;
     for (std::size_t i = 0; i < sightings.size(); ++i) {
       frame.sightings[i] = sightings[i];
@@ -77,18 +77,18 @@ std::optional<Pose> rough_pose(const std::vector<Sighting>& sightings,
       }
     }
     frame.size = sightings.size();
-    const auto [status, fix] = fix_robustly(frame, usual_share);
+    const auto [status, fix] = estimate_pose_robust(frame, max_residual_fraction);
     if (status == FixStatus::ok) return fix.pose;
   }
-  const auto [status, fix] = fix_consistent(sightings, kInfinite);
+  const auto [status, fix] = estimate_pose_checked(sightings, kInfinite);
   return status == FixStatus::ok ? std::optional(fix.pose) : std::nullopt;
 }
 
 /// Returns an orthonormal basis of translation, yaw and scale of the detected lamps, divided by the
 /// standard deviation of the constraint.
-Eigen::MatrixXd map_gauge(const std::vector<Eigen::Vector3d>& lamps_m,
-                          const std::vector<bool>& seen) {
-  constexpr double held_sd_m = 1e-6;  // far below the sd of lamps, and far above rounding
+Eigen::MatrixXd make_gauge(const std::vector<Eigen::Vector3d>& lamps_m,
+                           const std::vector<bool>& seen) {
+  constexpr double constraint_sd_m = 1e-6;  // far below the sd of lamps, and far above rounding
   Eigen::Vector3d mean_m = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < seen.size(); ++i) {
     if (seen[i]) mean_m += lamps_m[i];
@@ -98,13 +98,13 @@ Eigen::MatrixXd map_gauge(const std::vector<Eigen::Vector3d>& lamps_m,
   for (std::size_t i = 0; i < seen.size(); ++i) {
     if (!seen[i]) continue;
     const Eigen::Vector3d p = lamps_m[i] - mean_m;
-    auto of_lamp = gauge.middleRows<3>(3 * static_cast<Eigen::Index>(i));
-    of_lamp.leftCols<3>().setIdentity();
-    of_lamp.col(3) = Eigen::Vector3d(-p.y(), p.x(), 0);
-    of_lamp.col(4) = p;
+    auto lamp_rows = gauge.middleRows<3>(3 * static_cast<Eigen::Index>(i));
+    lamp_rows.leftCols<3>().setIdentity();
+    lamp_rows.col(3) = Eigen::Vector3d(-p.y(), p.x(), 0);
+    lamp_rows.col(4) = p;
   }
   const Eigen::HouseholderQR<Eigen::MatrixXd> qr(gauge);
-  return qr.householderQ() * Eigen::MatrixXd::Identity(gauge.rows(), 5) / held_sd_m;
+  return qr.householderQ() * Eigen::MatrixXd::Identity(gauge.rows(), 5) / constraint_sd_m;
 }
 
 /// Returns the derivative of a pixel of the undistorted image with respect to the pixel of the ray.
@@ -118,7 +118,7 @@ Eigen::Matrix2d undistorted_from_pixel(const Lens& lens, const Lens::Ray& ray) {
 /// Key of a known position that captures have in common: their spot, or the position itself.
 using PlaceKey = std::tuple<std::string, double, double, double, PlaceOf>;
 
-Assembled assemble(const AdjustmentInput& input) {
+AssembledProblem assemble(const AdjustmentInput& input) {
   const Camera& camera = input.calibration.camera;
   const auto& report = input.calibration.intrinsics_report;
   const auto& center = input.calibration.rotation_center;
@@ -126,14 +126,15 @@ Assembled assemble(const AdjustmentInput& input) {
   for (const AdjustmentCapture& capture : input.captures) {
     if (!capture.spot.empty()) spots.emplace(capture.spot, spots.size());
   }
-  Assembled all{AdjustmentProblem(camera.lens_model,
-                                  LensFreedom(camera, report ? report->covariance : std::nullopt),
-                                  input.lamps.lamps.size(), spots.size()),
-                mean_of(input.lamps)};
+  AssembledProblem all{
+      AdjustmentProblem(camera.lens_model,
+                        LensParametrization(camera, report ? report->covariance : std::nullopt),
+                        input.lamps.lamps.size(), spots.size()),
+      compute_mean_position(input.lamps)};
   AdjustmentProblem& problem = all.problem;
   const AdjustmentLayout& layout = problem.layout();
   const Lens lens(camera.lens_model, camera.intrinsics);
-  const auto row_clock = row_clock_of(camera);
+  const auto row_clock = make_row_clock(camera);
   std::vector<Eigen::Vector3d> lamps_m;
   for (const Lamp& lamp : input.lamps.lamps) {
     lamps_m.emplace_back(lamp.position_m - all.origin_m);
@@ -150,17 +151,18 @@ Assembled assemble(const AdjustmentInput& input) {
   problem.state().segment<2>(layout.zenith) = zenith;
   problem.state().segment<2>(layout.lever_arm) = arm_m;
   const Eigen::Matrix3d base_from_camera =
-      turn_by_zenith(zenith, Eigen::Vector3d::UnitZ()).camera_from_level.transpose();
+      rotate_by_zenith(zenith, Eigen::Vector3d::UnitZ()).camera_from_level.transpose();
 
   std::vector<Eigen::Vector3d> axes_m(spots.size(), Eigen::Vector3d::Zero());
-  std::vector<int> spot_captures(spots.size(), 0);
+  std::vector<int> find_rotation_captures(spots.size(), 0);
   std::map<PlaceKey, std::size_t> place_of_key;
   std::vector<AdjustmentProblem::Sighting> seen;
   std::vector<Sighting> sightings;
   std::vector<std::size_t> lamps;
   for (const AdjustmentCapture& capture : input.captures) {
-    const InclinationRotation lean =
-        capture.inclination ? inclination_rotation(*capture.inclination, 0) : InclinationRotation();
+    const InclinationRotation inclination =
+        capture.inclination ? compute_inclination_rotation(*capture.inclination, 0)
+                            : InclinationRotation();
     seen.clear();
     sightings.clear();
     lamps.clear();
@@ -170,7 +172,7 @@ Assembled assemble(const AdjustmentInput& input) {
       const auto index = static_cast<std::size_t>(lamp - input.lamps.lamps.data());
       const auto ray = lens.unproject(detection.pixel);
       if (!ray || std::find(lamps.begin(), lamps.end(), index) != lamps.end()) continue;
-      const Eigen::Vector3d level = lean.level_from_base * base_from_camera * ray->direction;
+      const Eigen::Vector3d level = inclination.level_from_base * base_from_camera * ray->direction;
       if (!(level.z() > 0)) continue;
       const double sigma_px = detection.sigma_px.value_or(1);
       if (!detection.sigma_px) all.noise_is_stated = false;
@@ -184,9 +186,9 @@ Assembled assemble(const AdjustmentInput& input) {
       sightings.push_back(
           {lamps_m[index], level.hnormalized(), Eigen::Matrix2d(lens.focal_px().asDiagonal()), 1});
     }
-    const auto pose = rough_pose(sightings, lamps, lamps_m);
+    const auto pose = estimate_rough_pose(sightings, lamps, lamps_m);
     if (!pose) {
-      ++all.captures_left_out;
+      ++all.rejected_captures;
       continue;
     }
     std::optional<std::size_t> spot;
@@ -195,11 +197,11 @@ Assembled assemble(const AdjustmentInput& input) {
       const Eigen::Matrix2d turn = rotation_about_z(pose->yaw_rad).topLeftCorner<2, 2>();
       axes_m[*spot] += pose->position_m;
       axes_m[*spot].head<2>() -= turn * arm_m;
-      ++spot_captures[*spot];
+      ++find_rotation_captures[*spot];
       problem.has_lever_arm = true;
     }
     const std::size_t index = problem.captures.size();
-    problem.add_capture({spot, lean.level_from_base.transpose(), capture.motion}, *pose);
+    problem.add_capture({spot, inclination.level_from_base.transpose(), capture.motion}, *pose);
     for (const auto& sighting : seen) {
       problem.sightings.push_back(sighting);
       all.lamp_seen[sighting.lamp] = true;
@@ -209,8 +211,8 @@ Assembled assemble(const AdjustmentInput& input) {
     const PlaceKey key = capture.spot.empty() ? PlaceKey{"", place.xy_m.x(), place.xy_m.y(),
                                                          place.z_m.value_or(kInfinite), place.of}
                                               : PlaceKey{capture.spot, 0, 0, 0, place.of};
-    const auto [entry, fresh] = place_of_key.emplace(key, all.places.size());
-    if (fresh) {
+    const auto [entry, is_new] = place_of_key.emplace(key, all.places.size());
+    if (is_new) {
       all.places.push_back({capture.spot.empty() ? capture.name : capture.spot, place.of, 0,
                             Eigen::Vector3d::Zero(), false});
       all.place_sd_m.push_back(place.sd_m);
@@ -226,15 +228,15 @@ Assembled assemble(const AdjustmentInput& input) {
     place.sd_m *= std::sqrt(static_cast<double>(all.places[place.place].captures));
   }
   problem.place_used.assign(all.places.size(), true);
-  if (input.frees_map_shape) problem.gauge = map_gauge(lamps_m, all.lamp_seen);
+  if (input.frees_map_shape) problem.gauge = make_gauge(lamps_m, all.lamp_seen);
   for (std::size_t i = 0; i < axes_m.size(); ++i) {
-    problem.state().segment<3>(layout.spot(i)) = axes_m[i] / std::max(1, spot_captures[i]);
+    problem.state().segment<3>(layout.spot(i)) = axes_m[i] / std::max(1, find_rotation_captures[i]);
   }
   return all;
 }
 
 /// Returns the norms of the whitened residuals; infinite if the lens cannot project the point.
-std::vector<double> lengths_of(const AdjustmentProblem& problem) {
+std::vector<double> compute_residual_norms(const AdjustmentProblem& problem) {
   std::vector<double> lengths;
   lengths.reserve(problem.sightings.size());
   const auto lens = problem.lens();
@@ -247,18 +249,19 @@ std::vector<double> lengths_of(const AdjustmentProblem& problem) {
 
 /// Rejects detections beyond the scatter of the residuals, estimated from their median, and
 /// reinstates the other ones. Returns true if the set of used detections changes.
-bool leave_out_outliers(AdjustmentProblem& problem, bool noise_is_stated,
-                        double degrees_of_freedom) {
+bool update_inliers(AdjustmentProblem& problem, bool noise_is_stated, double degrees_of_freedom) {
   constexpr double rounding = 1e-6;  // standard deviations
-  const std::vector<double> lengths = lengths_of(problem);
+  const std::vector<double> lengths = compute_residual_norms(problem);
   std::vector<double> squares;
   for (std::size_t i = 0; i < lengths.size(); ++i) {
     if (problem.sightings[i].used) squares.push_back(lengths[i] * lengths[i]);
   }
   if (squares.empty()) return false;
-  const double scatter = std::sqrt(robust_planar_variance(std::move(squares), degrees_of_freedom) *
-                                   planar_outlier_bound(kOutlier, degrees_of_freedom));
-  const double limit = std::max(scatter, kOutlier * (noise_is_stated ? 1 : rounding));
+  const double scatter =
+      std::sqrt(robust_planar_variance(std::move(squares), degrees_of_freedom) *
+                planar_outlier_bound(kDetectionOutlierSigmas, degrees_of_freedom));
+  const double limit =
+      std::max(scatter, kDetectionOutlierSigmas * (noise_is_stated ? 1 : rounding));
   bool changed = false;
   for (std::size_t i = 0; i < lengths.size(); ++i) {
     const bool use = lengths[i] <= limit;
@@ -270,17 +273,17 @@ bool leave_out_outliers(AdjustmentProblem& problem, bool noise_is_stated,
 
 /// Computes the residuals of the known positions, adjusted minus measured, as means over their
 /// captures.
-void measure_places(Assembled& all) {
-  for (auto& place : all.places) place.misfit_m.setZero();
+void measure_places(AssembledProblem& all) {
+  for (auto& place : all.places) place.residual_m.setZero();
   for (const auto& seen : all.problem.places) {
     auto& place = all.places[seen.place];
-    place.misfit_m.head(seen.size) +=
-        (all.problem.place_of(seen) - seen.stated_m).head(seen.size) / place.captures;
+    place.residual_m.head(seen.size) +=
+        (all.problem.predict_position(seen) - seen.stated_m).head(seen.size) / place.captures;
   }
 }
 
-double misfit_of(const Assembled& all, std::size_t place) {
-  return all.places[place].misfit_m.norm() / all.place_sd_m[place];
+double compute_normalized_residual(const AssembledProblem& all, std::size_t place) {
+  return all.places[place].residual_m.norm() / all.place_sd_m[place];
 }
 
 /// Returns the squared correction r of a lamp, adjusted minus surveyed, normalized by its expected
@@ -295,11 +298,11 @@ double moved_chi_squared(const AdjustmentProblem& problem, const Eigen::MatrixXd
       counts ? Eigen::Matrix3d(survey - found) : Eigen::Matrix3d(survey + found));
   // Skips directions in which only the survey determines the lamp, because no data contradict it
   // there.
-  constexpr double told = 1e-6;
+  constexpr double determined = 1e-6;
   double sum = 0;
   for (int i = 0; i < 3; ++i) {
     const double variance = eigen.eigenvalues()[i];
-    if (!(variance > told * sd_m * sd_m)) continue;
+    if (!(variance > determined * sd_m * sd_m)) continue;
     const double along = eigen.eigenvectors().col(i).dot(r_m);
     sum += along * along / variance;
   }
@@ -309,7 +312,7 @@ double moved_chi_squared(const AdjustmentProblem& problem, const Eigen::MatrixXd
 /// Outliers among surveyed lamps and known positions, identified one at a time.
 class Contradictions {
  public:
-  explicit Contradictions(Assembled& all) : all_(all) {
+  explicit Contradictions(AssembledProblem& all) : all_(all) {
     for (const auto& lamp : all.problem.lamps) sd_m_.push_back(lamp.sd_m);
     moved_.resize(sd_m_.size());
   }
@@ -317,42 +320,42 @@ class Contradictions {
   const std::vector<bool>& moved() const { return moved_; }
   /// Returns true if most lamps contradict their survey, so that the moved ones cannot be
   /// identified.
-  bool most() const { return most_; }
+  bool most_contradict() const { return most_contradict_; }
   double sd_m(std::size_t lamp) const { return sd_m_[lamp]; }
 
   /// Rejects everything far from the robust solution, which outliers do not bias.
-  void leave_out_the_worst() {
-    constexpr double far = 8;  // standard deviations
+  void reject_far_observations() {
+    constexpr double max_sigmas = 8;  // standard deviations
     for (std::size_t i = 0; i < sd_m_.size(); ++i) {
       const auto& [surveyed_m, sd_m] = all_.problem.lamps[i];
       const Eigen::Vector3d found_m =
           all_.problem.state().segment<3>(all_.problem.layout().lamp(i));
-      if (all_.lamp_seen[i] && sd_m > 0 && (found_m - surveyed_m).norm() > far * sd_m) {
+      if (all_.lamp_seen[i] && sd_m > 0 && (found_m - surveyed_m).norm() > max_sigmas * sd_m) {
         release(i);
       }
     }
     measure_places(all_);
     for (std::size_t i = 0; i < all_.places.size(); ++i) {
-      all_.problem.place_used[i] = misfit_of(all_, i) <= kWrongPlace;
+      all_.problem.place_used[i] = compute_normalized_residual(all_, i) <= kMaxPlaceSigmas;
     }
   }
 
   /// Rejects the worst lamp or known position, or reinstates one that no longer contradicts the
   /// solution. Returns true if anything changes.
-  bool settle(const Eigen::MatrixXd& covariance) {
+  bool refine(const Eigen::MatrixXd& covariance) {
     measure_places(all_);
     for (std::size_t i = 0; i < all_.places.size(); ++i) {
-      if (taken_back_places_.contains(i) || all_.problem.place_used[i]) continue;
-      if (misfit_of(all_, i) > kWrongPlace) continue;
-      taken_back_places_.insert(i);
+      if (reinstated_places_.contains(i) || all_.problem.place_used[i]) continue;
+      if (compute_normalized_residual(all_, i) > kMaxPlaceSigmas) continue;
+      reinstated_places_.insert(i);
       all_.problem.place_used[i] = true;
       return true;
     }
     std::size_t worst_place = all_.places.size();
-    double worst = kWrongPlace;
+    double worst = kMaxPlaceSigmas;
     for (std::size_t i = 0; i < all_.places.size(); ++i) {
-      if (!all_.problem.place_used[i] || misfit_of(all_, i) <= worst) continue;
-      worst = misfit_of(all_, i);
+      if (!all_.problem.place_used[i] || compute_normalized_residual(all_, i) <= worst) continue;
+      worst = compute_normalized_residual(all_, i);
       worst_place = i;
     }
     if (worst_place < all_.places.size()) {
@@ -364,8 +367,8 @@ class Contradictions {
     for (std::size_t i = 0; i < sd_m_.size(); ++i) {
       if (!all_.lamp_seen[i] || !(sd_m_[i] > 0) || std::isinf(sd_m_[i])) continue;
       const double chi = moved_chi_squared(all_.problem, covariance, i, sd_m_[i], !moved_[i]);
-      if (moved_[i] && chi < kMovedChiSquared && !taken_back_.contains(i)) {
-        taken_back_.insert(i);
+      if (moved_[i] && chi < kMovedChiSquared && !reinstated_.contains(i)) {
+        reinstated_.insert(i);
         moved_[i] = false;
         all_.problem.lamps[i].sd_m = sd_m_[i];
         return true;
@@ -374,11 +377,11 @@ class Contradictions {
       worst_chi = chi;
       worst_lamp = i;
     }
-    if (worst_lamp == sd_m_.size() || most_) return false;
+    if (worst_lamp == sd_m_.size() || most_contradict_) return false;
     const auto seen = std::count(all_.lamp_seen.begin(), all_.lamp_seen.end(), true);
     const auto released = std::count(moved_.begin(), moved_.end(), true);
     if (2 * (released + 1) >= seen) {
-      most_ = true;
+      most_contradict_ = true;
       for (std::size_t i = 0; i < sd_m_.size(); ++i) all_.problem.lamps[i].sd_m = sd_m_[i];
       moved_.assign(moved_.size(), false);
       return true;
@@ -393,11 +396,11 @@ class Contradictions {
     all_.problem.lamps[lamp].sd_m = kInfinite;
   }
 
-  Assembled& all_;
+  AssembledProblem& all_;
   std::vector<double> sd_m_;
   std::vector<bool> moved_;
-  std::set<std::size_t> taken_back_, taken_back_places_;
-  bool most_ = false;
+  std::set<std::size_t> reinstated_, reinstated_places_;
+  bool most_contradict_ = false;
 };
 
 /// Noise of the detections.
@@ -412,11 +415,12 @@ struct Noise {
 /// coordinates minus the trace of their hat matrix. The trace is the number of unknowns minus the
 /// fraction of each that priors determine. The detections determine 1 - sd_after^2 / sd_prior^2 of
 /// an unknown.
-Noise noise_of(const Assembled& all, const AdjustmentProblem::SharedCovariance& shared) {
-  const Eigen::MatrixXd& covariance = shared.matrix;
+Noise estimate_noise(const AssembledProblem& all,
+                     const AdjustmentProblem::GlobalCovariance& global) {
+  const Eigen::MatrixXd& covariance = global.matrix;
   const AdjustmentProblem& problem = all.problem;
   const AdjustmentLayout& at = problem.layout();
-  const std::vector<double> lengths = lengths_of(problem);
+  const std::vector<double> lengths = compute_residual_norms(problem);
   double squares = 0, freedom = 0;
   std::vector<Eigen::Index> used(problem.captures.size()), place_rows(problem.captures.size());
   std::vector<bool> lamp_used(problem.lamps.size());
@@ -430,13 +434,13 @@ Noise noise_of(const Assembled& all, const AdjustmentProblem::SharedCovariance& 
   for (const auto& place : problem.places) {
     if (problem.place_used[place.place]) place_rows[place.capture] += place.size;
   }
-  std::vector<bool> spot_used(static_cast<std::size_t>(at.shared - at.spots) / 3);
+  std::vector<bool> spot_used(static_cast<std::size_t>(at.global - at.spots) / 3);
   for (std::size_t k = 0; k < used.size(); ++k) {
     if (used[k] == 0) continue;
     const auto& spot = problem.captures[k].spot;
     freedom -=
         static_cast<double>(std::min<Eigen::Index>(spot ? 1 : 4, 2 * used[k] + place_rows[k]));
-    freedom -= problem.told_of_motion(k);
+    freedom -= problem.count_determined_motion(k);
     if (spot) spot_used[*spot] = true;
   }
   freedom -= static_cast<double>(at.lens_size) -
@@ -449,29 +453,29 @@ Noise noise_of(const Assembled& all, const AdjustmentProblem::SharedCovariance& 
   }
   freedom -= 3.0 * static_cast<double>(std::count(spot_used.begin(), spot_used.end(), true));
   freedom += static_cast<double>(problem.gauge.cols());
-  freedom += shared.determined_by_places;
+  freedom += global.determined_by_places;
   return {std::sqrt(squares / std::max(freedom, 1.0)), freedom};
 }
 
 /// Solves until the sets of used detections, lamps and known positions and the noise are unchanged,
 /// at most 40 times. Returns false if a solution fails.
-bool settle(Assembled& all, Contradictions& contradictions, Eigen::MatrixXd& covariance,
+bool refine(AssembledProblem& all, Contradictions& contradictions, Eigen::MatrixXd& covariance,
             double& freedom) {
   AdjustmentProblem& problem = all.problem;
-  constexpr int rounds = 40;
-  for (int round = 0; round < rounds; ++round) {
+  constexpr int max_iterations = 40;
+  for (int iteration = 0; iteration < max_iterations; ++iteration) {
     if (!problem.solve(false)) return false;
-    const auto shared = problem.shared_covariance();
-    covariance = shared.matrix;
-    const Noise noise = noise_of(all, shared);
+    const auto global = problem.global_covariance();
+    covariance = global.matrix;
+    const Noise noise = estimate_noise(all, global);
     freedom = noise.freedom;
-    bool changed = leave_out_outliers(problem, all.noise_is_stated, freedom);
-    if (!changed) changed = contradictions.settle(covariance);
+    bool changed = update_inliers(problem, all.noise_is_stated, freedom);
+    if (!changed) changed = contradictions.refine(covariance);
     if (noise.freedom > 0) {
       const double scale = problem.noise_scale * noise.ratio;
       const double next = std::max(scale, all.noise_is_stated ? 1 : kMinNoise_px);
-      constexpr double same = 0.01;
-      if (std::abs(next / problem.noise_scale - 1) > same) {
+      constexpr double tolerance = 0.01;
+      if (std::abs(next / problem.noise_scale - 1) > tolerance) {
         problem.noise_scale = next;
         changed = true;
       }
@@ -479,31 +483,33 @@ bool settle(Assembled& all, Contradictions& contradictions, Eigen::MatrixXd& cov
     if (!changed) return true;
   }
   if (!problem.solve(false)) return false;
-  covariance = problem.shared_covariance().matrix;
+  covariance = problem.global_covariance().matrix;
   return true;
 }
 
 /// Returns the covariance for equal noise in the image, and estimates that noise. The estimates
 /// keep the weights that they were solved with.
-Eigen::MatrixXd covariance_of_image_noise(Assembled& all) {
+Eigen::MatrixXd compute_covariance_for_image_noise(AssembledProblem& all) {
   AdjustmentProblem& problem = all.problem;
   for (auto& sighting : problem.sightings) {
     sighting.whitening = Eigen::Matrix2d::Identity() / sighting.sigma_px;
   }
-  const Noise noise = noise_of(all, problem.shared_covariance());
+  const Noise noise = estimate_noise(all, problem.global_covariance());
   problem.noise_scale = std::max(problem.noise_scale * noise.ratio, kMinNoise_px);
-  return problem.shared_covariance().matrix;
+  return problem.global_covariance().matrix;
 }
 
-std::string undetermined_by(const AdjustmentProblem& problem, const Eigen::MatrixXd& covariance,
-                            double height_m, const AdjustmentLimits& limits, bool& has_lever_arm) {
+std::string explain_undetermined(const AdjustmentProblem& problem,
+                                 const Eigen::MatrixXd& covariance, double height_m,
+                                 const AdjustmentLimits& limits, bool& has_lever_arm) {
   const AdjustmentLayout& at = problem.layout();
-  const auto sd_of = [&](Eigen::Index first) {
-    const Eigen::Matrix2d both = covariance.block<2, 2>(first, first);
-    return std::sqrt(symmetric_eigen(both).values.maxCoeff());
+  const auto compute_max_sd = [&](Eigen::Index first) {
+    const Eigen::Matrix2d block = covariance.block<2, 2>(first, first);
+    return std::sqrt(decompose_symmetric(block).values.maxCoeff());
   };
-  const bool zenith = sd_of(at.zenith) <= limits.zenith_rad;
-  has_lever_arm = problem.has_lever_arm && sd_of(at.lever_arm) <= limits.lever_arm_share * height_m;
+  const bool zenith = compute_max_sd(at.zenith) <= limits.zenith_rad;
+  has_lever_arm =
+      problem.has_lever_arm && compute_max_sd(at.lever_arm) <= limits.lever_arm_fraction * height_m;
   if (zenith) return "";
   if (problem.has_lever_arm && !has_lever_arm) {
     return "tilt and lever arm are not told apart: a camera that leans looks like one beside its "
@@ -523,29 +529,29 @@ struct AdjustedState {
 
 /// Moves the problem to its robust solution and rejects everything far from it. Returns false if
 /// the solution fails.
-bool start_robustly(Assembled& all, Contradictions& contradictions) {
+bool solve_robustly(AssembledProblem& all, Contradictions& contradictions) {
   AdjustmentProblem& problem = all.problem;
   if (!problem.solve(true) || !problem.solve(true)) return false;
-  contradictions.leave_out_the_worst();
-  const Noise noise = noise_of(all, problem.shared_covariance());
-  leave_out_outliers(problem, all.noise_is_stated, noise.freedom);
+  contradictions.reject_far_observations();
+  const Noise noise = estimate_noise(all, problem.global_covariance());
+  update_inliers(problem, all.noise_is_stated, noise.freedom);
   return true;
 }
 
 /// Solves the problem, starting with a robust solution unless the captures are checked. Returns
 /// std::nullopt if it does not converge.
-std::optional<AdjustedState> solve_all(const AdjustmentInput& input, Assembled& all,
+std::optional<AdjustedState> solve_all(const AdjustmentInput& input, AssembledProblem& all,
                                        Contradictions& contradictions) {
   // A misidentified lamp may be at a point that the lens cannot project.
-  const std::vector<double> at_start = lengths_of(all.problem);
-  for (std::size_t i = 0; i < at_start.size(); ++i) {
-    all.problem.sightings[i].used = at_start[i] < kInfinite;
+  const std::vector<double> initial_norms = compute_residual_norms(all.problem);
+  for (std::size_t i = 0; i < initial_norms.size(); ++i) {
+    all.problem.sightings[i].used = initial_norms[i] < kInfinite;
   }
   AdjustedState adjusted;
-  if (!input.captures_are_checked && !start_robustly(all, contradictions)) return std::nullopt;
-  if (!settle(all, contradictions, adjusted.covariance, adjusted.freedom)) return std::nullopt;
+  if (!input.captures_are_checked && !solve_robustly(all, contradictions)) return std::nullopt;
+  if (!refine(all, contradictions, adjusted.covariance, adjusted.freedom)) return std::nullopt;
   if (input.weighs_in_undistorted_image && !all.noise_is_stated) {
-    adjusted.covariance = covariance_of_image_noise(all);
+    adjusted.covariance = compute_covariance_for_image_noise(all);
   }
   return adjusted;
 }
@@ -560,18 +566,18 @@ double mean_height_m(const AdjustmentProblem& problem) {
     if (!sighting.used) continue;
     const auto& capture = problem.captures[sighting.capture];
     sum_m += state[at.lamp(sighting.lamp) + 2] -
-             state[(capture.spot ? at.spot(*capture.spot) : capture.own) + 2];
+             state[(capture.spot ? at.spot(*capture.spot) : capture.local) + 2];
     ++count;
   }
   return sum_m / std::max(1, count);
 }
 
 /// Sets the counts of captures and detections, and their residuals.
-void report_detections(const AdjustmentProblem& problem, bool noise_is_stated, double freedom,
-                       AdjustmentResult& result) {
+void set_detections(const AdjustmentProblem& problem, bool noise_is_stated, double freedom,
+                    AdjustmentResult& result) {
   double squares_px = 0;
   std::vector<bool> capture_used(problem.captures.size());
-  const std::vector<double> lengths = lengths_of(problem);
+  const std::vector<double> lengths = compute_residual_norms(problem);
   for (std::size_t i = 0; i < lengths.size(); ++i) {
     const auto& sighting = problem.sightings[i];
     if (!sighting.used) continue;
@@ -579,9 +585,9 @@ void report_detections(const AdjustmentProblem& problem, bool noise_is_stated, d
     capture_used[sighting.capture] = true;
     squares_px += std::pow(lengths[i] * sighting.sigma_px * problem.noise_scale, 2);
   }
-  result.detections_left_out -= result.detections;
+  result.rejected_detections -= result.detections;
   result.captures = static_cast<int>(std::count(capture_used.begin(), capture_used.end(), true));
-  result.captures_left_out += static_cast<int>(capture_used.size()) - result.captures;
+  result.rejected_captures += static_cast<int>(capture_used.size()) - result.captures;
   result.residual_px = std::sqrt(squares_px / std::max(freedom, 1.0));
   result.noise_scale = problem.noise_scale;
   const double chance = 3 * std::sqrt(0.5 / std::max(freedom, 1.0));
@@ -589,8 +595,8 @@ void report_detections(const AdjustmentProblem& problem, bool noise_is_stated, d
 }
 
 /// Sets lens, zenith and lever arm with their covariances.
-void report_center(const AdjustmentProblem& problem, const Eigen::MatrixXd& covariance,
-                   bool has_lever_arm, AdjustmentResult& result) {
+void set_center(const AdjustmentProblem& problem, const Eigen::MatrixXd& covariance,
+                bool has_lever_arm, AdjustmentResult& result) {
   const AdjustmentLayout& at = problem.layout();
   const Eigen::VectorXd& state = problem.state();
   result.camera.intrinsics = problem.intrinsics();
@@ -613,12 +619,12 @@ void report_center(const AdjustmentProblem& problem, const Eigen::MatrixXd& cova
 
 /// Sets the joint covariance of intrinsics (from the directions of the lens), zenith, lever arm and
 /// lamps, without the spots. The one for the surveyed map excludes the lamps.
-void report_joint_covariance(const AdjustmentProblem& problem, const Eigen::MatrixXd& covariance,
-                             bool has_lever_arm, AdjustmentResult& result) {
+void set_joint_covariance(const AdjustmentProblem& problem, const Eigen::MatrixXd& covariance,
+                          bool has_lever_arm, AdjustmentResult& result) {
   const AdjustmentLayout& at = problem.layout();
-  const Eigen::Index intrinsics = stated_intrinsics(result.camera);
+  const Eigen::Index intrinsics = count_reported_intrinsics(result.camera);
   const Eigen::Index rows = intrinsics + at.spots - at.zenith;
-  Eigen::MatrixXd from_state = Eigen::MatrixXd::Zero(rows, at.shared);
+  Eigen::MatrixXd from_state = Eigen::MatrixXd::Zero(rows, at.global);
   from_state.block(0, at.lens, intrinsics, at.lens_size) = problem.freedom().directions;
   from_state.block(intrinsics, at.zenith, at.spots - at.zenith, at.spots - at.zenith).setIdentity();
   if (!has_lever_arm) from_state.middleRows<2>(intrinsics + 2).setZero();
@@ -631,12 +637,12 @@ void report_joint_covariance(const AdjustmentProblem& problem, const Eigen::Matr
 }
 
 /// Sets the lamps with their covariances, in both joint covariances.
-void report_map(const Assembled& all, const Contradictions& contradictions,
-                AdjustmentResult& result) {
+void set_map(const AssembledProblem& all, const Contradictions& contradictions,
+             AdjustmentResult& result) {
   const AdjustmentProblem& problem = all.problem;
   const AdjustmentLayout& at = problem.layout();
   const Eigen::VectorXd& state = problem.state();
-  const Eigen::Index first_lamp = stated_intrinsics(result.camera) + 4;
+  const Eigen::Index first_lamp = count_reported_intrinsics(result.camera) + 4;
   for (std::size_t i = 0; i < problem.lamps.size(); ++i) {
     Lamp& lamp = result.refined.lamps[i];
     const Eigen::Index row = first_lamp + 3 * static_cast<Eigen::Index>(i);
@@ -662,14 +668,14 @@ void report_map(const Assembled& all, const Contradictions& contradictions,
     lamp.position_m += correction_m;
     lamp.sd_m = std::sqrt(found.trace() / 3);
   }
-  if (contradictions.most()) {
+  if (contradictions.most_contradict()) {
     result.notes.emplace_back(
         "the captures contradict the survey of half the lamps or more: is its sd_m right?");
   }
 }
 
 /// Sets the known positions, and the properties of the map that only the survey determines.
-void report_places(Assembled& all, AdjustmentResult& result) {
+void set_places(AssembledProblem& all, AdjustmentResult& result) {
   measure_places(all);
   result.places = all.places;
   std::size_t places_used = 0;
@@ -678,31 +684,32 @@ void report_places(Assembled& all, AdjustmentResult& result) {
     if (all.problem.place_used[i]) ++places_used;
   }
   if (places_used < 3) {
-    constexpr std::array<const char*, 3> held{
+    constexpr std::array<const char*, 3> undetermined_parts{
         "where the map is, how it is turned and how large it is",
         "how the map is turned and how large it is",
         "how the map is turned about the line through both places"};
     result.notes.push_back(fmt::format(
         "{} known place{}: {} rests on the survey; captures at {} more known places would tell it",
-        places_used, places_used == 1 ? "" : "s", held.at(places_used), 3 - places_used));
+        places_used, places_used == 1 ? "" : "s", undetermined_parts.at(places_used),
+        3 - places_used));
   }
 }
 
 /// Tests the correction of the lens against its covariance.
-void report_lens(const AdjustmentProblem& problem, const Eigen::MatrixXd& covariance,
-                 AdjustmentResult& result) {
+void set_lens(const AdjustmentProblem& problem, const Eigen::MatrixXd& covariance,
+              AdjustmentResult& result) {
   const AdjustmentLayout& at = problem.layout();
   const Eigen::VectorXd& state = problem.state();
   const Eigen::VectorXd u = state.segment(at.lens, at.lens_size);
   if (at.lens_size > 0) {
-    const auto told = symmetric_eigen(
+    const auto determined = decompose_symmetric(
         Eigen::MatrixXd(Eigen::MatrixXd::Identity(at.lens_size, at.lens_size) -
                         covariance.block(at.lens, at.lens, at.lens_size, at.lens_size)));
     for (Eigen::Index i = 0; i < at.lens_size; ++i) {
-      constexpr double something = 1e-3;
-      if (!(told.values[i] > something)) continue;
-      const double along = told.vectors.col(i).dot(u);
-      result.lens_chi_squared += along * along / told.values[i];
+      constexpr double min_determined = 1e-3;
+      if (!(determined.values[i] > min_determined)) continue;
+      const double along = determined.vectors.col(i).dot(u);
+      result.lens_chi_squared += along * along / determined.values[i];
       ++result.lens_freedom;
     }
     result.lens_contradicted =
@@ -713,16 +720,16 @@ void report_lens(const AdjustmentProblem& problem, const Eigen::MatrixXd& covari
 
 }  // namespace
 
-MatrixX stated_lens_covariance(const Camera& camera, double sd_px) {
+MatrixX make_lens_covariance(const Camera& camera, double sd_px) {
   const Lens lens(camera.lens_model, camera.intrinsics);
   constexpr int across = 16;
-  Eigen::VectorXd squares = Eigen::VectorXd::Zero(stated_intrinsics(camera));
+  Eigen::VectorXd squares = Eigen::VectorXd::Zero(count_reported_intrinsics(camera));
   int rays = 0;
   for (int row = 0; row < across; ++row) {
     for (int column = 0; column < across; ++column) {
-      const Eigen::Vector2d share((column + 0.5) / across, (row + 0.5) / across);
+      const Eigen::Vector2d fraction((column + 0.5) / across, (row + 0.5) / across);
       const auto ray = lens.unproject(
-          {share.x() * camera.imager_px[0] - 0.5, share.y() * camera.imager_px[1] - 0.5});
+          {fraction.x() * camera.imager_px[0] - 0.5, fraction.y() * camera.imager_px[1] - 0.5});
       if (!ray) continue;
       const auto seen = lens.project_with_jacobians(ray->direction);
       if (!seen) continue;
@@ -737,10 +744,10 @@ MatrixX stated_lens_covariance(const Camera& camera, double sd_px) {
 
 AdjustmentResult adjust_captures(const AdjustmentInput& input, const AdjustmentLimits& limits) {
   AdjustmentResult result;
-  Assembled all = assemble(input);
+  AssembledProblem all = assemble(input);
   const AdjustmentProblem& problem = all.problem;
-  result.captures_left_out = all.captures_left_out;
-  result.detections_left_out = static_cast<int>(problem.sightings.size());
+  result.rejected_captures = all.rejected_captures;
+  result.rejected_detections = static_cast<int>(problem.sightings.size());
   result.camera = input.calibration.camera;
   result.refined = input.lamps;
   if (problem.captures.empty()) {
@@ -756,15 +763,15 @@ AdjustmentResult adjust_captures(const AdjustmentInput& input, const AdjustmentL
     return result;
   }
   const Eigen::MatrixXd& covariance = adjusted->covariance;
-  report_detections(problem, all.noise_is_stated, adjusted->freedom, result);
+  set_detections(problem, all.noise_is_stated, adjusted->freedom, result);
   bool has_lever_arm = false;
   result.undetermined =
-      undetermined_by(problem, covariance, mean_height_m(problem), limits, has_lever_arm);
-  report_center(problem, covariance, has_lever_arm, result);
-  report_joint_covariance(problem, covariance, has_lever_arm, result);
-  report_map(all, contradictions, result);
-  report_places(all, result);
-  report_lens(problem, covariance, result);
+      explain_undetermined(problem, covariance, mean_height_m(problem), limits, has_lever_arm);
+  set_center(problem, covariance, has_lever_arm, result);
+  set_joint_covariance(problem, covariance, has_lever_arm, result);
+  set_map(all, contradictions, result);
+  set_places(all, result);
+  set_lens(problem, covariance, result);
   return result;
 }
 

@@ -90,7 +90,7 @@ struct AdjustmentLimits {
   double zenith_rad = 0.005;
   /// Limit of the lever arm, in its worst direction, as a fraction of the lamps' height above the
   /// camera.
-  double lever_arm_share = 0.005;
+  double lever_arm_fraction = 0.005;
 };
 
 /// Result of adjust_captures().
@@ -129,7 +129,7 @@ struct AdjustmentResult {
     /// Number of captures with this position.
     int captures;
     /// Adjusted minus measured position: x, y, and z if it was measured.
-    Eigen::Vector3d misfit_m;
+    Eigen::Vector3d residual_m;
     /// True if the position contradicts the other data and is rejected.
     bool wrong;
   };
@@ -144,9 +144,9 @@ struct AdjustmentResult {
 
   /// Number of captures that are used, and of captures without a fix, with fewer than two lamps of
   /// the map, or without an inlier.
-  int captures = 0, captures_left_out = 0;
+  int captures = 0, rejected_captures = 0;
   /// Number of detections that are used, and that are rejected.
-  int detections = 0, detections_left_out = 0;
+  int detections = 0, rejected_detections = 0;
   /// RMS residual of the used detections per axis, in px: sqrt(sum of squares / degrees of
   /// freedom).
   double residual_px = 0;
@@ -166,7 +166,7 @@ struct AdjustmentResult {
 /// each intrinsic, taken alone, displaces the pixels of a grid over the image by `sd_px` (RMS per
 /// axis). Errors of different intrinsics are independent.
 /// @pre sd_px is positive
-MatrixX stated_lens_covariance(const Camera& camera, double sd_px);
+MatrixX make_lens_covariance(const Camera& camera, double sd_px);
 
 /// Estimates lens, zenith, lever arm and lamp map from all captures.
 ///

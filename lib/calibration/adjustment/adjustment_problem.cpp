@@ -20,7 +20,7 @@ using CaptureMatrix = Eigen::Matrix<double, 7, 7>;
 using CaptureVector = Eigen::Matrix<double, 7, 1>;
 
 /// Position, yaw and motion of the camera (or axis) of a capture, from the state.
-struct Placed {
+struct CapturePose {
   Eigen::Vector3d position_m;
   double cosine, sine;
   Eigen::Vector2d velocity_m_per_s;
@@ -28,14 +28,14 @@ struct Placed {
 
   /// Returns the lamp relative to the axis (on a spot) or to the camera, in the level frame: Rz(-g)
   /// (P - A) or Rz(-g) (P - S).
-  Eigen::Vector3d still_of(const Eigen::Vector3d& lamp_m) const {
+  Eigen::Vector3d lamp_in_level(const Eigen::Vector3d& lamp_m) const {
     const Eigen::Vector3d w = lamp_m - position_m;
     return {cosine * w.x() + sine * w.y(), cosine * w.y() - sine * w.x(), w.z()};
   }
 };
 
 /// Returns the rotation Rz(-angle).
-Eigen::Matrix3d turned_back(double angle_rad) {
+Eigen::Matrix3d make_inverse_yaw_rotation(double angle_rad) {
   const double c = std::cos(angle_rad), s = std::sin(angle_rad);
   Eigen::Matrix3d turn;
   turn << c, s, 0, -s, c, 0, 0, 0, 1;
@@ -44,12 +44,12 @@ Eigen::Matrix3d turned_back(double angle_rad) {
 
 }  // namespace
 
-ZenithTurn turn_by_zenith(const Eigen::Vector2d& zenith, const Eigen::Vector3d& x) {
+ZenithRotation rotate_by_zenith(const Eigen::Vector2d& zenith, const Eigen::Vector3d& x) {
   // Transpose of level_from_zenith(), the smallest rotation of n to +Z.
   const double nz = 1 / std::sqrt(1 + zenith.squaredNorm());
   const Eigen::Vector2d n = zenith * nz;
   const double a = n.dot(x.head<2>()), across = a / (1 + nz), lift = x.z() - across;
-  ZenithTurn turn;
+  ZenithRotation turn;
   turn.x_in_camera << x.head<2>() + n * lift, nz * x.z() - a;
   turn.camera_from_level << 1 - n.x() * n.x() / (1 + nz), -n.x() * n.y() / (1 + nz), n.x(),
       -n.x() * n.y() / (1 + nz), 1 - n.y() * n.y() / (1 + nz), n.y(), -n.x(), -n.y(), nz;
@@ -58,21 +58,22 @@ ZenithTurn turn_by_zenith(const Eigen::Vector2d& zenith, const Eigen::Vector3d& 
     const Eigen::Vector2d d_n = nz * Eigen::Vector2d::Unit(i) + d_nz * zenith;
     const double d_a = d_n.dot(x.head<2>());
     const double d_across = d_a / (1 + nz) - a * d_nz / ((1 + nz) * (1 + nz));
-    turn.by_zenith.col(i) << d_n * lift - n * d_across, d_nz * x.z() - d_a;
+    turn.jacobian_wrt_zenith.col(i) << d_n * lift - n * d_across, d_nz * x.z() - d_a;
   }
   return turn;
 }
 
-LensFreedom::LensFreedom(const Camera& camera, const std::optional<MatrixX>& covariance)
+LensParametrization::LensParametrization(const Camera& camera,
+                                         const std::optional<MatrixX>& covariance)
     : start(Eigen::Map<const Eigen::VectorXd>(camera.intrinsics.data(),
                                               std::ssize(camera.intrinsics))),
-      directions(stated_intrinsics(camera), 0) {
+      directions(count_reported_intrinsics(camera), 0) {
   if (!covariance) return;
   // Scales pixels and coefficients by their standard deviations to make them comparable.
   const Eigen::VectorXd sd = covariance->diagonal().cwiseSqrt();
   const Eigen::VectorXd inverse_sd =
       (sd.array() > 0).select(sd.cwiseInverse(), Eigen::VectorXd::Zero(sd.size()));
-  const auto eigen = symmetric_eigen(
+  const auto eigen = decompose_symmetric(
       Eigen::MatrixXd(inverse_sd.asDiagonal() * *covariance * inverse_sd.asDiagonal()));
   constexpr double rounding = 1e-12;
   const Eigen::VectorXd& values = eigen.values;
@@ -84,25 +85,25 @@ LensFreedom::LensFreedom(const Camera& camera, const std::optional<MatrixX>& cov
                values.tail(kept).cwiseMax(0).cwiseSqrt().asDiagonal();
 }
 
-AdjustmentProblem::AdjustmentProblem(LensModel model, LensFreedom freedom, std::size_t lamp_count,
-                                     std::size_t spot_count)
+AdjustmentProblem::AdjustmentProblem(LensModel model, LensParametrization freedom,
+                                     std::size_t lamp_count, std::size_t spot_count)
     : model_(model), freedom_(std::move(freedom)) {
   layout_.lens_size = freedom_.directions.cols();
   layout_.zenith = layout_.lens_size;
   layout_.lever_arm = layout_.zenith + 2;
   layout_.lamps = layout_.lever_arm + 2;
   layout_.spots = layout_.lamp(lamp_count);
-  layout_.shared = layout_.spot(spot_count);
-  state_ = Eigen::VectorXd::Zero(layout_.shared);
+  layout_.global = layout_.spot(spot_count);
+  state_ = Eigen::VectorXd::Zero(layout_.global);
 }
 
 void AdjustmentProblem::add_capture(const Capture& capture, const Pose& start) {
   Capture added = capture;
-  added.own = state_.size();
+  added.local = state_.size();
   captures.push_back(added);
   state_.conservativeResize(state_.size() + capture.size());
-  if (!capture.spot) state_.segment<3>(added.own) = start.position_m;
-  Eigen::Index next = added.own + capture.pose_size();
+  if (!capture.spot) state_.segment<3>(added.local) = start.position_m;
+  Eigen::Index next = added.local + capture.pose_size();
   state_[next - 1] = start.yaw_rad;
   if (capture.velocity_is_free()) {
     state_.segment<2>(next) = capture.motion.velocity_m_per_s;
@@ -131,18 +132,18 @@ std::optional<Lens> AdjustmentProblem::lens() const {
 
 namespace {
 
-Placed placed(const Eigen::VectorXd& state, const AdjustmentLayout& layout,
-              const AdjustmentProblem::Capture& capture) {
-  const Eigen::Index motion = capture.own + capture.pose_size();
+CapturePose compute_capture_pose(const Eigen::VectorXd& state, const AdjustmentLayout& layout,
+                                 const AdjustmentProblem::Capture& capture) {
+  const Eigen::Index motion = capture.local + capture.pose_size();
   const double yaw_rad = state[motion - 1];
-  const Eigen::Index position = capture.spot ? layout.spot(*capture.spot) : capture.own;
-  Placed camera{state.segment<3>(position), std::cos(yaw_rad), std::sin(yaw_rad),
-                capture.motion.velocity_m_per_s, capture.motion.yaw_rate_rad_per_s};
+  const Eigen::Index position = capture.spot ? layout.spot(*capture.spot) : capture.local;
+  CapturePose camera{state.segment<3>(position), std::cos(yaw_rad), std::sin(yaw_rad),
+                     capture.motion.velocity_m_per_s, capture.motion.yaw_rate_rad_per_s};
   // The axis is stationary.
   if (capture.spot) camera.velocity_m_per_s.setZero();
   if (capture.velocity_is_free()) camera.velocity_m_per_s = state.segment<2>(motion);
   if (capture.yaw_rate_is_free()) {
-    camera.yaw_rate_rad_per_s = state[capture.own + capture.size() - 1];
+    camera.yaw_rate_rad_per_s = state[capture.local + capture.size() - 1];
   }
   return camera;
 }
@@ -152,51 +153,58 @@ Placed placed(const Eigen::VectorXd& state, const AdjustmentLayout& layout,
 std::optional<AdjustmentProblem::Linearized> AdjustmentProblem::linearize(const Sighting& sighting,
                                                                           const Lens& lens) const {
   const Capture& capture = captures[sighting.capture];
-  const Placed camera = placed(state_, layout_, capture);
+  const CapturePose camera = compute_capture_pose(state_, layout_, capture);
   const Eigen::Vector2d arm_m =
       capture.spot ? Eigen::Vector2d(state_.segment<2>(layout_.lever_arm)) : Eigen::Vector2d(0, 0);
   const double time_s = sighting.time_s;
-  const Eigen::Vector3d still = camera.still_of(state_.segment<3>(layout_.lamp(sighting.lamp)));
-  const Eigen::Matrix3d read_from_still = turned_back(camera.yaw_rate_rad_per_s * time_s);
-  Eigen::Vector3d turned = still;
-  turned.head<2>() -= camera.velocity_m_per_s * time_s;
-  turned = (read_from_still * turned).eval();
-  Eigen::Vector3d level = turned;
+  const Eigen::Vector3d lamp_at_mid_exposure =
+      camera.lamp_in_level(state_.segment<3>(layout_.lamp(sighting.lamp)));
+  const Eigen::Matrix3d readout_from_middle =
+      make_inverse_yaw_rotation(camera.yaw_rate_rad_per_s * time_s);
+  Eigen::Vector3d rotated = lamp_at_mid_exposure;
+  rotated.head<2>() -= camera.velocity_m_per_s * time_s;
+  rotated = (readout_from_middle * rotated).eval();
+  Eigen::Vector3d level = rotated;
   level.head<2>() -= arm_m;
-  const ZenithTurn turn =
-      turn_by_zenith(state_.segment<2>(layout_.zenith), capture.base_from_level * level);
+  const ZenithRotation turn =
+      rotate_by_zenith(state_.segment<2>(layout_.zenith), capture.base_from_level * level);
   const auto seen = lens.project_with_jacobians(turn.x_in_camera);
   if (!seen) return std::nullopt;
   const Eigen::Matrix2d weight = sighting.whitening / noise_scale;
-  const Matrix23 by_camera = -weight * seen->d_pixel_d_point;
-  const Matrix23 by_level = by_camera * turn.camera_from_level * capture.base_from_level;
+  const Matrix23 jacobian_wrt_camera = -weight * seen->d_pixel_d_point;
+  const Matrix23 jacobian_wrt_level =
+      jacobian_wrt_camera * turn.camera_from_level * capture.base_from_level;
   Eigen::Matrix3d level_from_world;
   level_from_world << camera.cosine, camera.sine, 0, -camera.sine, camera.cosine, 0, 0, 0, 1;
   Linearized at;
   at.residual = weight * (sighting.pixel - seen->pixel);
-  at.by_lens = -weight * seen->d_pixel_d_parameters * freedom_.directions;
-  at.by_zenith = by_camera * turn.by_zenith;
-  at.by_lever_arm = -by_level.leftCols<2>();
-  const Matrix23 by_still = by_level * read_from_still;
-  at.by_lamp = by_still * level_from_world;
-  at.by_spot = -at.by_lamp;
-  at.by_own.resize(2, capture.size());
+  at.jacobian_wrt_lens = -weight * seen->d_pixel_d_parameters * freedom_.directions;
+  at.jacobian_wrt_zenith = jacobian_wrt_camera * turn.jacobian_wrt_zenith;
+  at.jacobian_wrt_lever_arm = -jacobian_wrt_level.leftCols<2>();
+  const Matrix23 jacobian_wrt_lamp_in_level = jacobian_wrt_level * readout_from_middle;
+  at.jacobian_wrt_lamp = jacobian_wrt_lamp_in_level * level_from_world;
+  at.jacobian_wrt_spot = -at.jacobian_wrt_lamp;
+  at.jacobian_wrt_local.resize(2, capture.size());
   Eigen::Index next = capture.pose_size();
-  if (!capture.spot) at.by_own.leftCols<3>() = at.by_spot;
-  at.by_own.col(next - 1) = by_still * Eigen::Vector3d(still.y(), -still.x(), 0);
+  if (!capture.spot) at.jacobian_wrt_local.leftCols<3>() = at.jacobian_wrt_spot;
+  at.jacobian_wrt_local.col(next - 1) =
+      jacobian_wrt_lamp_in_level *
+      Eigen::Vector3d(lamp_at_mid_exposure.y(), -lamp_at_mid_exposure.x(), 0);
   if (capture.velocity_is_free()) {
-    at.by_own.middleCols<2>(next) = -time_s * by_still.leftCols<2>();
+    at.jacobian_wrt_local.middleCols<2>(next) = -time_s * jacobian_wrt_lamp_in_level.leftCols<2>();
     next += 2;
   }
   if (capture.yaw_rate_is_free()) {
-    at.by_own.col(next) = time_s * (by_level * Eigen::Vector3d(turned.y(), -turned.x(), 0));
+    at.jacobian_wrt_local.col(next) =
+        time_s * (jacobian_wrt_level * Eigen::Vector3d(rotated.y(), -rotated.x(), 0));
   }
   return at;
 }
 
 AdjustmentProblem::MotionPrior AdjustmentProblem::motion_prior(const Capture& capture) const {
   const Eigen::Index size = capture.motion_size();
-  MotionPrior prior{state_.segment(capture.own + capture.pose_size(), size), Eigen::VectorXd(size)};
+  MotionPrior prior{state_.segment(capture.local + capture.pose_size(), size),
+                    Eigen::VectorXd(size)};
   const KnownMotion& known = capture.motion;
   if (capture.velocity_is_free()) {
     prior.deviations.head<2>() -= known.velocity_m_per_s;
@@ -210,61 +218,61 @@ AdjustmentProblem::MotionPrior AdjustmentProblem::motion_prior(const Capture& ca
   return prior;
 }
 
-double AdjustmentProblem::told_of_motion(std::size_t index) const {
+double AdjustmentProblem::count_determined_motion(std::size_t index) const {
   const Capture& capture = captures[index];
   const Eigen::Index size = capture.motion_size();
   if (size == 0) return 0;
   const auto lens = this->lens();
   if (!lens) return 0;
-  Eigen::MatrixXd own = Eigen::MatrixXd::Zero(capture.size(), capture.size());
+  Eigen::MatrixXd local = Eigen::MatrixXd::Zero(capture.size(), capture.size());
   for (const Sighting& sighting : sightings) {
     if (!sighting.used || sighting.capture != index) continue;
     const auto at = linearize(sighting, *lens);
-    if (at) own += at->by_own.transpose() * at->by_own;
+    if (at) local += at->jacobian_wrt_local.transpose() * at->jacobian_wrt_local;
   }
   const Eigen::VectorXd weights = motion_prior(capture).weights;
-  own.diagonal().tail(size) += weights.cwiseAbs2();
+  local.diagonal().tail(size) += weights.cwiseAbs2();
   const Eigen::MatrixXd covariance =
-      solve_symmetric(own, Eigen::MatrixXd::Identity(capture.size(), capture.size()));
+      solve_symmetric(local, Eigen::MatrixXd::Identity(capture.size(), capture.size()));
   return static_cast<double>(size) - covariance.diagonal().tail(size).dot(weights.cwiseAbs2());
 }
 
-Eigen::Vector3d AdjustmentProblem::place_of(const PlaceSighting& place) const {
+Eigen::Vector3d AdjustmentProblem::predict_position(const PlaceObservation& place) const {
   const Capture& capture = captures[place.capture];
-  const Placed camera = placed(state_, layout_, capture);
+  const CapturePose camera = compute_capture_pose(state_, layout_, capture);
   const Eigen::Vector2d arm_m = state_.segment<2>(layout_.lever_arm);
-  const Eigen::Vector3d turned(camera.cosine * arm_m.x() - camera.sine * arm_m.y(),
-                               camera.sine * arm_m.x() + camera.cosine * arm_m.y(), 0);
+  const Eigen::Vector3d rotated(camera.cosine * arm_m.x() - camera.sine * arm_m.y(),
+                                camera.sine * arm_m.x() + camera.cosine * arm_m.y(), 0);
   // On a spot the position is the axis', elsewhere the camera's.
-  const double share = (place.of_axis ? 0 : 1) - (capture.spot ? 0 : 1);
-  return camera.position_m + share * turned;
+  const double factor = (place.of_axis ? 0 : 1) - (capture.spot ? 0 : 1);
+  return camera.position_m + factor * rotated;
 }
 
 namespace {
 
-/// Derivatives of place_of() with respect to the lever arm and to the yaw.
+/// Derivatives of predict_position() with respect to the lever arm and to the yaw.
 struct PlaceDerivatives {
-  Eigen::Matrix<double, 3, 2> by_arm;
-  Eigen::Vector3d by_yaw;
+  Eigen::Matrix<double, 3, 2> jacobian_wrt_arm;
+  Eigen::Vector3d jacobian_wrt_yaw;
 };
 
-PlaceDerivatives derivatives_of(const AdjustmentProblem& problem,
-                                const AdjustmentProblem::PlaceSighting& place) {
+PlaceDerivatives compute_place_derivatives(const AdjustmentProblem& problem,
+                                           const AdjustmentProblem::PlaceObservation& place) {
   const auto& capture = problem.captures[place.capture];
-  const Placed camera = placed(problem.state(), problem.layout(), capture);
+  const CapturePose camera = compute_capture_pose(problem.state(), problem.layout(), capture);
   const Eigen::Vector2d arm_m = problem.state().segment<2>(problem.layout().lever_arm);
   // On a spot the position is that of the axis, elsewhere that of the camera.
-  const double share = (place.of_axis ? 0 : 1) - (capture.spot ? 0 : 1);
+  const double factor = (place.of_axis ? 0 : 1) - (capture.spot ? 0 : 1);
   PlaceDerivatives at;
-  at.by_arm << camera.cosine, -camera.sine, camera.sine, camera.cosine, 0, 0;
-  at.by_arm *= share;
-  at.by_yaw << share * (-camera.sine * arm_m.x() - camera.cosine * arm_m.y()),
-      share * (camera.cosine * arm_m.x() - camera.sine * arm_m.y()), 0;
+  at.jacobian_wrt_arm << camera.cosine, -camera.sine, camera.sine, camera.cosine, 0, 0;
+  at.jacobian_wrt_arm *= factor;
+  at.jacobian_wrt_yaw << factor * (-camera.sine * arm_m.x() - camera.cosine * arm_m.y()),
+      factor * (camera.cosine * arm_m.x() - camera.sine * arm_m.y()), 0;
   return at;
 }
 
-bool turns_the_arm(const AdjustmentProblem& problem,
-                   const AdjustmentProblem::PlaceSighting& place) {
+bool depends_on_lever_arm(const AdjustmentProblem& problem,
+                          const AdjustmentProblem::PlaceObservation& place) {
   return problem.captures[place.capture].spot.has_value() != place.of_axis;
 }
 
@@ -273,8 +281,8 @@ bool turns_the_arm(const AdjustmentProblem& problem,
 /// Cost functions and solver. The unknowns stay in the state vector of the problem. The order of
 /// their addresses, and with it the rounding in Ceres, is therefore always the same.
 struct AdjustmentCosts {
-  struct Lenses : ceres::EvaluationCallback {
-    explicit Lenses(const AdjustmentProblem& of) : problem(of) {}
+  struct LensUpdater : ceres::EvaluationCallback {
+    explicit LensUpdater(const AdjustmentProblem& of) : problem(of) {}
     void PrepareForEvaluation(bool, bool new_point) override {
       if (new_point || !lens) lens = problem.lens();
     }
@@ -292,16 +300,17 @@ struct AdjustmentCosts {
 
   /// Residual of an observation. Blocks: local unknowns of the capture, [spot, lever arm], zenith,
   /// lamp, [lens].
-  class Seen : public ceres::CostFunction {
+  class ObservationCost : public ceres::CostFunction {
    public:
-    Seen(const AdjustmentProblem& problem, const Lenses& lenses,
-         const AdjustmentProblem::Sighting& sighting)
+    ObservationCost(const AdjustmentProblem& problem, const LensUpdater& lenses,
+                    const AdjustmentProblem::Sighting& sighting)
         : problem_(problem), lenses_(lenses), sighting_(sighting) {
       set_num_residuals(2);
       on_spot_ = problem.captures[sighting.capture].spot.has_value();
       auto& sizes = *mutable_parameter_block_sizes();
-      const auto own = static_cast<int32_t>(problem.captures[sighting.capture].size());
-      sizes = on_spot_ ? std::vector<int32_t>{own, 3, 2, 2, 3} : std::vector<int32_t>{own, 2, 3};
+      const auto local = static_cast<int32_t>(problem.captures[sighting.capture].size());
+      sizes =
+          on_spot_ ? std::vector<int32_t>{local, 3, 2, 2, 3} : std::vector<int32_t>{local, 2, 3};
       const auto lens_size = static_cast<int32_t>(problem.layout().lens_size);
       if (lens_size > 0) sizes.push_back(lens_size);
     }
@@ -312,28 +321,28 @@ struct AdjustmentCosts {
       Eigen::Map<Eigen::Vector2d>(residuals, 2) = at->residual;
       if (jacobians == nullptr) return true;
       int block = 0;
-      copy(jacobians, block, at->by_own);
+      copy(jacobians, block, at->jacobian_wrt_local);
       if (on_spot_) {
-        copy(jacobians, block, at->by_spot);
-        copy(jacobians, block, at->by_lever_arm);
+        copy(jacobians, block, at->jacobian_wrt_spot);
+        copy(jacobians, block, at->jacobian_wrt_lever_arm);
       }
-      copy(jacobians, block, at->by_zenith);
-      copy(jacobians, block, at->by_lamp);
-      if (at->by_lens.cols() > 0) copy(jacobians, block, at->by_lens);
+      copy(jacobians, block, at->jacobian_wrt_zenith);
+      copy(jacobians, block, at->jacobian_wrt_lamp);
+      if (at->jacobian_wrt_lens.cols() > 0) copy(jacobians, block, at->jacobian_wrt_lens);
       return true;
     }
 
    private:
     const AdjustmentProblem& problem_;
-    const Lenses& lenses_;
+    const LensUpdater& lenses_;
     const AdjustmentProblem::Sighting& sighting_;
     bool on_spot_;
   };
 
   /// Residual (unknowns - prior mean) / sd.
-  class Prior : public ceres::CostFunction {
+  class PriorCost : public ceres::CostFunction {
    public:
-    Prior(Eigen::VectorXd value, double sd) : value_(std::move(value)), weight_(1 / sd) {
+    PriorCost(Eigen::VectorXd value, double sd) : value_(std::move(value)), weight_(1 / sd) {
       set_num_residuals(static_cast<int>(value_.size()));
       mutable_parameter_block_sizes()->push_back(static_cast<int32_t>(value_.size()));
     }
@@ -355,24 +364,24 @@ struct AdjustmentCosts {
   };
 
   /// Constraint of the fixed directions of the lamps. Blocks: all lamps.
-  class Gauge : public ceres::CostFunction {
+  class GaugeCost : public ceres::CostFunction {
    public:
-    explicit Gauge(const AdjustmentProblem& problem) : problem_(problem) {
+    explicit GaugeCost(const AdjustmentProblem& problem) : problem_(problem) {
       set_num_residuals(static_cast<int>(problem.gauge.cols()));
       mutable_parameter_block_sizes()->assign(problem.lamps.size(), 3);
     }
     bool Evaluate(double const* const* lamps, double* residuals,
                   double** jacobians) const override {
       const Eigen::MatrixXd& gauge = problem_.gauge;
-      Eigen::Map<Eigen::VectorXd> held(residuals, gauge.cols());
-      held.setZero();
+      Eigen::Map<Eigen::VectorXd> constraint(residuals, gauge.cols());
+      constraint.setZero();
       int block = 0;
       for (std::size_t i = 0; i < problem_.lamps.size(); ++i) {
-        const Eigen::MatrixXd by_lamp =
+        const Eigen::MatrixXd jacobian_wrt_lamp =
             gauge.middleRows<3>(3 * static_cast<Eigen::Index>(i)).transpose();
-        held +=
-            by_lamp * (Eigen::Map<const Eigen::Vector3d>(lamps[i]) - problem_.lamps[i].surveyed_m);
-        if (jacobians != nullptr) copy(jacobians, block, by_lamp);
+        constraint += jacobian_wrt_lamp *
+                      (Eigen::Map<const Eigen::Vector3d>(lamps[i]) - problem_.lamps[i].surveyed_m);
+        if (jacobians != nullptr) copy(jacobians, block, jacobian_wrt_lamp);
       }
       return true;
     }
@@ -382,9 +391,9 @@ struct AdjustmentCosts {
   };
 
   /// Prior of the motion of a capture. Block: local unknowns of the capture.
-  class Moved : public ceres::CostFunction {
+  class MotionCost : public ceres::CostFunction {
    public:
-    Moved(const AdjustmentProblem& problem, const AdjustmentProblem::Capture& capture)
+    MotionCost(const AdjustmentProblem& problem, const AdjustmentProblem::Capture& capture)
         : problem_(problem), capture_(capture) {
       set_num_residuals(static_cast<int>(capture.motion_size()));
       mutable_parameter_block_sizes()->push_back(static_cast<int32_t>(capture.size()));
@@ -393,10 +402,10 @@ struct AdjustmentCosts {
       const auto [deviations, weights] = problem_.motion_prior(capture_);
       Eigen::Map<Eigen::VectorXd>(residuals, deviations.size()) = deviations;
       if (jacobians == nullptr) return true;
-      Eigen::MatrixXd by_own = Eigen::MatrixXd::Zero(weights.size(), capture_.size());
-      by_own.rightCols(weights.size()) = weights.asDiagonal();
+      Eigen::MatrixXd jacobian_wrt_local = Eigen::MatrixXd::Zero(weights.size(), capture_.size());
+      jacobian_wrt_local.rightCols(weights.size()) = weights.asDiagonal();
       int block = 0;
-      copy(jacobians, block, by_own);
+      copy(jacobians, block, jacobian_wrt_local);
       return true;
     }
 
@@ -406,42 +415,42 @@ struct AdjustmentCosts {
   };
 
   /// Residual of a known position. Blocks: local unknowns of the capture, [spot], [lever arm].
-  class Stood : public ceres::CostFunction {
+  class PlaceCost : public ceres::CostFunction {
    public:
-    Stood(const AdjustmentProblem& problem, const AdjustmentProblem::PlaceSighting& place)
+    PlaceCost(const AdjustmentProblem& problem, const AdjustmentProblem::PlaceObservation& place)
         : problem_(problem), place_(place) {
       set_num_residuals(static_cast<int>(place.size));
       auto& sizes = *mutable_parameter_block_sizes();
       on_spot_ = problem.captures[place.capture].spot.has_value();
-      own_ = problem.captures[place.capture].size();
-      sizes = {static_cast<int32_t>(own_)};
+      local_size_ = problem.captures[place.capture].size();
+      sizes = {static_cast<int32_t>(local_size_)};
       if (on_spot_) sizes.push_back(3);
-      if (turns_the_arm(problem, place)) sizes.push_back(2);
+      if (depends_on_lever_arm(problem, place)) sizes.push_back(2);
     }
     bool Evaluate(double const* const*, double* residuals, double** jacobians) const override {
-      const Eigen::Vector3d misfit_m = problem_.place_of(place_) - place_.stated_m;
+      const Eigen::Vector3d residual_m = problem_.predict_position(place_) - place_.stated_m;
       Eigen::Map<Eigen::VectorXd>(residuals, place_.size) =
-          misfit_m.head(place_.size) / place_.sd_m;
+          residual_m.head(place_.size) / place_.sd_m;
       if (jacobians == nullptr) return true;
-      const PlaceDerivatives at = derivatives_of(problem_, place_);
+      const PlaceDerivatives at = compute_place_derivatives(problem_, place_);
       int block = 0;
       const auto rows = [&](const Eigen::MatrixXd& values) -> Eigen::MatrixXd {
         return values.topRows(place_.size) / place_.sd_m;
       };
-      Eigen::MatrixXd by_own = Eigen::MatrixXd::Zero(3, own_);
-      by_own.col(on_spot_ ? 0 : 3) = at.by_yaw;
-      if (!on_spot_) by_own.leftCols<3>().setIdentity();
-      copy(jacobians, block, rows(by_own));
+      Eigen::MatrixXd jacobian_wrt_local = Eigen::MatrixXd::Zero(3, local_size_);
+      jacobian_wrt_local.col(on_spot_ ? 0 : 3) = at.jacobian_wrt_yaw;
+      if (!on_spot_) jacobian_wrt_local.leftCols<3>().setIdentity();
+      copy(jacobians, block, rows(jacobian_wrt_local));
       if (on_spot_) copy(jacobians, block, rows(Eigen::Matrix3d::Identity()));
-      if (turns_the_arm(problem_, place_)) copy(jacobians, block, rows(at.by_arm));
+      if (depends_on_lever_arm(problem_, place_)) copy(jacobians, block, rows(at.jacobian_wrt_arm));
       return true;
     }
 
    private:
     const AdjustmentProblem& problem_;
-    const AdjustmentProblem::PlaceSighting& place_;
+    const AdjustmentProblem::PlaceObservation& place_;
     bool on_spot_;
-    Eigen::Index own_;
+    Eigen::Index local_size_;
   };
 
   static bool solve(AdjustmentProblem& problem, bool robust) {
@@ -450,10 +459,10 @@ struct AdjustmentCosts {
     const auto loss = [robust]() -> ceres::LossFunction* {
       return robust ? new ceres::CauchyLoss(width) : nullptr;
     };
-    Lenses lenses(problem);
-    ceres::Problem::Options how;
-    how.evaluation_callback = &lenses;
-    ceres::Problem ceres(how);
+    LensUpdater lenses(problem);
+    ceres::Problem::Options problem_options;
+    problem_options.evaluation_callback = &lenses;
+    ceres::Problem ceres(problem_options);
     const AdjustmentLayout& layout = problem.layout();
     double* const state = problem.state_.data();
     auto order = std::make_shared<ceres::ParameterBlockOrdering>();
@@ -462,19 +471,19 @@ struct AdjustmentCosts {
       order->AddElementToGroup(state + at, group);
       return state + at;
     };
-    std::vector<bool> spot_seen((static_cast<std::size_t>(layout.shared - layout.spots)) / 3);
+    std::vector<bool> spot_seen((static_cast<std::size_t>(layout.global - layout.spots)) / 3);
     std::vector<bool> lamp_seen(problem.lamps.size());
     const bool has_lens = layout.lens_size > 0;
     if (has_lens) {
       add(layout.lens, layout.lens_size, 1);
-      ceres.AddResidualBlock(new Prior(Eigen::VectorXd::Zero(layout.lens_size), 1), nullptr,
+      ceres.AddResidualBlock(new PriorCost(Eigen::VectorXd::Zero(layout.lens_size), 1), nullptr,
                              state + layout.lens);
     }
     add(layout.zenith, 2, 1);
     for (const auto& sighting : problem.sightings) {
       if (!sighting.used) continue;
       const auto& capture = problem.captures[sighting.capture];
-      std::vector<double*> blocks{add(capture.own, capture.size(), 0)};
+      std::vector<double*> blocks{add(capture.local, capture.size(), 0)};
       if (capture.spot) {
         blocks.push_back(add(layout.spot(*capture.spot), 3, 1));
         blocks.push_back(add(layout.lever_arm, 2, 1));
@@ -483,7 +492,7 @@ struct AdjustmentCosts {
       blocks.push_back(add(layout.lamp(sighting.lamp), 3, 1));
       lamp_seen[sighting.lamp] = true;
       if (has_lens) blocks.push_back(state + layout.lens);
-      ceres.AddResidualBlock(new Seen(problem, lenses, sighting), loss(), blocks);
+      ceres.AddResidualBlock(new ObservationCost(problem, lenses, sighting), loss(), blocks);
     }
     for (std::size_t i = 0; i < problem.lamps.size(); ++i) {
       const auto& [surveyed_m, sd_m] = problem.lamps[i];
@@ -492,7 +501,7 @@ struct AdjustmentCosts {
       if (sd_m == 0) {
         ceres.SetParameterBlockConstant(lamp);
       } else {
-        ceres.AddResidualBlock(new Prior(surveyed_m, sd_m), loss(), lamp);
+        ceres.AddResidualBlock(new PriorCost(surveyed_m, sd_m), loss(), lamp);
       }
     }
     if (problem.gauge.cols() > 0) {
@@ -501,20 +510,20 @@ struct AdjustmentCosts {
         blocks.push_back(add(layout.lamp(i), 3, 1));
         if (!lamp_seen[i]) ceres.SetParameterBlockConstant(blocks.back());
       }
-      ceres.AddResidualBlock(new Gauge(problem), nullptr, blocks);
+      ceres.AddResidualBlock(new GaugeCost(problem), nullptr, blocks);
     }
     for (const auto& place : problem.places) {
       if (!problem.place_used[place.place]) continue;
       const auto& capture = problem.captures[place.capture];
-      std::vector<double*> blocks{state + capture.own};
-      if (!ceres.HasParameterBlock(state + capture.own)) continue;  // none of its lamps is used
+      std::vector<double*> blocks{state + capture.local};
+      if (!ceres.HasParameterBlock(state + capture.local)) continue;  // none of its lamps is used
       if (capture.spot) blocks.push_back(state + layout.spot(*capture.spot));
-      if (turns_the_arm(problem, place)) blocks.push_back(add(layout.lever_arm, 2, 1));
-      ceres.AddResidualBlock(new Stood(problem, place), loss(), blocks);
+      if (depends_on_lever_arm(problem, place)) blocks.push_back(add(layout.lever_arm, 2, 1));
+      ceres.AddResidualBlock(new PlaceCost(problem, place), loss(), blocks);
     }
     for (const auto& capture : problem.captures) {
-      if (capture.motion_size() == 0 || !ceres.HasParameterBlock(state + capture.own)) continue;
-      ceres.AddResidualBlock(new Moved(problem, capture), nullptr, state + capture.own);
+      if (capture.motion_size() == 0 || !ceres.HasParameterBlock(state + capture.local)) continue;
+      ceres.AddResidualBlock(new MotionCost(problem, capture), nullptr, state + capture.local);
     }
     ceres::Solver::Options options;
     options.linear_solver_type = ceres::DENSE_SCHUR;
@@ -539,22 +548,23 @@ namespace {
 
 /// Information of the local unknowns of a capture, and the cross block with global unknowns, for
 /// marginalization.
-struct OwnBlock {
-  CaptureMatrix own = CaptureMatrix::Zero();
+struct LocalBlock {
+  CaptureMatrix local = CaptureMatrix::Zero();
   std::vector<Eigen::Index> columns;
-  std::vector<CaptureVector> mixed;
+  std::vector<CaptureVector> cross;
 
-  void add(const Eigen::MatrixXd& by_own, Eigen::Index first, const Eigen::MatrixXd& by_shared) {
-    const Eigen::MatrixXd product = by_own.transpose() * by_shared;
+  void add(const Eigen::MatrixXd& jacobian_wrt_local, Eigen::Index first,
+           const Eigen::MatrixXd& jacobian_wrt_global) {
+    const Eigen::MatrixXd product = jacobian_wrt_local.transpose() * jacobian_wrt_global;
     for (Eigen::Index i = 0; i < product.cols(); ++i) {
       CaptureVector column = CaptureVector::Zero();
       column.head(product.rows()) = product.col(i);
       const auto place = std::find(columns.begin(), columns.end(), first + i);
       if (place == columns.end()) {
         columns.push_back(first + i);
-        mixed.push_back(column);
+        cross.push_back(column);
       } else {
-        mixed[static_cast<std::size_t>(place - columns.begin())] += column;
+        cross[static_cast<std::size_t>(place - columns.begin())] += column;
       }
     }
   }
@@ -566,52 +576,58 @@ using Parts = std::vector<std::pair<Eigen::Index, Eigen::MatrixXd>>;
 /// Returns the derivatives of the whitened residual of a known position with respect to the local
 /// unknowns of the capture. Stores those with respect to the global unknowns in `parts`.
 Eigen::MatrixXd whitened_derivatives(const AdjustmentProblem& problem,
-                                     const AdjustmentProblem::PlaceSighting& place, Parts& parts) {
+                                     const AdjustmentProblem::PlaceObservation& place,
+                                     Parts& parts) {
   const AdjustmentLayout& at = problem.layout();
   const auto& capture = problem.captures[place.capture];
-  const PlaceDerivatives derivatives = derivatives_of(problem, place);
+  const PlaceDerivatives derivatives = compute_place_derivatives(problem, place);
   const Eigen::Index rows = place.size;
-  const Eigen::MatrixXd by_position =
+  const Eigen::MatrixXd jacobian_wrt_position =
       Eigen::MatrixXd(Eigen::Matrix3d::Identity()).topRows(rows) / place.sd_m;
   parts.clear();
-  Eigen::MatrixXd by_own(rows, capture.spot ? 1 : 4);
+  Eigen::MatrixXd jacobian_wrt_local(rows, capture.spot ? 1 : 4);
   if (capture.spot) {
-    by_own = derivatives.by_yaw.head(rows) / place.sd_m;
-    parts.emplace_back(at.spot(*capture.spot), by_position);
+    jacobian_wrt_local = derivatives.jacobian_wrt_yaw.head(rows) / place.sd_m;
+    parts.emplace_back(at.spot(*capture.spot), jacobian_wrt_position);
   } else {
-    by_own << by_position, derivatives.by_yaw.head(rows) / place.sd_m;
+    jacobian_wrt_local << jacobian_wrt_position,
+        derivatives.jacobian_wrt_yaw.head(rows) / place.sd_m;
   }
-  if (turns_the_arm(problem, place)) {
-    parts.emplace_back(at.lever_arm, derivatives.by_arm.topRows(rows) / place.sd_m);
+  if (depends_on_lever_arm(problem, place)) {
+    parts.emplace_back(at.lever_arm, derivatives.jacobian_wrt_arm.topRows(rows) / place.sd_m);
   }
-  return by_own;
+  return jacobian_wrt_local;
 }
 
 /// Marginalization of the local unknowns of a capture: their information N, and N^-1 times the
 /// cross block.
-struct Elimination {
-  Eigen::MatrixXd own, own_from_shared;
+struct Marginalization {
+  Eigen::MatrixXd local, local_from_global;
 };
 
 /// Returns the trace of the covariance of whitened residuals,
 ///   tr(B N^-1 B' + (A - B N^-1 M) C (A - B N^-1 M)')
-/// with their derivatives B (`by_own`) with respect to the local unknowns and A (`parts`) with
-/// respect to the global unknowns `columns`. M is the cross block, C the covariance of the global
-/// unknowns.
-double predicted_variance(const Eigen::MatrixXd& by_own, const Parts& parts,
-                          const std::vector<Eigen::Index>& columns, const Elimination& eliminated,
-                          const Eigen::MatrixXd& shared_covariance) {
-  Eigen::MatrixXd own_rows = Eigen::MatrixXd::Zero(by_own.rows(), eliminated.own.rows());
-  own_rows.leftCols(by_own.cols()) = by_own;
-  Eigen::MatrixXd shared_rows = Eigen::MatrixXd::Zero(by_own.rows(), shared_covariance.cols());
-  for (const auto& [first, by_shared] : parts) {
-    shared_rows.middleCols(first, by_shared.cols()) = by_shared;
+/// with their derivatives B (`jacobian_wrt_local`) with respect to the local unknowns and A
+/// (`parts`) with respect to the global unknowns `columns`. M is the cross block, C the covariance
+/// of the global unknowns.
+double predicted_variance(const Eigen::MatrixXd& jacobian_wrt_local, const Parts& parts,
+                          const std::vector<Eigen::Index>& columns,
+                          const Marginalization& marginalized,
+                          const Eigen::MatrixXd& global_covariance) {
+  Eigen::MatrixXd local_rows =
+      Eigen::MatrixXd::Zero(jacobian_wrt_local.rows(), marginalized.local.rows());
+  local_rows.leftCols(jacobian_wrt_local.cols()) = jacobian_wrt_local;
+  Eigen::MatrixXd global_rows =
+      Eigen::MatrixXd::Zero(jacobian_wrt_local.rows(), global_covariance.cols());
+  for (const auto& [first, jacobian_wrt_global] : parts) {
+    global_rows.middleCols(first, jacobian_wrt_global.cols()) = jacobian_wrt_global;
   }
   const Eigen::MatrixXd rows =
-      shared_rows(Eigen::all, columns) - own_rows * eliminated.own_from_shared;
-  return own_rows.cwiseProduct(solve_symmetric(eliminated.own, own_rows.transpose()).transpose())
+      global_rows(Eigen::all, columns) - local_rows * marginalized.local_from_global;
+  return local_rows
+             .cwiseProduct(solve_symmetric(marginalized.local, local_rows.transpose()).transpose())
              .sum() +
-         rows.cwiseProduct(rows * shared_covariance(columns, columns)).sum();
+         rows.cwiseProduct(rows * global_covariance(columns, columns)).sum();
 }
 
 void add_information(const Parts& parts, Eigen::MatrixXd& information) {
@@ -626,11 +642,11 @@ void add_information(const Parts& parts, Eigen::MatrixXd& information) {
 /// information of a guess.
 Eigen::MatrixXd prior_information(const AdjustmentProblem& problem) {
   const AdjustmentLayout& at = problem.layout();
-  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(at.shared, at.shared);
+  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(at.global, at.global);
   constexpr double guess_rad = 1, guess_m = 10;
   information.diagonal().segment(at.lens, at.lens_size).setOnes();
   information.diagonal().segment<2>(at.zenith).setConstant(1 / (guess_rad * guess_rad));
-  information.diagonal().tail(at.shared - at.lever_arm).setConstant(1 / (guess_m * guess_m));
+  information.diagonal().tail(at.global - at.lever_arm).setConstant(1 / (guess_m * guess_m));
   for (std::size_t i = 0; i < problem.lamps.size(); ++i) {
     const double sd_m = problem.lamps[i].sd_m;
     if (std::isinf(sd_m)) continue;
@@ -649,48 +665,51 @@ void set_parts(const AdjustmentProblem& problem, const AdjustmentProblem::Sighti
   const AdjustmentLayout& at = problem.layout();
   const auto& spot = problem.captures[sighting.capture].spot;
   parts.clear();
-  if (at.lens_size > 0) parts.emplace_back(at.lens, seen.by_lens);
-  parts.emplace_back(at.zenith, seen.by_zenith);
+  if (at.lens_size > 0) parts.emplace_back(at.lens, seen.jacobian_wrt_lens);
+  parts.emplace_back(at.zenith, seen.jacobian_wrt_zenith);
   if (problem.lamps[sighting.lamp].sd_m > 0) {
-    parts.emplace_back(at.lamp(sighting.lamp), seen.by_lamp);
+    parts.emplace_back(at.lamp(sighting.lamp), seen.jacobian_wrt_lamp);
   }
   if (spot) {
-    parts.emplace_back(at.lever_arm, seen.by_lever_arm);
-    parts.emplace_back(at.spot(*spot), seen.by_spot);
+    parts.emplace_back(at.lever_arm, seen.jacobian_wrt_lever_arm);
+    parts.emplace_back(at.spot(*spot), seen.jacobian_wrt_spot);
   }
 }
 
 /// Adds the information of residuals with these derivatives to that of the global unknowns and of
 /// the local unknowns.
-void add_residuals(const Eigen::MatrixXd& by_own, const Parts& parts, Eigen::MatrixXd& information,
-                   OwnBlock& block) {
+void add_residuals(const Eigen::MatrixXd& jacobian_wrt_local, const Parts& parts,
+                   Eigen::MatrixXd& information, LocalBlock& block) {
   add_information(parts, information);
-  block.own.topLeftCorner(by_own.cols(), by_own.cols()) += by_own.transpose() * by_own;
-  for (const auto& [first, by_shared] : parts) block.add(by_own, first, by_shared);
+  block.local.topLeftCorner(jacobian_wrt_local.cols(), jacobian_wrt_local.cols()) +=
+      jacobian_wrt_local.transpose() * jacobian_wrt_local;
+  for (const auto& [first, jacobian_wrt_global] : parts)
+    block.add(jacobian_wrt_local, first, jacobian_wrt_global);
 }
 
 /// Marginalizes the local unknowns of a capture from the information of the global ones.
 /// @pre the capture is used
-Elimination eliminate(const AdjustmentProblem& problem, const AdjustmentProblem::Capture& capture,
-                      const OwnBlock& block, Eigen::MatrixXd& information) {
+Marginalization marginalize(const AdjustmentProblem& problem,
+                            const AdjustmentProblem::Capture& capture, const LocalBlock& block,
+                            Eigen::MatrixXd& information) {
   const Eigen::Index size = capture.size(), n = std::ssize(block.columns);
-  CaptureMatrix known = block.own;
+  CaptureMatrix known = block.local;
   const Eigen::VectorXd weights = problem.motion_prior(capture).weights;
   known.diagonal().segment(capture.pose_size(), weights.size()) += weights.cwiseAbs2();
-  Eigen::MatrixXd mixed(size, n);
+  Eigen::MatrixXd cross(size, n);
   for (Eigen::Index i = 0; i < n; ++i) {
-    mixed.col(i) = block.mixed[static_cast<std::size_t>(i)].head(size);
+    cross.col(i) = block.cross[static_cast<std::size_t>(i)].head(size);
   }
-  const Elimination eliminated{known.topLeftCorner(size, size),
-                               solve_symmetric(known.topLeftCorner(size, size), mixed)};
-  const Eigen::MatrixXd taken = mixed.transpose() * eliminated.own_from_shared;
+  const Marginalization marginalized{known.topLeftCorner(size, size),
+                                     solve_symmetric(known.topLeftCorner(size, size), cross)};
+  const Eigen::MatrixXd subtracted = cross.transpose() * marginalized.local_from_global;
   for (Eigen::Index i = 0; i < n; ++i) {
     for (Eigen::Index j = 0; j < n; ++j) {
       information(block.columns[static_cast<std::size_t>(i)],
-                  block.columns[static_cast<std::size_t>(j)]) -= taken(i, j);
+                  block.columns[static_cast<std::size_t>(j)]) -= subtracted(i, j);
     }
   }
-  return eliminated;
+  return marginalized;
 }
 
 /// Returns the inverse of the information; zero for exact lamps.
@@ -701,7 +720,7 @@ Eigen::MatrixXd covariance_from_information(const AdjustmentProblem& problem,
   const Eigen::MatrixXd scaled = scale.asDiagonal() * information * scale.asDiagonal();
   Eigen::MatrixXd covariance =
       scale.asDiagonal() *
-      solve_symmetric(scaled, Eigen::MatrixXd::Identity(at.shared, at.shared)) * scale.asDiagonal();
+      solve_symmetric(scaled, Eigen::MatrixXd::Identity(at.global, at.global)) * scale.asDiagonal();
   covariance = 0.5 * (covariance + covariance.transpose()).eval();
   for (std::size_t i = 0; i < problem.lamps.size(); ++i) {
     if (problem.lamps[i].sd_m > 0) continue;
@@ -713,9 +732,9 @@ Eigen::MatrixXd covariance_from_information(const AdjustmentProblem& problem,
 
 }  // namespace
 
-AdjustmentProblem::SharedCovariance AdjustmentProblem::shared_covariance() const {
+AdjustmentProblem::GlobalCovariance AdjustmentProblem::global_covariance() const {
   Eigen::MatrixXd information = prior_information(*this);
-  std::vector<OwnBlock> own(captures.size());
+  std::vector<LocalBlock> local(captures.size());
   std::vector<bool> capture_used(captures.size());
   const auto lens = this->lens();
   Parts parts;
@@ -725,25 +744,26 @@ AdjustmentProblem::SharedCovariance AdjustmentProblem::shared_covariance() const
     if (!seen) continue;
     capture_used[sighting.capture] = true;
     set_parts(*this, sighting, *seen, parts);
-    add_residuals(seen->by_own, parts, information, own[sighting.capture]);
+    add_residuals(seen->jacobian_wrt_local, parts, information, local[sighting.capture]);
   }
-  for (const PlaceSighting& place : places) {
+  for (const PlaceObservation& place : places) {
     if (!place_used[place.place] || !capture_used[place.capture]) continue;
-    const Eigen::MatrixXd by_own = whitened_derivatives(*this, place, parts);
-    add_residuals(by_own, parts, information, own[place.capture]);
+    const Eigen::MatrixXd jacobian_wrt_local = whitened_derivatives(*this, place, parts);
+    add_residuals(jacobian_wrt_local, parts, information, local[place.capture]);
   }
-  std::vector<Elimination> eliminated(captures.size());
+  std::vector<Marginalization> marginalized(captures.size());
   for (std::size_t k = 0; k < captures.size(); ++k) {
-    if (own[k].columns.empty()) continue;
-    eliminated[k] = eliminate(*this, captures[k], own[k], information);
+    if (local[k].columns.empty()) continue;
+    marginalized[k] = marginalize(*this, captures[k], local[k], information);
   }
   const Eigen::MatrixXd covariance = covariance_from_information(*this, information);
   double determined_by_places = 0;
-  for (const PlaceSighting& place : places) {
+  for (const PlaceObservation& place : places) {
     if (!place_used[place.place] || !capture_used[place.capture]) continue;
-    const Eigen::MatrixXd by_own = whitened_derivatives(*this, place, parts);
-    determined_by_places += predicted_variance(by_own, parts, own[place.capture].columns,
-                                               eliminated[place.capture], covariance);
+    const Eigen::MatrixXd jacobian_wrt_local = whitened_derivatives(*this, place, parts);
+    determined_by_places +=
+        predicted_variance(jacobian_wrt_local, parts, local[place.capture].columns,
+                           marginalized[place.capture], covariance);
   }
   return {covariance, determined_by_places};
 }

@@ -19,7 +19,7 @@ namespace vlp {
 /// Positions of the unknowns in the vector: first the global ones, then those of each capture. An
 /// absent part has size 0.
 struct AdjustmentLayout {
-  /// Correction of the lens, in units of its standard deviations (LensFreedom).
+  /// Correction of the lens, in units of its standard deviations (LensParametrization).
   Eigen::Index lens = 0, lens_size = 0;
   /// Point (x/z, y/z) of the zenith in the camera.
   Eigen::Index zenith = 0;
@@ -27,20 +27,20 @@ struct AdjustmentLayout {
   /// Three per lamp; three (x, y of the axis, z of the camera) per spot.
   Eigen::Index lamps = 0, spots = 0;
   /// Number of global unknowns.
-  Eigen::Index shared = 0;
+  Eigen::Index global = 0;
 
   Eigen::Index lamp(std::size_t i) const { return lamps + 3 * static_cast<Eigen::Index>(i); }
   Eigen::Index spot(std::size_t i) const { return spots + 3 * static_cast<Eigen::Index>(i); }
 };
 
 /// Whitened parametrization of the lens: intrinsics = start + directions u, where u has unit
-/// covariance. Comprises the intrinsics that have errors (stated_intrinsics()). Omits directions in
-/// which the covariance is numeric noise.
-struct LensFreedom {
+/// covariance. Comprises the intrinsics that have errors (count_reported_intrinsics()). Omits
+/// directions in which the covariance is numeric noise.
+struct LensParametrization {
   Eigen::VectorXd start;
   Eigen::MatrixXd directions;
 
-  LensFreedom(const Camera& camera, const std::optional<MatrixX>& covariance);
+  LensParametrization(const Camera& camera, const std::optional<MatrixX>& covariance);
 };
 
 /// Unknowns, observations and priors of an adjustment.
@@ -67,7 +67,7 @@ class AdjustmentProblem {
     KnownMotion motion = {};
     /// Index of its first local unknown. The local unknowns are (X, Y, Z, yaw), or the yaw on a
     /// spot, followed by velocity and yaw rate if these are not known exactly.
-    Eigen::Index own = 0;
+    Eigen::Index local = 0;
 
     bool velocity_is_free() const { return !spot && motion.velocity_sd_m_per_s > 0; }
     bool yaw_rate_is_free() const { return motion.yaw_rate_sd_rad_per_s > 0; }
@@ -84,7 +84,7 @@ class AdjustmentProblem {
     double sd_m;
   };
   /// Observation of a known position by one capture.
-  struct PlaceSighting {
+  struct PlaceObservation {
     std::size_t capture, place;
     bool of_axis;
     Eigen::Vector3d stated_m;
@@ -95,7 +95,8 @@ class AdjustmentProblem {
     double sd_m;
   };
 
-  AdjustmentProblem(LensModel model, LensFreedom freedom, std::size_t lamps, std::size_t spots);
+  AdjustmentProblem(LensModel model, LensParametrization freedom, std::size_t lamps,
+                    std::size_t spots);
 
   /// Adds a capture and its local unknowns, with the initial pose `start`.
   void add_capture(const Capture& capture, const Pose& start);
@@ -110,7 +111,7 @@ class AdjustmentProblem {
   /// Directions of the lamps' coordinates that stay as surveyed, one column each, divided by the
   /// standard deviation of this constraint. Without columns there is no constraint.
   Eigen::MatrixXd gauge;
-  std::vector<PlaceSighting> places;
+  std::vector<PlaceObservation> places;
   std::vector<bool> place_used;
   /// True if some residual depends on the lever arm.
   bool has_lever_arm = false;
@@ -126,17 +127,17 @@ class AdjustmentProblem {
   /// respect to the global unknowns and to the local ones of the capture.
   struct Linearized {
     Eigen::Vector2d residual;
-    Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::ColMajor, 2, 16> by_lens;
-    Eigen::Matrix2d by_zenith, by_lever_arm;
-    Eigen::Matrix<double, 2, 3> by_lamp, by_spot;
-    Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::ColMajor, 2, 7> by_own;
+    Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::ColMajor, 2, 16> jacobian_wrt_lens;
+    Eigen::Matrix2d jacobian_wrt_zenith, jacobian_wrt_lever_arm;
+    Eigen::Matrix<double, 2, 3> jacobian_wrt_lamp, jacobian_wrt_spot;
+    Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::ColMajor, 2, 7> jacobian_wrt_local;
   };
   /// Linearizes an observation at the current state. Returns std::nullopt if the lens cannot
   /// project the point.
   std::optional<Linearized> linearize(const Sighting& sighting, const Lens& lens) const;
 
   /// Returns the position of the camera (or of the axis) in the capture, from the current state.
-  Eigen::Vector3d place_of(const PlaceSighting& place) const;
+  Eigen::Vector3d predict_position(const PlaceObservation& place) const;
 
   /// Prior of the motion unknowns of a capture, one entry for each that is not known exactly.
   /// `deviations` are (state - prior mean) / sd, `weights` are 1 / sd.
@@ -148,14 +149,14 @@ class AdjustmentProblem {
 
   /// Returns the number of motion unknowns of a capture that its observations determine: the sum of
   /// 1 - (posterior variance / prior variance).
-  double told_of_motion(std::size_t capture) const;
+  double count_determined_motion(std::size_t capture) const;
 
   /// Returns the lens of the current state; std::nullopt if its intrinsics are invalid.
   std::optional<Lens> lens() const;
   std::vector<double> intrinsics() const;
 
-  /// Result of shared_covariance().
-  struct SharedCovariance {
+  /// Result of global_covariance().
+  struct GlobalCovariance {
     /// Covariance of the global unknowns, zero for exact ones. Unknowns without any residual have
     /// the standard deviation of a guess: 1 rad, 10 m.
     Eigen::MatrixXd matrix;
@@ -165,28 +166,28 @@ class AdjustmentProblem {
   };
   /// Computes the covariance of the global unknowns at the current state, after marginalization of
   /// the local ones.
-  SharedCovariance shared_covariance() const;
+  GlobalCovariance global_covariance() const;
 
-  const LensFreedom& freedom() const { return freedom_; }
+  const LensParametrization& freedom() const { return freedom_; }
 
  private:
   friend struct AdjustmentCosts;
 
   LensModel model_;
-  LensFreedom freedom_;
+  LensParametrization freedom_;
   AdjustmentLayout layout_;
   Eigen::VectorXd state_;
 };
 
 /// Point in the camera, its derivative with respect to the zenith's normalized point, and the
 /// rotation.
-struct ZenithTurn {
+struct ZenithRotation {
   Eigen::Vector3d x_in_camera;
-  Eigen::Matrix<double, 3, 2> by_zenith;
+  Eigen::Matrix<double, 3, 2> jacobian_wrt_zenith;
   Eigen::Matrix3d camera_from_level;
 };
 /// Rotates a point of the level frame into the camera by camera_from_level of a zenith, given as a
 /// normalized point.
-ZenithTurn turn_by_zenith(const Eigen::Vector2d& zenith, const Eigen::Vector3d& x_in_level);
+ZenithRotation rotate_by_zenith(const Eigen::Vector2d& zenith, const Eigen::Vector3d& x_in_level);
 
 }  // namespace vlp

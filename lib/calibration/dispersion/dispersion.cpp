@@ -14,8 +14,8 @@ namespace vlp {
 namespace {
 
 /// Sets the fixes and circles before and after the correction.
-void apply(DispersionFit& fit, const StationFixes& station, const std::vector<bool>& used,
-           DispersionCircle kind) {
+void set_fixes(DispersionFit& fit, const ReferencePointFixes& station,
+               const std::vector<bool>& used, DispersionCircle kind) {
   const OptionalFixes before = station.at({0, 0}), after = station.at(fit.dispersion.offset_px);
   std::vector<Eigen::Vector2d> before_m, after_m;
   for (std::size_t i = 0; i < before.size(); ++i) {
@@ -25,15 +25,15 @@ void apply(DispersionFit& fit, const StationFixes& station, const std::vector<bo
     before_m.push_back(before[i]->error_m);
     after_m.push_back(after[i]->error_m);
   }
-  fit.before = circle_of(before_m, kind);
-  fit.after = circle_of(after_m, kind);
+  fit.before = fit_dispersion_circle(before_m, kind);
+  fit.after = fit_dispersion_circle(after_m, kind);
   fit.dispersion.radius_m = fit.before.radius;
   fit.dispersion.center_m = fit.before.center;
   fit.dispersion.captures = static_cast<int>(before_m.size());
 }
 
-bool all_stated(std::span<const StationCapture> captures) {
-  return std::all_of(captures.begin(), captures.end(), [](const StationCapture& capture) {
+bool all_have_sigma(std::span<const ReferencePointCapture> captures) {
+  return std::all_of(captures.begin(), captures.end(), [](const ReferencePointCapture& capture) {
     return std::all_of(capture.detections.begin(), capture.detections.end(),
                        [](const Detection& detection) { return detection.sigma_px.has_value(); });
   });
@@ -54,30 +54,30 @@ std::vector<Dispersion::UncertainLamp> make_uncertain_lamps(const LampDerivative
   return lamps;
 }
 
-void fit_paper(DispersionFit& fit, const StationFixes& station, const Eigen::Vector2d& focal_px,
-               DispersionCircle kind) {
-  const PaperOffset found = find_paper_offset(station, focal_px, kind, fit.noise_is_stated);
+void fit_chen_guan(DispersionFit& fit, const ReferencePointFixes& station,
+                   const Eigen::Vector2d& focal_px, DispersionCircle kind) {
+  const ChenGuanOffset found = find_chen_guan_offset(station, focal_px, kind, fit.noise_is_stated);
   fit.status = found.status;
   if (found.status != DispersionStatus::ok) return;
   fit.dispersion.offset_px = found.offset_px;
   fit.dispersion.covariance = found.covariance;
   fit.dispersion.by_lamps = make_uncertain_lamps(found.by_lamps, focal_px);
-  apply(fit, station, found.used, kind);
+  set_fixes(fit, station, found.used, kind);
 }
 
-void fit_camera(DispersionFit& fit, const StationFixes& station, const Eigen::Vector2d& focal_px,
-                DispersionCircle kind) {
+void fit_camera(DispersionFit& fit, const ReferencePointFixes& station,
+                const Eigen::Vector2d& focal_px, DispersionCircle kind) {
   const auto separation = separate_offsets(station);
   if (!separation) {
     fit.status = DispersionStatus::diverged;
     return;
   }
   const OptionalFixes fixes = station.at({0, 0});
-  if (typical_of(fixes, separation->used).count < 3) {
+  if (compute_mean_fix(fixes, separation->used).count < 3) {
     fit.status = DispersionStatus::too_few_captures;
     return;
   }
-  if (at_one_yaw_without_one(fixes, separation->used)) {
+  if (is_at_one_yaw_without_one(fixes, separation->used)) {
     fit.status = DispersionStatus::one_yaw;
     return;
   }
@@ -85,47 +85,47 @@ void fit_camera(DispersionFit& fit, const StationFixes& station, const Eigen::Ve
     fit.status = DispersionStatus::too_few_captures;
     return;
   }
-  const double factor =
-      compute_variance_factor(separation->excess, separation->freedom, fit.noise_is_stated);
+  const double factor = compute_variance_factor(separation->variance_factor, separation->freedom,
+                                                fit.noise_is_stated);
   fit.dispersion.offset_px = separation->offset_px;
   Matrix2 covariance = factor * separation->covariance.topLeftCorner<2, 2>();
   covariance(1, 0) = covariance(0, 1);
   fit.dispersion.covariance = covariance;
   fit.dispersion.by_lamps = make_uncertain_lamps(separation->by_lamps, focal_px);
-  const Eigen::MatrixXd world_moves_m = separation->by_lamps.compute_moves().bottomRows<2>();
+  const Eigen::MatrixXd world_changes_m = separation->by_lamps.compute_changes().bottomRows<2>();
   fit.world_offset_m = separation->world_m;
   fit.world_covariance = factor * separation->covariance.bottomRightCorner<2, 2>() +
-                         world_moves_m * world_moves_m.transpose();
-  apply(fit, station, separation->used, kind);
+                         world_changes_m * world_changes_m.transpose();
+  set_fixes(fit, station, separation->used, kind);
 }
 
 }  // namespace
 
-DispersionFit fit_dispersion(std::span<const StationCapture> captures, const LampMap& map,
+DispersionFit fit_dispersion(std::span<const ReferencePointCapture> captures, const LampMap& map,
                              const Calibration& calibration, DispersionMethod method,
                              DispersionCircle circle) {
-  const StationFixes station(captures, map, calibration);
+  const ReferencePointFixes station(captures, map, calibration);
   const OptionalFixes fixes = station.at({0, 0});
   const auto count =
       std::count_if(fixes.begin(), fixes.end(), [](const auto& fix) { return fix.has_value(); });
   DispersionFit fit;
   fit.captures_without_fix = static_cast<int>(std::ssize(fixes) - count);
-  fit.no_fix_status = station.first_refusal();
-  fit.noise_is_stated = all_stated(captures);
+  fit.no_fix_status = station.first_failure();
+  fit.noise_is_stated = all_have_sigma(captures);
   if (count == 0) return fit;
   const bool paper = method == DispersionMethod::paper;
   const std::vector<bool> all(fixes.size(), true);
-  if (far_from_all(fixes)) {
+  if (are_all_far(fixes)) {
     fit.status = DispersionStatus::station_far;
   } else if (count < (paper ? 2 : 3)) {
     fit.status = DispersionStatus::too_few_captures;
-  } else if (!paper && typical_of(fixes, all).at_one_yaw()) {
+  } else if (!paper && compute_mean_fix(fixes, all).is_at_one_yaw()) {
     fit.status = DispersionStatus::one_yaw;
   } else {
     fit.status = DispersionStatus::ok;
     const Eigen::Vector2d focal_px = calibration.camera.focal_px();
     if (paper) {
-      fit_paper(fit, station, focal_px, circle);
+      fit_chen_guan(fit, station, focal_px, circle);
     } else {
       fit_camera(fit, station, focal_px, circle);
     }
@@ -133,7 +133,7 @@ DispersionFit fit_dispersion(std::span<const StationCapture> captures, const Lam
   return fit;
 }
 
-std::string_view explanation_of(DispersionStatus status) {
+std::string_view describe(DispersionStatus status) {
   switch (status) {
     case DispersionStatus::ok:
       return "ok";

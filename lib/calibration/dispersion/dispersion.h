@@ -18,10 +18,10 @@
 namespace vlp {
 
 /// Capture at a reference point, that is, at a known position of the camera.
-struct StationCapture {
+struct ReferencePointCapture {
   std::vector<Detection> detections;
   /// Position of the camera in the world: the reference point.
-  Eigen::Vector2d station_m;
+  Eigen::Vector2d reference_point_m;
   std::optional<Inclination> inclination = {};
 };
 
@@ -51,7 +51,7 @@ enum class DispersionStatus {
 };
 
 /// Describes the status and the remedy, human-readable.
-std::string_view explanation_of(DispersionStatus status);
+std::string_view describe(DispersionStatus status);
 
 /// Result of fit_dispersion(). Members after `noise_is_stated` are valid only if the status is
 /// `ok`.
@@ -76,7 +76,7 @@ struct DispersionFit {
   Matrix2 world_covariance = Matrix2::Zero();
 
   /// Position fix of one capture.
-  struct StationFix {
+  struct ReferencePointFix {
     /// Index of the capture.
     std::size_t capture;
     /// Fix minus reference point, without any dispersion correction and with the estimated one.
@@ -84,7 +84,7 @@ struct DispersionFit {
     /// False if the fix contradicts the other fixes and is rejected.
     bool used;
   };
-  std::vector<StationFix> fixes = {};
+  std::vector<ReferencePointFix> fixes = {};
   /// Dispersion circles of the fixes that are used.
   Circle before = {{0, 0}, 0}, after = {{0, 0}, 0};
 };
@@ -98,8 +98,8 @@ struct DispersionFit {
 ///
 /// Method `paper` assumes m = 0. The center D of the circle gives offset_px = -f e^{-jg} D / H. The
 /// offset is corrected until the circle of the recomputed fixes is centered at the reference point
-/// (find_paper_offset()). These are eq. 10 to 13, with the scale f / H and the rotation by the yaw,
-/// which the paper omits.
+/// (find_chen_guan_offset()). These are eq. 10 to 13, with the scale f / H and the rotation by the
+/// yaw, which the paper omits.
 ///
 /// Method `camera` estimates offset_px = f delta and m. The fixes are recomputed with the offset as
 /// in level_from_camera(), so that the model is exact. Each fix is weighted by its covariance.
@@ -108,7 +108,7 @@ struct DispersionFit {
 /// existing dispersion of `calibration` is ignored.
 ///
 /// Source: Chen and Guan, section 3.2.
-DispersionFit fit_dispersion(std::span<const StationCapture> captures, const LampMap& map,
+DispersionFit fit_dispersion(std::span<const ReferencePointCapture> captures, const LampMap& map,
                              const Calibration& calibration, DispersionMethod method,
                              DispersionCircle circle = DispersionCircle::mean);
 

@@ -13,7 +13,7 @@
 namespace vlp {
 namespace {
 
-using Fixes = std::vector<std::optional<StationFixes::At>>;
+using Fixes = std::vector<std::optional<ReferencePointFixes::Estimate>>;
 
 /// Whitened residual of a fix and its derivative with respect to (offset_px, world_m).
 struct Equation {
@@ -24,7 +24,7 @@ struct Equation {
   Eigen::Matrix2d whitening;
 };
 
-std::vector<Equation> linearize(const StationFixes& fixes, const OffsetSeparation& at) {
+std::vector<Equation> linearize(const ReferencePointFixes& fixes, const OffsetSeparation& at) {
   constexpr double step_px =
       0.25;  // fixes are smooth over this step, which is far above their rounding
   const Eigen::Vector2d along_u(step_px, 0), along_v(0, step_px);
@@ -46,7 +46,7 @@ std::vector<Equation> linearize(const StationFixes& fixes, const OffsetSeparatio
   return equations;
 }
 
-std::vector<double> squares_of(const std::vector<Equation>& equations) {
+std::vector<double> compute_squares(const std::vector<Equation>& equations) {
   std::vector<double> squares;
   squares.reserve(equations.size());
   for (const Equation& equation : equations) squares.push_back(equation.residual.squaredNorm());
@@ -55,8 +55,9 @@ std::vector<double> squares_of(const std::vector<Equation>& equations) {
 
 /// Applies one step of weighted least squares to `at` and returns it. Returns std::nullopt if the
 /// equations do not determine it.
-std::optional<Eigen::Vector4d> step_of(const std::vector<Equation>& equations,
-                                       const std::vector<double>& weights, OffsetSeparation& at) {
+std::optional<Eigen::Vector4d> apply_step(const std::vector<Equation>& equations,
+                                          const std::vector<double>& weights,
+                                          OffsetSeparation& at) {
   Eigen::Matrix4d information = Eigen::Matrix4d::Zero();
   Eigen::Vector4d gradient = Eigen::Vector4d::Zero();
   double chi_squared = 0;
@@ -75,48 +76,49 @@ std::optional<Eigen::Vector4d> step_of(const std::vector<Equation>& equations,
   at.world_m += step.tail<2>();
   at.covariance = information.inverse();
   at.freedom = 2 * count - 4;
-  at.excess = at.freedom > 0 ? chi_squared / at.freedom : 0;
+  at.variance_factor = at.freedom > 0 ? chi_squared / at.freedom : 0;
   return step;
 }
 
 /// Returns the degrees of freedom of fixes: two rows each, minus the four unknowns.
-double freedom_of(const std::vector<double>& squares) {
+double count_degrees_of_freedom(const std::vector<double>& squares) {
   return 2 * static_cast<double>(squares.size()) - 4;
 }
 
 /// Estimates the variance per axis. Returns a value above zero, so that it can be a divisor.
-double variance_of(const std::vector<double>& squares) {
-  return std::max(robust_planar_variance(squares, freedom_of(squares)), kFixRoundingVariance);
+double estimate_variance(const std::vector<double>& squares) {
+  return std::max(robust_planar_variance(squares, count_degrees_of_freedom(squares)),
+                  kFixRoundingVariance);
 }
 
 /// Approaches the solution closely enough to recognize outliers. Returns false if the fixes do not
 /// determine it.
-bool approach(const StationFixes& fixes, OffsetSeparation& at) {
+bool approach(const ReferencePointFixes& fixes, OffsetSeparation& at) {
   constexpr int iterations = 6;
   constexpr double width_squared = 2.385 * 2.385;  // 95 % efficiency for normal noise
   for (int iteration = 0; iteration < iterations; ++iteration) {
     const auto equations = linearize(fixes, at);
     if (equations.empty()) return false;
-    std::vector<double> weights = squares_of(equations);
-    const double variance = iteration == 0 ? 0 : variance_of(weights);
+    std::vector<double> weights = compute_squares(equations);
+    const double variance = iteration == 0 ? 0 : estimate_variance(weights);
     for (double& one : weights) {
       one = iteration == 0 ? 1 : 1 / (1 + one / (width_squared * variance));
     }
-    if (!step_of(equations, weights, at)) return false;
+    if (!apply_step(equations, weights, at)) return false;
   }
   return true;
 }
 
 /// Solves by least squares without outliers. Returns true if the set of inliers differs from
 /// `at.used`, and std::nullopt if the solution does not converge.
-std::optional<bool> settle(const StationFixes& fixes, OffsetSeparation& at) {
+std::optional<bool> solve_without_outliers(const ReferencePointFixes& fixes, OffsetSeparation& at) {
   constexpr int max_iterations = 30;
-  constexpr double small_px = 1e-7, small_m = 1e-10;
+  constexpr double tolerance_px = 1e-7, tolerance_m = 1e-10;
   auto equations = linearize(fixes, at);
   if (equations.empty()) return std::nullopt;
-  const auto squares = squares_of(equations);
-  const double limit =
-      planar_outlier_bound(kFixOutlierSigmas, freedom_of(squares)) * variance_of(squares);
+  const auto squares = compute_squares(equations);
+  const double limit = planar_outlier_bound(kFixOutlierSigmas, count_degrees_of_freedom(squares)) *
+                       estimate_variance(squares);
   std::vector<bool> used(at.used.size());
   for (std::size_t i = 0; i < squares.size(); ++i) {
     used[equations[i].capture] = squares[i] <= limit;
@@ -127,9 +129,10 @@ std::optional<bool> settle(const StationFixes& fixes, OffsetSeparation& at) {
     std::vector<double> weights;
     weights.reserve(equations.size());
     for (const Equation& equation : equations) weights.push_back(at.used[equation.capture] ? 1 : 0);
-    const auto step = step_of(equations, weights, at);
+    const auto step = apply_step(equations, weights, at);
     if (!step) return std::nullopt;
-    if (step->head<2>().norm() < small_px && step->tail<2>().norm() < small_m) return changed;
+    if (step->head<2>().norm() < tolerance_px && step->tail<2>().norm() < tolerance_m)
+      return changed;
     equations = linearize(fixes, at);
   }
   return std::nullopt;
@@ -137,7 +140,7 @@ std::optional<bool> settle(const StationFixes& fixes, OffsetSeparation& at) {
 
 /// Propagates errors of the map. The solution changes by -(J'WJ)^-1 J'W d, where d are the changes
 /// of the fixes.
-LampDerivatives propagate_map(const StationFixes& fixes, const OffsetSeparation& at) {
+LampDerivatives propagate_map(const ReferencePointFixes& fixes, const OffsetSeparation& at) {
   LampDerivatives derivatives = fixes.compute_lamp_derivatives(at.offset_px);
   if (derivatives.lamps.empty()) return derivatives;
   const Eigen::MatrixXd& d_fixes = derivatives.by_positions;
@@ -153,13 +156,13 @@ LampDerivatives propagate_map(const StationFixes& fixes, const OffsetSeparation&
 
 }  // namespace
 
-std::optional<OffsetSeparation> separate_offsets(const StationFixes& fixes) {
+std::optional<OffsetSeparation> separate_offsets(const ReferencePointFixes& fixes) {
   OffsetSeparation result;
   result.used.resize(fixes.at(result.offset_px).size());
   if (!approach(fixes, result)) return std::nullopt;
-  constexpr int max_rounds = 10;
-  for (int round = 0; round < max_rounds; ++round) {
-    const auto changed = settle(fixes, result);
+  constexpr int max_iterations = 10;
+  for (int iteration = 0; iteration < max_iterations; ++iteration) {
+    const auto changed = solve_without_outliers(fixes, result);
     if (!changed) return std::nullopt;
     if (!*changed) break;
   }

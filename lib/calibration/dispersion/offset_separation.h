@@ -23,7 +23,7 @@ struct OffsetSeparation {
   /// `covariance`.
   LampDerivatives by_lamps = {};
   /// Variance factor: squared residuals divided by their expectation. It is 0 without redundancy.
-  double excess;
+  double variance_factor;
   /// Number of rows of the used fixes minus the number of unknowns.
   int freedom = 0;
   /// True for each capture whose fix is used.
@@ -36,7 +36,7 @@ struct OffsetSeparation {
 ///
 /// Returns std::nullopt if the captures do not determine the unknowns, or if the iterations do not
 /// converge.
-std::optional<OffsetSeparation> separate_offsets(const StationFixes& fixes);
+std::optional<OffsetSeparation> separate_offsets(const ReferencePointFixes& fixes);
 
 /// Number of standard deviations beyond which a fix is an outlier, for a known variance
 /// (planar_outlier_bound()).

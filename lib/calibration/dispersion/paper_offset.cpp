@@ -15,9 +15,9 @@
 namespace vlp {
 namespace {
 
-std::vector<Eigen::Vector2d> errors_at(const StationFixes& station,
-                                       const Eigen::Vector2d& offset_px,
-                                       const std::vector<bool>& used) {
+std::vector<Eigen::Vector2d> compute_errors(const ReferencePointFixes& station,
+                                            const Eigen::Vector2d& offset_px,
+                                            const std::vector<bool>& used) {
   const OptionalFixes fixes = station.at(offset_px);
   std::vector<Eigen::Vector2d> errors_m;
   for (std::size_t i = 0; i < fixes.size(); ++i) {
@@ -26,7 +26,7 @@ std::vector<Eigen::Vector2d> errors_at(const StationFixes& station,
   return errors_m;
 }
 
-Eigen::Vector2d mean_of(const std::vector<Eigen::Vector2d>& points) {
+Eigen::Vector2d compute_mean_point(const std::vector<Eigen::Vector2d>& points) {
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
   for (const auto& point : points) sum += point;
   return sum / static_cast<double>(points.size());
@@ -34,15 +34,16 @@ Eigen::Vector2d mean_of(const std::vector<Eigen::Vector2d>& points) {
 
 /// Differentiates the mean fix with respect to the offset, numerically. The result is not finite if
 /// there is no fix.
-Eigen::Matrix2d floor_from_image(const StationFixes& station, const Eigen::Vector2d& at_px,
-                                 const std::vector<bool>& used) {
+Eigen::Matrix2d differentiate_mean_fix(const ReferencePointFixes& station,
+                                       const Eigen::Vector2d& at_px,
+                                       const std::vector<bool>& used) {
   constexpr double step_px =
       0.25;  // fixes are smooth over this step, which is far above their rounding
   Eigen::Matrix2d derivative;
   for (Eigen::Index axis = 0; axis < 2; ++axis) {
     const Eigen::Vector2d step = step_px * Eigen::Vector2d::Unit(axis);
-    derivative.col(axis) = (mean_of(errors_at(station, at_px + step, used)) -
-                            mean_of(errors_at(station, at_px - step, used))) /
+    derivative.col(axis) = (compute_mean_point(compute_errors(station, at_px + step, used)) -
+                            compute_mean_point(compute_errors(station, at_px - step, used))) /
                            (2 * step_px);
   }
   return derivative;
@@ -50,8 +51,8 @@ Eigen::Matrix2d floor_from_image(const StationFixes& station, const Eigen::Vecto
 
 /// Returns the mean noise covariance of the fixes, in m^2. Returns zero if neither sigma_px nor
 /// residuals determine the noise.
-Eigen::Matrix2d noise_of_fixes(const OptionalFixes& fixes, const std::vector<bool>& used,
-                               bool noise_is_stated) {
+Eigen::Matrix2d compute_mean_noise(const OptionalFixes& fixes, const std::vector<bool>& used,
+                                   bool noise_is_stated) {
   Eigen::Matrix2d sum = Eigen::Matrix2d::Zero();
   double count = 0, squares_px2 = 0, freedom = 0;
   for (std::size_t i = 0; i < fixes.size(); ++i) {
@@ -71,10 +72,10 @@ Eigen::Matrix2d noise_of_fixes(const OptionalFixes& fixes, const std::vector<boo
 /// therefore has weight n - 1 and its isotropic mean has isotropic_weight.
 /// compute_variance_factor() scales the variance along each axis of the result, in coordinates in
 /// which the noise is the unit matrix.
-Eigen::Matrix2d covariance_of_mean(const std::vector<Eigen::Vector2d>& errors,
-                                   const Eigen::Matrix2d& noise) {
+Eigen::Matrix2d estimate_covariance_of_mean(const std::vector<Eigen::Vector2d>& errors,
+                                            const Eigen::Matrix2d& noise) {
   constexpr double isotropic_weight = 2;  // as three errors
-  const Eigen::Vector2d mean = mean_of(errors);
+  const Eigen::Vector2d mean = compute_mean_point(errors);
   Eigen::Matrix2d squares = Eigen::Matrix2d::Zero();
   for (const auto& error : errors) squares += (error - mean) * (error - mean).transpose();
   const double n = static_cast<double>(errors.size());
@@ -88,7 +89,7 @@ Eigen::Matrix2d covariance_of_mean(const std::vector<Eigen::Vector2d>& errors,
     return compute_variance_factor(1, freedom, false) * scatter / n;
   const Eigen::Matrix2d l = root.matrixL(), l_inverse = l.inverse();
   auto [values, axes] =
-      symmetric_eigen(Eigen::Matrix2d(l_inverse * scatter * l_inverse.transpose()));
+      decompose_symmetric(Eigen::Matrix2d(l_inverse * scatter * l_inverse.transpose()));
   const double ratio = (l_inverse * squares * l_inverse.transpose()).trace() / freedom;
   for (double& value : values) value = compute_variance_factor(value, freedom, true, ratio);
   return l * axes * values.asDiagonal() * axes.transpose() * l.transpose() / n;
@@ -96,7 +97,8 @@ Eigen::Matrix2d covariance_of_mean(const std::vector<Eigen::Vector2d>& errors,
 
 /// Computes the derivatives of the offset with respect to the positions of the lamps. The offset
 /// compensates the mean change of the fixes.
-LampDerivatives compute_offset_derivatives(const StationFixes& station, const PaperOffset& found,
+LampDerivatives compute_offset_derivatives(const ReferencePointFixes& station,
+                                           const ChenGuanOffset& found,
                                            const Eigen::Matrix2d& image_from_floor) {
   LampDerivatives derivatives = station.compute_lamp_derivatives(found.offset_px);
   Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(2, derivatives.by_positions.cols());
@@ -112,43 +114,46 @@ LampDerivatives compute_offset_derivatives(const StationFixes& station, const Pa
 
 }  // namespace
 
-Circle circle_of(const std::vector<Eigen::Vector2d>& points, DispersionCircle kind) {
-  if (kind == DispersionCircle::enclosing) return enclosing_circle(points);
-  Circle circle{mean_of(points), 0};
+Circle fit_dispersion_circle(const std::vector<Eigen::Vector2d>& points, DispersionCircle kind) {
+  if (kind == DispersionCircle::enclosing) return compute_enclosing_circle(points);
+  Circle circle{compute_mean_point(points), 0};
   for (const auto& point : points) {
     circle.radius = std::max(circle.radius, (point - circle.center).norm());
   }
   return circle;
 }
 
-PaperOffset find_paper_offset(const StationFixes& station, const Eigen::Vector2d& focal_px,
-                              DispersionCircle kind, bool noise_is_stated) {
+ChenGuanOffset find_chen_guan_offset(const ReferencePointFixes& station,
+                                     const Eigen::Vector2d& focal_px, DispersionCircle kind,
+                                     bool noise_is_stated) {
   const OptionalFixes fixes = station.at({0, 0});
-  const std::vector<bool> used = near_median(fixes);
-  const TypicalFix typical = typical_of(fixes, used);
-  if (!typical.at_one_yaw()) return {.status = DispersionStatus::many_yaws};
+  const std::vector<bool> used = find_near_median(fixes);
+  const MeanFix mean_fix = compute_mean_fix(fixes, used);
+  if (!mean_fix.is_at_one_yaw()) return {.status = DispersionStatus::many_yaws};
   Eigen::Matrix2d image_from_floor =
       focal_px.asDiagonal() *
-      Eigen::Matrix2d(product_matrix(typical.heading.normalized()).transpose() / typical.height_m);
-  constexpr int max_rounds = 30;
-  constexpr double settled_m = 1e-10;  // far below any noise
+      Eigen::Matrix2d(product_matrix(mean_fix.heading.normalized()).transpose() /
+                      mean_fix.height_m);
+  constexpr int max_iterations = 30;
+  constexpr double tolerance_m = 1e-10;  // far below any noise
   Eigen::Vector2d offset_px = Eigen::Vector2d::Zero();
-  for (int round = 0; round < max_rounds; ++round) {
-    const auto errors_m = errors_at(station, offset_px, used);
+  for (int iteration = 0; iteration < max_iterations; ++iteration) {
+    const auto errors_m = compute_errors(station, offset_px, used);
     if (errors_m.size() < 2) break;
-    const Eigen::Vector2d center_m = circle_of(errors_m, kind).center;
-    if (round > 0) {
-      image_from_floor = floor_from_image(station, offset_px, used).inverse();
+    const Eigen::Vector2d center_m = fit_dispersion_circle(errors_m, kind).center;
+    if (iteration > 0) {
+      image_from_floor = differentiate_mean_fix(station, offset_px, used).inverse();
       if (!image_from_floor.allFinite()) break;
     }
-    if (center_m.norm() > settled_m) {
+    if (center_m.norm() > tolerance_m) {
       offset_px -= image_from_floor * center_m;
       continue;
     }
-    PaperOffset found{.status = DispersionStatus::ok, .offset_px = offset_px, .used = used};
+    ChenGuanOffset found{.status = DispersionStatus::ok, .offset_px = offset_px, .used = used};
     if (kind == DispersionCircle::mean) {
-      const Eigen::Matrix2d noise_m2 = noise_of_fixes(station.at(offset_px), used, noise_is_stated);
-      const Eigen::Matrix2d mean_covariance_m2 = covariance_of_mean(errors_m, noise_m2);
+      const Eigen::Matrix2d noise_m2 =
+          compute_mean_noise(station.at(offset_px), used, noise_is_stated);
+      const Eigen::Matrix2d mean_covariance_m2 = estimate_covariance_of_mean(errors_m, noise_m2);
       Matrix2 covariance = image_from_floor * mean_covariance_m2 * image_from_floor.transpose();
       covariance(1, 0) = covariance(0, 1);
       found.covariance = covariance;

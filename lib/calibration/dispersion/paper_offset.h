@@ -13,10 +13,10 @@ namespace vlp {
 
 /// Returns the dispersion circle of the points.
 /// @pre there is at least one point
-Circle circle_of(const std::vector<Eigen::Vector2d>& points, DispersionCircle kind);
+Circle fit_dispersion_circle(const std::vector<Eigen::Vector2d>& points, DispersionCircle kind);
 
-/// Result of find_paper_offset(). Members other than `status` are valid only if it is `ok`.
-struct PaperOffset {
+/// Result of find_chen_guan_offset(). Members other than `status` are valid only if it is `ok`.
+struct ChenGuanOffset {
   /// Status `ok`, `many_yaws` or `diverged`.
   DispersionStatus status;
   Eigen::Vector2d offset_px = Eigen::Vector2d::Zero();
@@ -41,7 +41,8 @@ struct PaperOffset {
 /// is applied as a shift and all lamps have one height. After a rotation center of model `tilt` the
 /// offset is applied as a rotation, which moves fixes by more. The offset is therefore corrected by
 /// the remaining D until it vanishes.
-PaperOffset find_paper_offset(const StationFixes& station, const Eigen::Vector2d& focal_px,
-                              DispersionCircle kind, bool noise_is_stated);
+ChenGuanOffset find_chen_guan_offset(const ReferencePointFixes& station,
+                                     const Eigen::Vector2d& focal_px, DispersionCircle kind,
+                                     bool noise_is_stated);
 
 }  // namespace vlp

@@ -12,7 +12,7 @@ namespace vlp {
 namespace {
 
 /// Returns the mean height of the detected lamps, in the world.
-double lamps_height(const StationCapture& capture, const LampMap& map) {
+double compute_lamp_height(const ReferencePointCapture& capture, const LampMap& map) {
   double sum_m = 0;
   int count = 0;
   for (const Detection& detection : capture.detections) {
@@ -24,7 +24,7 @@ double lamps_height(const StationCapture& capture, const LampMap& map) {
   return sum_m / count;
 }
 
-Fix fix_of(const Positioner& positioner, const StationCapture& capture) {
+Fix locate_camera(const Positioner& positioner, const ReferencePointCapture& capture) {
   Sensors sensors;
   sensors.inclination = capture.inclination;
   return positioner.locate(capture.detections, sensors);
@@ -32,7 +32,7 @@ Fix fix_of(const Positioner& positioner, const StationCapture& capture) {
 
 }  // namespace
 
-Eigen::MatrixXd LampDerivatives::compute_moves() const {
+Eigen::MatrixXd LampDerivatives::compute_changes() const {
   Eigen::MatrixXd moves = by_positions;
   for (std::size_t i = 0; i < lamps.size(); ++i) {
     moves.middleCols<3>(3 * static_cast<Eigen::Index>(i)) *= *lamps[i].sd_m;
@@ -40,45 +40,46 @@ Eigen::MatrixXd LampDerivatives::compute_moves() const {
   return moves;
 }
 
-StationFixes::StationFixes(std::span<const StationCapture> captures, const LampMap& map,
-                           const Calibration& calibration)
+ReferencePointFixes::ReferencePointFixes(std::span<const ReferencePointCapture> captures,
+                                         const LampMap& map, const Calibration& calibration)
     : captures_(captures), map_(map), calibration_(calibration) {
   calibration_.dispersion.reset();
   const Positioner positioner(map_, calibration_);
-  for (const StationCapture& capture : captures_) {
-    const Fix fix = fix_of(positioner, capture);
-    if (!fix.ok() && first_refusal_ == FixStatus::ok) first_refusal_ = fix.status;
+  for (const ReferencePointCapture& capture : captures_) {
+    const Fix fix = locate_camera(positioner, capture);
+    if (!fix.ok() && first_failure_ == FixStatus::ok) first_failure_ = fix.status;
   }
 }
 
-std::vector<std::optional<StationFixes::At>> StationFixes::at(
+std::vector<std::optional<ReferencePointFixes::Estimate>> ReferencePointFixes::at(
     const Eigen::Vector2d& offset_px) const {
   return at(offset_px, map_);
 }
 
-std::vector<std::optional<StationFixes::At>> StationFixes::at(const Eigen::Vector2d& offset_px,
-                                                              const LampMap& map) const {
+std::vector<std::optional<ReferencePointFixes::Estimate>> ReferencePointFixes::at(
+    const Eigen::Vector2d& offset_px, const LampMap& map) const {
   Calibration calibration = calibration_;
   calibration.dispersion = Dispersion{offset_px, 0, {0, 0}, 1, {}};
   const Positioner positioner(map, calibration);
-  std::vector<std::optional<At>> fixes(captures_.size());
+  std::vector<std::optional<Estimate>> fixes(captures_.size());
   for (std::size_t i = 0; i < captures_.size(); ++i) {
-    const Fix fix = fix_of(positioner, captures_[i]);
+    const Fix fix = locate_camera(positioner, captures_[i]);
     if (!fix.ok()) continue;
     const Pose& pose = fix.estimate.pose;
-    fixes[i] = At{pose.position_m.head<2>() - captures_[i].station_m,
-                  fix.noise_covariance.topLeftCorner<2, 2>(),
-                  pose.yaw_rad,
-                  lamps_height(captures_[i], map) - pose.position_m.z(),
-                  fix.residual_px * fix.residual_px * fix.lamps,
-                  2 * fix.lamps - 4};
+    fixes[i] = Estimate{pose.position_m.head<2>() - captures_[i].reference_point_m,
+                        fix.noise_covariance.topLeftCorner<2, 2>(),
+                        pose.yaw_rad,
+                        compute_lamp_height(captures_[i], map) - pose.position_m.z(),
+                        fix.residual_px * fix.residual_px * fix.lamps,
+                        2 * fix.lamps - 4};
   }
   return fixes;
 }
 
-LampDerivatives StationFixes::compute_lamp_derivatives(const Eigen::Vector2d& offset_px) const {
+LampDerivatives ReferencePointFixes::compute_lamp_derivatives(
+    const Eigen::Vector2d& offset_px) const {
   std::set<int> detected;
-  for (const StationCapture& capture : captures_) {
+  for (const ReferencePointCapture& capture : captures_) {
     for (const Detection& detection : capture.detections) detected.insert(detection.lamp);
   }
   LampDerivatives derivatives;

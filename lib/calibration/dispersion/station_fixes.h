@@ -20,14 +20,14 @@ struct LampDerivatives {
 
   /// Returns the changes of the quantities for errors of one standard deviation, one column per
   /// lamp coordinate.
-  Eigen::MatrixXd compute_moves() const;
+  Eigen::MatrixXd compute_changes() const;
 };
 
 /// Position fixes of captures at a reference point, as functions of the dispersion's offset.
-class StationFixes {
+class ReferencePointFixes {
  public:
   /// Position fix of one capture for a given offset.
-  struct At {
+  struct Estimate {
     /// Fix minus reference point.
     Eigen::Vector2d error_m;
     /// Covariance from the noise of this capture alone. Errors that all captures have in common do
@@ -42,25 +42,26 @@ class StationFixes {
     int degrees_of_freedom;
   };
 
-  StationFixes(std::span<const StationCapture> captures, const LampMap& map,
-               const Calibration& calibration);
+  ReferencePointFixes(std::span<const ReferencePointCapture> captures, const LampMap& map,
+                      const Calibration& calibration);
 
   /// Returns the fix of each capture; std::nullopt for captures without a fix.
-  std::vector<std::optional<At>> at(const Eigen::Vector2d& offset_px) const;
+  std::vector<std::optional<Estimate>> at(const Eigen::Vector2d& offset_px) const;
   /// Computes the derivatives of the fixes, in m, with respect to the positions of the lamps that
   /// are detected and have an sd_m above zero. Differentiates numerically, one coordinate at a
   /// time. The result has two rows for each capture, which are zero without a fix.
   LampDerivatives compute_lamp_derivatives(const Eigen::Vector2d& offset_px) const;
   /// Returns the status of the first capture without a fix; `ok` if there is none.
-  FixStatus first_refusal() const { return first_refusal_; }
+  FixStatus first_failure() const { return first_failure_; }
 
  private:
-  std::vector<std::optional<At>> at(const Eigen::Vector2d& offset_px, const LampMap& map) const;
+  std::vector<std::optional<Estimate>> at(const Eigen::Vector2d& offset_px,
+                                          const LampMap& map) const;
 
-  std::span<const StationCapture> captures_;
+  std::span<const ReferencePointCapture> captures_;
   const LampMap& map_;
   Calibration calibration_;
-  FixStatus first_refusal_ = FixStatus::ok;
+  FixStatus first_failure_ = FixStatus::ok;
 };
 
 }  // namespace vlp

@@ -15,7 +15,7 @@
 namespace vlp {
 namespace {
 
-constexpr double kFar = 0.2;  // of the lamps' height
+constexpr double kMaxErrorFraction = 0.2;  // of the lamps' height
 
 /// Computes q of compute_variance_factor().
 double compute_student_factor(double degrees_of_freedom) {
@@ -37,41 +37,41 @@ double compute_contradiction(double ratio, double degrees_of_freedom) {
 
 }  // namespace
 
-double TypicalFix::yaw_variety() const {
+double MeanFix::yaw_variation() const {
   return std::sqrt(std::max(0.0, 1 - heading.squaredNorm()));
 }
 
-bool TypicalFix::at_one_yaw() const {
+bool MeanFix::is_at_one_yaw() const {
   constexpr double one_yaw_rad = rad_from_deg(10);
-  return yaw_variety() < std::sin(one_yaw_rad);
+  return yaw_variation() < std::sin(one_yaw_rad);
 }
 
-TypicalFix typical_of(const OptionalFixes& fixes, const std::vector<bool>& used) {
-  TypicalFix typical;
+MeanFix compute_mean_fix(const OptionalFixes& fixes, const std::vector<bool>& used) {
+  MeanFix mean_fix;
   for (std::size_t i = 0; i < fixes.size(); ++i) {
     if (!fixes[i] || !used[i]) continue;
-    typical.heading += Eigen::Vector2d(std::cos(fixes[i]->yaw_rad), std::sin(fixes[i]->yaw_rad));
-    typical.height_m += fixes[i]->height_m;
-    ++typical.count;
+    mean_fix.heading += Eigen::Vector2d(std::cos(fixes[i]->yaw_rad), std::sin(fixes[i]->yaw_rad));
+    mean_fix.height_m += fixes[i]->height_m;
+    ++mean_fix.count;
   }
-  typical.heading /= typical.count;
-  typical.height_m /= typical.count;
-  return typical;
+  mean_fix.heading /= mean_fix.count;
+  mean_fix.height_m /= mean_fix.count;
+  return mean_fix;
 }
 
-bool at_one_yaw_without_one(const OptionalFixes& fixes, std::vector<bool> used) {
+bool is_at_one_yaw_without_one(const OptionalFixes& fixes, std::vector<bool> used) {
   for (std::size_t i = 0; i < used.size(); ++i) {
     if (!fixes[i] || !used[i]) continue;
     used[i] = false;
-    if (typical_of(fixes, used).at_one_yaw()) return true;
+    if (compute_mean_fix(fixes, used).is_at_one_yaw()) return true;
     used[i] = true;
   }
   return false;
 }
 
-bool far_from_all(const OptionalFixes& fixes) {
+bool are_all_far(const OptionalFixes& fixes) {
   return std::all_of(fixes.begin(), fixes.end(), [](const auto& fix) {
-    return !fix || fix->error_m.norm() > kFar * fix->height_m;
+    return !fix || fix->error_m.norm() > kMaxErrorFraction * fix->height_m;
   });
 }
 
@@ -88,7 +88,7 @@ double compute_variance_factor(double ratio, double degrees_of_freedom, bool noi
   return factor * std::pow(std::max(1.0, from_residuals / factor), weight);
 }
 
-std::vector<bool> near_median(const OptionalFixes& fixes) {
+std::vector<bool> find_near_median(const OptionalFixes& fixes) {
   std::vector<double> x, y, squares;
   for (const auto& fix : fixes) {
     if (!fix) continue;

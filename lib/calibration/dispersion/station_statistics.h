@@ -12,10 +12,10 @@
 namespace vlp {
 
 /// Fix of each capture.
-using OptionalFixes = std::vector<std::optional<StationFixes::At>>;
+using OptionalFixes = std::vector<std::optional<ReferencePointFixes::Estimate>>;
 
 /// Means over the fixes that are used.
-struct TypicalFix {
+struct MeanFix {
   /// Mean of the unit vectors along the yaws.
   Eigen::Vector2d heading = Eigen::Vector2d::Zero();
   /// Mean height of the lamps above the camera.
@@ -24,21 +24,21 @@ struct TypicalFix {
   int count = 0;
 
   /// Returns the approximate RMS sine of the yaws relative to their mean.
-  double yaw_variety() const;
+  double yaw_variation() const;
   /// Returns true if the yaws vary by less than about 10 degrees.
-  bool at_one_yaw() const;
+  bool is_at_one_yaw() const;
 };
 
 /// Computes the means over the fixes that are used.
-TypicalFix typical_of(const OptionalFixes& fixes, const std::vector<bool>& used);
+MeanFix compute_mean_fix(const OptionalFixes& fixes, const std::vector<bool>& used);
 
 /// Returns true if the removal of a single fix leaves one yaw. One fix alone is not sufficient to
 /// separate errors of camera and world.
-bool at_one_yaw_without_one(const OptionalFixes& fixes, std::vector<bool> used);
+bool is_at_one_yaw_without_one(const OptionalFixes& fixes, std::vector<bool> used);
 
 /// Returns true if every fix is farther from the reference point than a camera tilted by 11 degrees
 /// would be.
-bool far_from_all(const OptionalFixes& fixes);
+bool are_all_far(const OptionalFixes& fixes);
 
 /// Degrees of freedom assigned to given noise: its standard deviation is accurate to 29 %, 1 /
 /// sqrt(12).
@@ -62,6 +62,6 @@ double compute_variance_factor(double ratio, double degrees_of_freedom, bool noi
 /// Returns true for each fix within five standard deviations of the median fix, for fixes at one
 /// yaw.
 /// @pre there is at least one fix
-std::vector<bool> near_median(const OptionalFixes& fixes);
+std::vector<bool> find_near_median(const OptionalFixes& fixes);
 
 }  // namespace vlp

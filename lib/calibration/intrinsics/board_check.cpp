@@ -19,19 +19,20 @@ namespace vlp {
 namespace {
 
 /// Largest edge displacement by tone curves, overexposure and blur, px.
-constexpr double kMostShift_px = 1.5;
+constexpr double kMaxShift_px = 1.5;
 
 /// Displacement from tag `from` to tag `to`, in widths of `from`: x right and y down on the board.
 struct Step {
   int from, to;
-  Eigen::Vector2d way;
+  Eigen::Vector2d displacement;
   /// Width of `from` in the image, the mean of its edges.
   double width_px;
 };
 
-std::optional<SeenTag> straightened(const SeenTag& tag, const std::optional<Lens>& lens) {
+std::optional<TagDetection> undistort_tag(const TagDetection& tag,
+                                          const std::optional<Lens>& lens) {
   if (!lens) return tag;
-  SeenTag straight = tag;
+  TagDetection straight = tag;
   for (auto& corner : straight.corners_px) {
     const auto ray = lens->unproject(corner);
     if (!ray || !(ray->direction.z() > 0)) return {};
@@ -40,7 +41,7 @@ std::optional<SeenTag> straightened(const SeenTag& tag, const std::optional<Lens
   return straight;
 }
 
-double width_of(const SeenTag& tag) {
+double compute_mean_edge_px(const TagDetection& tag) {
   double sum_px = 0;
   for (std::size_t k = 0; k < 4; ++k) {
     sum_px += (tag.corners_px[(k + 1) % 4] - tag.corners_px[k]).norm();
@@ -50,30 +51,30 @@ double width_of(const SeenTag& tag) {
 
 /// Returns the steps from every tag to its four nearest neighbors, including tags that the board
 /// does not have. `shift_px`: inward displacement of the tag edges.
-std::vector<Step> steps_in(std::span<const BoardView> views, const std::optional<Lens>& lens,
-                           double shift_px) {
+std::vector<Step> collect_steps(std::span<const BoardView> views, const std::optional<Lens>& lens,
+                                double shift_px) {
   constexpr std::size_t nearest = 4;
   std::vector<Step> steps;
   for (const BoardView& view : views) {
-    std::vector<SeenTag> tags;
+    std::vector<TagDetection> tags;
     std::vector<double> widths_px;
     for (const auto* seen : {&view.seen.tags, &view.seen.foreign}) {
-      for (const SeenTag& tag : *seen) {
-        const auto straight = straightened(tag, lens);
+      for (const TagDetection& tag : *seen) {
+        const auto straight = undistort_tag(tag, lens);
         if (!straight) continue;
         tags.push_back(*straight);
-        widths_px.push_back(width_of(tag));
+        widths_px.push_back(compute_mean_edge_px(tag));
       }
     }
     for (std::size_t i = 0; i < tags.size(); ++i) {
-      const SeenTag& tag = tags[i];
+      const TagDetection& tag = tags[i];
       const std::array<PlanePair, 4> square{{{tag.corners_px[0], {-0.5, 0.5}},
                                              {tag.corners_px[1], {0.5, 0.5}},
                                              {tag.corners_px[2], {0.5, -0.5}},
                                              {tag.corners_px[3], {-0.5, -0.5}}}};
-      const Eigen::Matrix3d tags_from_image = homography(square);
+      const Eigen::Matrix3d tags_from_image = estimate_homography(square);
       std::vector<Step> around;
-      for (const SeenTag& other : tags) {
+      for (const TagDetection& other : tags) {
         if (other.id == tag.id) continue;
         Eigen::Vector2d middle = Eigen::Vector2d::Zero();
         for (const auto& corner : other.corners_px) {
@@ -82,8 +83,9 @@ std::vector<Step> steps_in(std::span<const BoardView> views, const std::optional
         const double width_px = widths_px[i] + 2 * shift_px;
         around.push_back({tag.id, other.id, middle * (widths_px[i] / width_px), width_px});
       }
-      std::sort(around.begin(), around.end(),
-                [](const Step& a, const Step& b) { return a.way.norm() < b.way.norm(); });
+      std::sort(around.begin(), around.end(), [](const Step& a, const Step& b) {
+        return a.displacement.norm() < b.displacement.norm();
+      });
       around.resize(std::min(around.size(), nearest));
       steps.insert(steps.end(), around.begin(), around.end());
     }
@@ -92,10 +94,10 @@ std::vector<Step> steps_in(std::span<const BoardView> views, const std::optional
 }
 
 /// Agreement of steps with a layout.
-struct Fit {
+struct LayoutFit {
   /// Fraction of the steps between tags of the layout that agree with the layout.
-  double share = 0;
-  std::size_t counted = 0;
+  double fraction = 0;
+  std::size_t num_counted = 0;
   std::optional<double> pitch;
   /// Line fitted to the distances between tags, px, over the widths of the tags:
   ///   distance = pitch (width + 2 shift_px),
@@ -107,75 +109,78 @@ struct Fit {
   std::optional<Line> line;
 };
 
-std::optional<Fit::Line> line_through(const std::vector<Eigen::Vector2d>& widths_and_ways) {
-  constexpr std::size_t least = 20;
-  const auto count = static_cast<double>(widths_and_ways.size());
-  if (widths_and_ways.size() < least) return {};
+std::optional<LayoutFit::Line> fit_pitch_line(
+    const std::vector<Eigen::Vector2d>& widths_and_distances) {
+  constexpr std::size_t minimum = 20;
+  const auto count = static_cast<double>(widths_and_distances.size());
+  if (widths_and_distances.size() < minimum) return {};
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
-  for (const auto& each : widths_and_ways) mean += each / count;
+  for (const auto& each : widths_and_distances) mean += each / count;
   Eigen::Matrix2d moments = Eigen::Matrix2d::Zero();
-  for (const auto& each : widths_and_ways) moments += (each - mean) * (each - mean).transpose();
+  for (const auto& each : widths_and_distances)
+    moments += (each - mean) * (each - mean).transpose();
   if (!(moments(0, 0) > 0)) return {};
   const double slope = moments(0, 1) / moments(0, 0);
-  const double rest = std::max(0.0, moments(1, 1) - slope * moments(0, 1));
-  return Fit::Line{slope, std::sqrt(rest / (count - 2) / moments(0, 0)),
-                   (mean.y() / slope - mean.x()) / 2};
+  const double residual = std::max(0.0, moments(1, 1) - slope * moments(0, 1));
+  return LayoutFit::Line{slope, std::sqrt(residual / (count - 2) / moments(0, 0)),
+                         (mean.y() / slope - mean.x()) / 2};
 }
 
-Fit fit_of(const Board& board, const std::vector<Step>& steps) {
+LayoutFit fit_layout(const Board& board, const std::vector<Step>& steps) {
   constexpr double straight = 0.25;       // off the way, of its length
   std::map<int, Eigen::Vector2d> places;  // in pitches
-  for (const BoardTag& tag : board_layout(board)) {
-    places[tag.id] = tag.corners_m[3] / tag_pitch_m(board);
+  for (const BoardTag& tag : compute_board_layout(board)) {
+    places[tag.id] = tag.corners_m[3] / compute_tag_pitch_m(board);
   }
   std::vector<double> pitches;
-  std::vector<Eigen::Vector2d> widths_and_ways;
-  std::size_t counted = 0;
+  std::vector<Eigen::Vector2d> widths_and_distances;
+  std::size_t num_counted = 0;
   for (const Step& step : steps) {
     const auto from = places.find(step.from), to = places.find(step.to);
     if (from == places.end() || to == places.end()) continue;
-    ++counted;
+    ++num_counted;
     const Eigen::Vector2d expected = to->second - from->second;
-    const double pitch = step.way.dot(expected) / expected.squaredNorm();
+    const double pitch = step.displacement.dot(expected) / expected.squaredNorm();
     if (expected.norm() < 2.1 &&
-        (step.way - pitch * expected).norm() < straight * step.way.norm() && pitch > 0) {
+        (step.displacement - pitch * expected).norm() < straight * step.displacement.norm() &&
+        pitch > 0) {
       pitches.push_back(pitch);
-      widths_and_ways.emplace_back(step.width_px, pitch * step.width_px);
+      widths_and_distances.emplace_back(step.width_px, pitch * step.width_px);
     }
   }
-  Fit fit;
+  LayoutFit fit;
   if (pitches.empty()) return fit;
-  fit.counted = counted;
-  fit.share = static_cast<double>(pitches.size()) / static_cast<double>(counted);
+  fit.num_counted = num_counted;
+  fit.fraction = static_cast<double>(pitches.size()) / static_cast<double>(num_counted);
   const auto middle = pitches.begin() + static_cast<std::ptrdiff_t>(pitches.size() / 2);
   std::nth_element(pitches.begin(), middle, pitches.end());
   fit.pitch = *middle;
-  std::erase_if(widths_and_ways, [&](const Eigen::Vector2d& each) {
-    constexpr double alike = 0.15;
-    return std::abs(each.y() / each.x() / *fit.pitch - 1) > alike;
+  std::erase_if(widths_and_distances, [&](const Eigen::Vector2d& each) {
+    constexpr double max_deviation = 0.15;
+    return std::abs(each.y() / each.x() / *fit.pitch - 1) > max_deviation;
   });
-  fit.line = line_through(widths_and_ways);
+  fit.line = fit_pitch_line(widths_and_distances);
   return fit;
 }
 
 /// Returns the increment of the id from a tag to the tag right of it (axis 0) or below it (axis 1),
 /// by a majority of the neighbors; 0 without a majority.
-int growth_along(int axis, const std::vector<Step>& steps) {
-  constexpr double aside = 0.35, most = 0.5;
-  constexpr int least_votes = 4;
+int estimate_id_increment(int axis, const std::vector<Step>& steps) {
+  constexpr double aside = 0.35, limit = 0.5;
+  constexpr int min_votes = 4;
   // The adjacent tags are the shortest steps along the axis, from each tag.
   std::map<int, int> votes;
   int all = 0;
   for (std::size_t i = 0; i < steps.size();) {
     std::size_t end = i;
     while (end < steps.size() && steps[end].from == steps[i].from &&
-           (end == i || steps[end].way.norm() >= steps[end - 1].way.norm())) {
+           (end == i || steps[end].displacement.norm() >= steps[end - 1].displacement.norm())) {
       ++end;
     }
     for (const double sign : {1.0, -1.0}) {
       for (std::size_t k = i; k < end; ++k) {
-        const double along = sign * steps[k].way[axis];
-        if (along < 0 || std::abs(steps[k].way[1 - axis]) > aside * along) continue;
+        const double along = sign * steps[k].displacement[axis];
+        if (along < 0 || std::abs(steps[k].displacement[1 - axis]) > aside * along) continue;
         ++votes[static_cast<int>(sign) * (steps[k].to - steps[k].from)];
         ++all;
         break;  // nearest first
@@ -183,21 +188,21 @@ int growth_along(int axis, const std::vector<Step>& steps) {
     }
     i = end;
   }
-  for (const auto& [growth, count] : votes) {
-    if (count >= least_votes && count > most * all) return growth;
+  for (const auto& [increment, count] : votes) {
+    if (count >= min_votes && count > limit * all) return increment;
   }
   return 0;
 }
 
 /// Returns the layout that explains the steps; std::nullopt if none does. Ids that increase by one
 /// along rows increase by the number of columns from row to row, and vice versa.
-std::optional<Board> layout_shown(Board board, const std::vector<Step>& steps) {
-  constexpr double enough = 0.8;
-  constexpr int most_tags = 1000;
-  const int right = growth_along(0, steps), down = growth_along(1, steps);
+std::optional<Board> find_layout(Board board, const std::vector<Step>& steps) {
+  constexpr double min_fraction = 0.8;
+  constexpr int max_tags = 1000;
+  const int right = estimate_id_increment(0, steps), down = estimate_id_increment(1, steps);
   const bool column_major = std::abs(down) == 1 && std::abs(right) != 1;
   const int line = std::abs(column_major ? right : down);  // tags in a row, or in a column
-  if (std::abs(column_major ? down : right) != 1 || line < 1 || line > most_tags) return {};
+  if (std::abs(column_major ? down : right) != 1 || line < 1 || line > max_tags) return {};
   board.id_order = {column_major,
                     right > 0 ? (down > 0 ? BoardCorner::top_left : BoardCorner::bottom_left)
                               : (down > 0 ? BoardCorner::top_right : BoardCorner::bottom_right)};
@@ -210,65 +215,65 @@ std::optional<Board> layout_shown(Board board, const std::vector<Step>& steps) {
   }
   std::erase_if(votes, [](const auto& vote) { return vote.second < 2; });
   if (votes.empty()) return {};
-  const int least = votes.begin()->first, largest = votes.rbegin()->first;
+  const int minimum = votes.begin()->first, largest = votes.rbegin()->first;
   const int stated = column_major ? board.cols : board.rows;
   std::optional<Board> best;
-  double best_share = 0;
+  double best_fraction = 0;
   // No step crosses the position at which a line of ids begins.
   const auto try_first = [&](int first) {
     if (first < 0) return;
-    Board tried = board;
-    tried.first_id = first;
+    Board candidate = board;
+    candidate.first_id = first;
     const int lines = (largest - first) / line + 1;
-    (column_major ? tried.rows : tried.cols) = line;
-    (column_major ? tried.cols : tried.rows) =
+    (column_major ? candidate.rows : candidate.cols) = line;
+    (column_major ? candidate.cols : candidate.rows) =
         line == (column_major ? board.rows : board.cols) && first == board.first_id
             ? std::max(lines, stated)
             : lines;
-    if (tried.cols > most_tags || tried.rows > most_tags) return;
-    const double share = fit_of(tried, steps).share;
-    if (share < enough || share <= best_share) return;
-    best = tried;
-    best_share = share;
+    if (candidate.cols > max_tags || candidate.rows > max_tags) return;
+    const double fraction = fit_layout(candidate, steps).fraction;
+    if (fraction < min_fraction || fraction <= best_fraction) return;
+    best = candidate;
+    best_fraction = fraction;
   };
-  if (board.first_id <= least) try_first(board.first_id);
-  for (int first = least; best_share < 1 && first > least - line; --first) try_first(first);
+  if (board.first_id <= minimum) try_first(board.first_id);
+  for (int first = minimum; best_fraction < 1 && first > minimum - line; --first) try_first(first);
   return best;
 }
 
-std::string layout_problem(const Board& board, const std::vector<Step>& steps) {
-  constexpr double enough = 0.8;
+std::string describe_layout_problem(const Board& board, const std::vector<Step>& steps) {
+  constexpr double min_fraction = 0.8;
   std::vector<Step> known;
   const int last_id = board.first_id + board.cols * board.rows - 1;
   const auto has = [&](int id) { return id >= board.first_id && id <= last_id; };
   std::copy_if(steps.begin(), steps.end(), std::back_inserter(known),
                [&](const Step& step) { return has(step.from) && has(step.to); });
-  const bool fits = known.empty() || fit_of(board, known).share >= enough;
-  const auto shown = layout_shown(board, steps);
+  const bool fits = known.empty() || fit_layout(board, known).fraction >= min_fraction;
+  const auto found = find_layout(board, steps);
   if (fits && !known.empty()) {
     // Unknown tags may belong to another board next to this one, unless they continue its layout.
     std::vector<Step> across;
     std::copy_if(steps.begin(), steps.end(), std::back_inserter(across),
                  [&](const Step& step) { return has(step.from) != has(step.to); });
     constexpr std::size_t few = 10;
-    if (!shown || across.size() < few || fit_of(*shown, across).counted < across.size() ||
-        fit_of(*shown, across).share < enough) {
+    if (!found || across.size() < few || fit_layout(*found, across).num_counted < across.size() ||
+        fit_layout(*found, across).fraction < min_fraction) {
       return "";
     }
   }
-  if (shown && shown->cols == board.cols && shown->rows == board.rows &&
-      shown->first_id == board.first_id && shown->id_order.from == board.id_order.from &&
-      shown->id_order.column_major == board.id_order.column_major) {
+  if (found && found->cols == board.cols && found->rows == board.rows &&
+      found->first_id == board.first_id && found->id_order.from == board.id_order.from &&
+      found->id_order.column_major == board.id_order.column_major) {
     return "";
   }
-  if (shown) {
-    std::string words = "the images show cols " + std::to_string(shown->cols);
-    words.append(", rows ").append(std::to_string(shown->rows));
-    words.append(", id_order ").append(name_of(shown->id_order));
-    if (shown->first_id != board.first_id) {
-      words.append(", first_id ").append(std::to_string(shown->first_id));
+  if (found) {
+    std::string text = "the images show cols " + std::to_string(found->cols);
+    text.append(", rows ").append(std::to_string(found->rows));
+    text.append(", id_order ").append(to_string(found->id_order));
+    if (found->first_id != board.first_id) {
+      text.append(", first_id ").append(std::to_string(found->first_id));
     }
-    return words;
+    return text;
   }
   if (fits) return "";
   return "the tags in the images do not lie as on a board of " + std::to_string(board.cols) +
@@ -278,10 +283,10 @@ std::string layout_problem(const Board& board, const std::vector<Step>& steps) {
 
 /// Returns true if the pitch agrees with `expected` from board.yaml, directly or with edges
 /// displaced by tone curves, overexposure and blur.
-bool gap_agrees(const Fit& fit, double expected, double tolerance) {
+bool is_pitch_consistent(const LayoutFit& fit, double expected, double tolerance) {
   constexpr double sigmas = 3;
   if (std::abs(*fit.pitch / expected - 1) <= tolerance) return true;
-  return fit.line && std::abs(fit.line->shift_px) <= kMostShift_px &&
+  return fit.line && std::abs(fit.line->shift_px) <= kMaxShift_px &&
          std::abs(fit.line->pitch / expected - 1) <=
              tolerance + sigmas * fit.line->pitch_sd / expected &&
          sigmas * fit.line->pitch_sd / expected <= tolerance;
@@ -289,36 +294,36 @@ bool gap_agrees(const Fit& fit, double expected, double tolerance) {
 
 /// Describes a ChArUco board with another number of squares, or another color of the first square,
 /// that explains the steps better than `board`; empty if `board` agrees.
-std::string charuco_problem(const Board& board, const std::vector<Step>& steps) {
-  constexpr double enough = 0.8;
-  constexpr int least = 4, most = 60;
-  const Fit stated = fit_of(board, steps);
+std::string describe_charuco_problem(const Board& board, const std::vector<Step>& steps) {
+  constexpr double min_fraction = 0.8;
+  constexpr int minimum = 4, limit = 60;
+  const LayoutFit stated = fit_layout(board, steps);
   // Unknown markers may belong to another board next to this one.
-  if (stated.share >= enough && 2 * stated.counted > steps.size()) return "";
+  if (stated.fraction >= min_fraction && 2 * stated.num_counted > steps.size()) return "";
   int largest = 0;
   for (const Step& step : steps) largest = std::max({largest, step.from, step.to});
   std::optional<Board> best;
-  double best_share = 0;
+  double best_fraction = 0;
   for (const bool white : {board.top_left_white, !board.top_left_white}) {
-    for (int cols = least; cols <= most; ++cols) {
-      Board tried = board;
-      tried.cols = cols;
-      tried.top_left_white = white;
+    for (int cols = minimum; cols <= limit; ++cols) {
+      Board candidate = board;
+      candidate.cols = cols;
+      candidate.top_left_white = white;
       // The number of rows that the markers need, or that of board.yaml if it is larger.
       const int markers = largest - board.first_id + 1;
-      tried.rows = std::max(least, (2 * markers + cols - 1) / cols);
-      if (tried.rows > most) continue;
-      if (cols == board.cols) tried.rows = std::max(tried.rows, board.rows);
-      const Fit fit = fit_of(tried, steps);
-      const double share =
-          fit.share * static_cast<double>(fit.counted) / static_cast<double>(steps.size());
-      if (share < enough || share <= best_share) continue;
-      best_share = share;
-      best = tried;
+      candidate.rows = std::max(minimum, (2 * markers + cols - 1) / cols);
+      if (candidate.rows > limit) continue;
+      if (cols == board.cols) candidate.rows = std::max(candidate.rows, board.rows);
+      const LayoutFit fit = fit_layout(candidate, steps);
+      const double fraction =
+          fit.fraction * static_cast<double>(fit.num_counted) / static_cast<double>(steps.size());
+      if (fraction < min_fraction || fraction <= best_fraction) continue;
+      best_fraction = fraction;
+      best = candidate;
     }
   }
   if (!best) {
-    if (stated.share >= enough) return "";
+    if (stated.fraction >= min_fraction) return "";
     return "the markers in the images do not lie as on a ChArUco board of " +
            std::to_string(board.cols) + " x " + std::to_string(board.rows) + " squares from id " +
            std::to_string(board.first_id) + "; is it another board?";
@@ -328,7 +333,7 @@ std::string charuco_problem(const Board& board, const std::vector<Step>& steps) 
 }
 
 BoardCheck check_charuco(const Board& board, const std::vector<Step>& steps) {
-  BoardCheck check{charuco_problem(board, steps), fit_of(board, steps).pitch};
+  BoardCheck check{describe_charuco_problem(board, steps), fit_layout(board, steps).pitch};
   if (!check.problem.empty() || !check.pitch) return check;
   // The outlines of markers are accurate to one or two pixels.
   constexpr double tolerance = 0.15, hundreds = 100;
@@ -345,16 +350,16 @@ BoardCheck check_charuco(const Board& board, const std::vector<Step>& steps) {
 BoardCheck check_board(const Board& board, std::span<const BoardView> views,
                        const std::optional<Lens>& lens, double shift_px) {
   // A larger displacement is caused by another spacing, not by a tone curve.
-  const auto steps = steps_in(views, lens, std::clamp(shift_px, -kMostShift_px, kMostShift_px));
-  constexpr std::size_t least_steps = 10;
-  if (steps.size() < least_steps) return {};
+  const auto steps = collect_steps(views, lens, std::clamp(shift_px, -kMaxShift_px, kMaxShift_px));
+  constexpr std::size_t min_steps = 10;
+  if (steps.size() < min_steps) return {};
   if (board.has_squares()) return check_charuco(board, steps);
-  BoardCheck check{layout_problem(board, steps), {}};
-  const Fit fit = fit_of(board, steps);
+  BoardCheck check{describe_layout_problem(board, steps), {}};
+  const LayoutFit fit = fit_layout(board, steps);
   check.pitch = fit.pitch;
   if (!check.problem.empty() || !fit.pitch) return check;
   const double tolerance = lens ? 0.01 : 0.05;
-  if (!gap_agrees(fit, 1 + board.tag_spacing, tolerance)) {
+  if (!is_pitch_consistent(fit, 1 + board.tag_spacing, tolerance)) {
     const double hundreds = 100;
     const double seen = std::round((*fit.pitch - 1) * hundreds) / hundreds;
     check.problem = "tag_spacing is " + shortest(board.tag_spacing) +

@@ -33,7 +33,7 @@ class BoardLattice {
     return static_cast<std::size_t>(cols_) * static_cast<std::size_t>(rows_);
   }
   /// Ratio of the warp of the whole board to that of a part, along x and y; a part is smaller.
-  const Eigen::Vector2d& warp_of_board() const { return warp_of_board_; }
+  const Eigen::Vector2d& board_warp_ratio() const { return board_warp_ratio_; }
 
   /// Corner of the board and its measurement in a view.
   struct Corner {
@@ -47,51 +47,51 @@ class BoardLattice {
     /// Factor by which the residual is multiplied.
     double weight = 1;
     /// Curvature of the tag's edge from this corner to the tag's next corner.
-    EdgeBow bow = {};
-    /// Standard deviation from pixel noise (SeenTag::Deviations), px; 0 if unknown.
+    EdgeCurvature bow = {};
+    /// Standard deviation from pixel noise (TagDetection::Deviations), px; 0 if unknown.
     double sd_px = 0;
   };
   /// Returns all corners of a detection on a flat board, in the order of `seen`: its points, or
   /// four corners of each tag.
-  std::vector<Corner> corners(const SeenBoard& seen) const;
-  /// Returns the SeenPoint::index of a point: part by part, row by row.
-  std::size_t index_of(std::size_t part, std::size_t point) const {
+  std::vector<Corner> corners(const BoardDetection& seen) const;
+  /// Returns the PointDetection::index of a point: part by part, row by row.
+  std::size_t point_index(std::size_t part, std::size_t point) const {
     return part * points() + point;
   }
   /// Returns the index of the tag of a point. The corners of a tag share its edges and therefore
   /// have correlated errors. On a board of squares each point is a group of its own.
-  std::size_t tag_of(std::size_t point) const {
-    if (squares_ || parts_ > 1) return point;
+  std::size_t tag_index(std::size_t point) const {
+    if (has_squares_ || parts_ > 1) return point;
     const auto cols = static_cast<std::size_t>(cols_);
     return point / cols / 2 * (cols / 2) + point % cols / 2;
   }
   /// Returns the corners of a board whose parts have the warp `warp_of_part_m`, along x and y.
-  std::vector<Corner> bent(std::vector<Corner> corners,
-                           const Eigen::Vector2d& warp_of_part_m) const;
+  std::vector<Corner> with_warp(std::vector<Corner> corners,
+                                const Eigen::Vector2d& warp_of_part_m) const;
 
   /// Computes the pose of a part from that of the board.
-  BoardPose pose_of_part(const BoardPose& camera_from_board, std::size_t part) const;
+  BoardPose compute_part_pose(const BoardPose& camera_from_board, std::size_t part) const;
   /// Returns true if the corners determine the pose of every part:
   /// - points: at least 12 of a board in one part, 6 in each of four parts, or all points of a
   ///   smaller board; at least two points in each of two rows
   /// - tags: at least 3 of a board in one part; at least 6 of a board in four parts, in at least
   ///   two columns and two rows
-  bool enough(const SeenBoard& seen) const;
+  bool sufficient(const BoardDetection& seen) const;
 
  private:
-  bool enough_points(const std::vector<SeenPoint>& seen) const;
-  struct Place {
+  bool has_sufficient_points(const std::vector<PointDetection>& seen) const;
+  struct TagPosition {
     int col, row;
     std::array<Eigen::Vector2d, 4> corners_m;
   };
-  std::map<int, Place> places_;
-  bool squares_, touching_;
+  std::map<int, TagPosition> tag_positions_;
+  bool has_squares_, is_touching_;
   std::size_t parts_;
   int cols_, rows_;
   double spacing_m_;
   /// Origin of each part in the board frame, m.
   std::array<Eigen::Vector2d, 4> origins_m_;
-  Eigen::Vector2d warp_of_board_, field_m_;
+  Eigen::Vector2d board_warp_ratio_, field_m_;
 };
 
 }  // namespace vlp

@@ -16,15 +16,15 @@ namespace vlp {
 namespace {
 
 /// Returns the points of a board in the order of BoardProblem, row by row.
-std::vector<Eigen::Vector3d> points_of_board(const BoardProblem& problem) {
+std::vector<Eigen::Vector3d> make_board_points(const BoardProblem& problem) {
   std::vector<Eigen::Vector3d> points;
-  points.reserve(problem.points_of_a_board());
+  points.reserve(problem.points_per_board());
   for (int j = 0; j < problem.rows; ++j) {
     for (int i = 0; i < problem.cols; ++i) {
-      const Eigen::Array2d share(2.0 * i / (problem.cols - 1) - 1,
-                                 2.0 * j / (problem.rows - 1) - 1);
+      const Eigen::Array2d normalized_position(2.0 * i / (problem.cols - 1) - 1,
+                                               2.0 * j / (problem.rows - 1) - 1);
       points.emplace_back(i * problem.spacing_m, j * problem.spacing_m,
-                          problem.warp_m.dot((1 - share.square()).matrix()));
+                          problem.warp_m.dot((1 - normalized_position.square()).matrix()));
     }
   }
   return points;
@@ -37,27 +37,27 @@ std::optional<PrintEffect> compute_print_effect(const IntrinsicsSolution& soluti
   const double aspect_error = std::numbers::sqrt2 * print_sd;
   const Lens lens = solution.lens();
   BoardProblem problem = solution.problem;
-  const std::vector<Eigen::Vector3d> points = points_of_board(problem);
+  const std::vector<Eigen::Vector3d> points = make_board_points(problem);
   for (std::size_t pose = 0; pose < problem.poses.size(); ++pose) {
-    const Eigen::Vector3d& turn = problem.poses[pose].rotation;
-    const Eigen::AngleAxisd rotation(turn.norm(), turn.normalized());
+    const Eigen::Vector3d& rotation_vector = problem.poses[pose].rotation;
+    const Eigen::AngleAxisd rotation(rotation_vector.norm(), rotation_vector.normalized());
     for (std::size_t i = 0; i < points.size(); ++i) {
-      Eigen::Vector3d& seen = problem.points[pose * points.size() + i];
-      if (seen.z() < 0) continue;
+      Eigen::Vector3d& measured = problem.points[pose * points.size() + i];
+      if (measured.z() < 0) continue;
       const Eigen::Vector3d in_camera = rotation * points[i] + problem.poses[pose].translation_m;
       const Eigen::Vector3d along = rotation * Eigen::Vector3d::UnitX();
       const auto stated = lens.project(in_camera);
       const auto printed = lens.project(in_camera + aspect_error * points[i].x() * along);
       if (!stated || !printed) return {};
-      seen.head<2>() += *stated - *printed;
+      measured.head<2>() += *stated - *printed;
     }
   }
   if (!solve_for_lens(problem, solution.solved_for)) return {};
   const Lens printed(problem.lens_model, problem.intrinsics);
-  const auto everywhere = projection_difference(lens, printed, problem.imager_px,
-                                                [](const Eigen::Vector2d&) { return 1.0; });
-  const auto in_region =
-      projection_difference(lens, printed, problem.imager_px, [&](const Eigen::Vector2d& pixel) {
+  const auto everywhere = compute_projection_difference(lens, printed, problem.imager_px,
+                                                        [](const Eigen::Vector2d&) { return 1.0; });
+  const auto in_region = compute_projection_difference(
+      lens, printed, problem.imager_px, [&](const Eigen::Vector2d& pixel) {
         return region.empty() || polygon_contains(region, pixel)
                    ? 1.0
                    : std::numeric_limits<double>::infinity();

@@ -21,17 +21,17 @@ namespace {
 /// Projection of a lattice point and its derivatives with respect to lens, pose and warp.
 struct PointProjection {
   Eigen::Vector2d pixel;
-  Lens::Projection by_lens;
-  Eigen::Matrix<double, 2, 6> by_pose;
-  Eigen::Matrix2d by_warp;
+  Lens::Projection projection;
+  Eigen::Matrix<double, 2, 6> d_pixel_d_pose;
+  Eigen::Matrix2d d_pixel_d_warp;
 };
 
 /// Point of the lattice, m, and the derivative of its z coordinate with respect to the warp.
 struct LatticePoint {
-  Eigen::Vector2d in_board_m, lift;
+  Eigen::Vector2d in_board_m, d_z_d_warp;
 };
 
-LatticePoint lattice_point(const BoardProblem& problem, std::size_t index) {
+LatticePoint make_lattice_point(const BoardProblem& problem, std::size_t index) {
   const auto cols = static_cast<std::size_t>(problem.cols);
   const std::size_t col = index % cols, row = index / cols;
   const Eigen::Array2d node(static_cast<double>(col), static_cast<double>(row));
@@ -39,19 +39,20 @@ LatticePoint lattice_point(const BoardProblem& problem, std::size_t index) {
   return {problem.spacing_m * node.matrix(), (1 - (2 * node / last - 1).square()).matrix()};
 }
 
-std::optional<PointProjection> projected(const Lens& lens, const LatticePoint& point,
-                                         const Eigen::Matrix3d& rotation,
-                                         const Eigen::Matrix3d& left, const BoardPose& pose,
-                                         const Eigen::Vector2d& warp_m) {
+std::optional<PointProjection> project_point(const Lens& lens, const LatticePoint& point,
+                                             const Eigen::Matrix3d& rotation,
+                                             const Eigen::Matrix3d& left, const BoardPose& pose,
+                                             const Eigen::Vector2d& warp_m) {
   Eigen::Vector3d in_board;
-  in_board << point.in_board_m, warp_m.dot(point.lift);
-  const Eigen::Vector3d turned = rotation * in_board;
-  const auto by_lens = lens.project_with_jacobians(turned + pose.translation_m);
-  if (!by_lens) return {};
-  PointProjection result{by_lens->pixel, *by_lens, {}, {}};
-  result.by_pose << -by_lens->d_pixel_d_point * cross_matrix(turned) * left,
-      by_lens->d_pixel_d_point;
-  result.by_warp = by_lens->d_pixel_d_point * rotation.col(2) * point.lift.transpose();
+  in_board << point.in_board_m, warp_m.dot(point.d_z_d_warp);
+  const Eigen::Vector3d rotated = rotation * in_board;
+  const auto projection = lens.project_with_jacobians(rotated + pose.translation_m);
+  if (!projection) return {};
+  PointProjection result{projection->pixel, *projection, {}, {}};
+  result.d_pixel_d_pose << -projection->d_pixel_d_point * cross_matrix(rotated) * left,
+      projection->d_pixel_d_point;
+  result.d_pixel_d_warp =
+      projection->d_pixel_d_point * rotation.col(2) * point.d_z_d_warp.transpose();
   return result;
 }
 
@@ -60,14 +61,14 @@ std::optional<PointProjection> projected(const Lens& lens, const LatticePoint& p
 class BoardCost : public ceres::CostFunction {
  public:
   BoardCost(const BoardProblem& problem, std::size_t pose) : problem_(problem) {
-    const std::size_t count = problem.points_of_a_board();
+    const std::size_t count = problem.points_per_board();
     for (std::size_t i = 0; i < count; ++i) {
-      if (problem.points[pose * count + i].z() > 0) seen_.push_back(pose * count + i);
+      if (problem.points[pose * count + i].z() > 0) inliers_.push_back(pose * count + i);
     }
     mutable_parameter_block_sizes()->push_back(static_cast<int>(problem.intrinsics.size()));
     mutable_parameter_block_sizes()->push_back(6);
     mutable_parameter_block_sizes()->push_back(2);
-    set_num_residuals(static_cast<int>(2 * seen_.size()));
+    set_num_residuals(static_cast<int>(2 * inliers_.size()));
   }
 
   bool Evaluate(double const* const* parameters, double* residuals,
@@ -84,27 +85,27 @@ class BoardCost : public ceres::CostFunction {
                           left = left_jacobian(pose.rotation);
     const Eigen::Vector2d warp_m(parameters[2]);
     const auto columns = static_cast<Eigen::Index>(intrinsics.size());
-    const std::size_t count = problem_.points_of_a_board();
+    const std::size_t count = problem_.points_per_board();
     using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-    for (std::size_t k = 0; k < seen_.size(); ++k) {
-      const auto point =
-          projected(lens, lattice_point(problem_, seen_[k] % count), rotation, left, pose, warp_m);
+    for (std::size_t k = 0; k < inliers_.size(); ++k) {
+      const auto point = project_point(lens, make_lattice_point(problem_, inliers_[k] % count),
+                                       rotation, left, pose, warp_m);
       if (!point) return false;
       const auto row = static_cast<Eigen::Index>(2 * k);
-      const double weight = problem_.points[seen_[k]].z();
+      const double weight = problem_.points[inliers_[k]].z();
       Eigen::Map<Eigen::Vector2d>(residuals + row) =
-          weight * (point->pixel - problem_.points[seen_[k]].head<2>());
+          weight * (point->pixel - problem_.points[inliers_[k]].head<2>());
       if (jacobians == nullptr) continue;
-      const auto rows = static_cast<Eigen::Index>(2 * seen_.size());
+      const auto rows = static_cast<Eigen::Index>(2 * inliers_.size());
       if (jacobians[0] != nullptr) {
         Eigen::Map<Rows>(jacobians[0], rows, columns).middleRows<2>(row) =
-            weight * point->by_lens.d_pixel_d_parameters;
+            weight * point->projection.d_pixel_d_parameters;
       }
       if (jacobians[1] != nullptr) {
-        Eigen::Map<Rows>(jacobians[1], rows, 6).middleRows<2>(row) = weight * point->by_pose;
+        Eigen::Map<Rows>(jacobians[1], rows, 6).middleRows<2>(row) = weight * point->d_pixel_d_pose;
       }
       if (jacobians[2] != nullptr) {
-        Eigen::Map<Rows>(jacobians[2], rows, 2).middleRows<2>(row) = weight * point->by_warp;
+        Eigen::Map<Rows>(jacobians[2], rows, 2).middleRows<2>(row) = weight * point->d_pixel_d_warp;
       }
     }
     return true;
@@ -112,10 +113,10 @@ class BoardCost : public ceres::CostFunction {
 
  private:
   const BoardProblem& problem_;
-  std::vector<std::size_t> seen_;
+  std::vector<std::size_t> inliers_;
 };
 
-bool solve_once(BoardProblem& problem, const SolveFor& what) {
+bool solve_once(BoardProblem& problem, const SolveOptions& what) {
   std::vector<std::array<double, 6>> poses;
   for (const BoardPose& pose : problem.poses) {
     poses.push_back({pose.rotation.x(), pose.rotation.y(), pose.rotation.z(),
@@ -169,7 +170,7 @@ bool solve_once(BoardProblem& problem, const SolveFor& what) {
 /// Marks corners with a residual beyond 5 sigma on either axis. Returns true if there are any.
 bool mark_outliers(BoardProblem& problem) {
   constexpr double sigmas = 5;
-  auto residuals = residuals_of(problem);
+  auto residuals = compute_residuals(problem);
   double squares = 0, count = 0;
   for (std::size_t i = 0; i < residuals.size(); ++i) {
     if (!(problem.points[i].z() > 0) || !residuals[i].allFinite()) continue;
@@ -188,22 +189,22 @@ bool mark_outliers(BoardProblem& problem) {
   return any;
 }
 
-bool has_lens(const BoardProblem& problem) {
+bool is_valid_lens(const BoardProblem& problem) {
   const auto& intrinsics = problem.intrinsics;
   return intrinsics[0] > 0 && intrinsics[1] > 0 &&
          std::ranges::all_of(intrinsics, [](double value) { return std::isfinite(value); });
 }
 
 /// Fit of a lens to the points that are not outliers.
-struct Left {
-  explicit Left(const BoardProblem& problem) {
-    const auto residuals = residuals_of(problem);
+struct InlierFit {
+  explicit InlierFit(const BoardProblem& problem) {
+    const auto residuals = compute_residuals(problem);
     double squares = 0, count = 0;
     for (std::size_t i = 0; i < residuals.size(); ++i) {
       const double weight = problem.points[i].z();
       if (!(weight > 0)) continue;
       if (!residuals[i].allFinite()) {
-        sees_all = false;
+        projects_all = false;
         continue;
       }
       squares += weight * weight * residuals[i].squaredNorm();
@@ -212,13 +213,13 @@ struct Left {
     rms_px = std::sqrt(squares / (2 * count));
   }
 
-  bool sees_all = true;
+  bool projects_all = true;
   double rms_px;  // of the points that it projects
 };
 
 }  // namespace
 
-std::vector<Eigen::Vector2d> seen_px(const BoardProblem& problem) {
+std::vector<Eigen::Vector2d> collect_inlier_pixels(const BoardProblem& problem) {
   std::vector<Eigen::Vector2d> pixels;
   for (const Eigen::Vector3d& point : problem.points) {
     if (point.z() > 0) pixels.emplace_back(point.head<2>());
@@ -226,43 +227,46 @@ std::vector<Eigen::Vector2d> seen_px(const BoardProblem& problem) {
   return pixels;
 }
 
-bool has_mrcal(LensModel model) { return name_of(model).starts_with("LENSMODEL_"); }
+bool has_mrcal(LensModel model) { return to_string(model).starts_with("LENSMODEL_"); }
 
-bool solve(BoardProblem& problem, const SolveFor& what) {
-  if (!has_mrcal(problem.lens_model)) return solve_by_ceres(problem, what) && has_lens(problem);
-  constexpr double as_well = 1.05;
+bool solve(BoardProblem& problem, const SolveOptions& what) {
+  if (!has_mrcal(problem.lens_model))
+    return solve_by_ceres(problem, what) && is_valid_lens(problem);
+  constexpr double max_rms_ratio = 1.05;
   const BoardProblem start = problem;
-  if (!solve_by_mrcal(problem, what) || !has_lens(problem)) return false;
-  const Left left(problem);
-  if (left.sees_all || is_splined(problem.lens_model) || !Left(start).sees_all) return true;
+  if (!solve_by_mrcal(problem, what) || !is_valid_lens(problem)) return false;
+  const InlierFit left(problem);
+  if (left.projects_all || is_splined(problem.lens_model) || !InlierFit(start).projects_all)
+    return true;
   BoardProblem without_poles = start;
   if (solve_by_ceres(without_poles, what) &&
-      !(Left(without_poles).rms_px > as_well * left.rms_px)) {
+      !(InlierFit(without_poles).rms_px > max_rms_ratio * left.rms_px)) {
     problem = std::move(without_poles);
   }
   return true;
 }
 
-Linearization linearized(const BoardProblem& problem, const SolveFor& what) {
-  return has_mrcal(problem.lens_model) ? linearized_by_mrcal(problem, what)
-                                       : linearized_by_us(problem, what);
+Linearization linearize(const BoardProblem& problem, const SolveOptions& what) {
+  return has_mrcal(problem.lens_model) ? linearize_by_mrcal(problem, what)
+                                       : linearize_analytically(problem, what);
 }
 
-bool solve_by_ceres(BoardProblem& problem, const SolveFor& what) {
+bool solve_by_ceres(BoardProblem& problem, const SolveOptions& what) {
   if (!solve_once(problem, what)) return false;
-  constexpr int rounds = 10;
-  for (int round = 0; what.without_outliers && round < rounds && mark_outliers(problem); ++round) {
+  constexpr int max_iterations = 10;
+  for (int iteration = 0;
+       what.without_outliers && iteration < max_iterations && mark_outliers(problem); ++iteration) {
     if (!solve_once(problem, what)) return false;
   }
   return true;
 }
 
-Linearization linearized_by_us(const BoardProblem& problem, const SolveFor& what) {
+Linearization linearize_analytically(const BoardProblem& problem, const SolveOptions& what) {
   const auto intrinsics = static_cast<Eigen::Index>(problem.intrinsics.size());
   const auto boards = static_cast<Eigen::Index>(problem.poses.size());
   const Eigen::Index warp = intrinsics + 6 * boards, states = warp + (what.warp ? 2 : 0);
   const auto rows = static_cast<Eigen::Index>(2 * problem.points.size());
-  const std::size_t count = problem.points_of_a_board();
+  const std::size_t count = problem.points_per_board();
   const Lens lens(problem.lens_model, problem.intrinsics);
   Linearization result;
   result.residuals_px = Eigen::VectorXd::Zero(rows);
@@ -274,8 +278,8 @@ Linearization linearized_by_us(const BoardProblem& problem, const SolveFor& what
     if (!(problem.points[i].z() > 0)) continue;
     const BoardPose& pose = problem.poses[i / count];
     const auto point =
-        projected(lens, lattice_point(problem, i % count), rotation_by(pose.rotation),
-                  left_jacobian(pose.rotation), pose, problem.warp_m);
+        project_point(lens, make_lattice_point(problem, i % count), rotation_by(pose.rotation),
+                      left_jacobian(pose.rotation), pose, problem.warp_m);
     if (!point) continue;
     const auto row = static_cast<Eigen::Index>(2 * i);
     const double weight = problem.points[i].z();
@@ -288,9 +292,10 @@ Linearization linearized_by_us(const BoardProblem& problem, const SolveFor& what
         }
       }
     };
-    add(0, (weight * point->by_lens.d_pixel_d_parameters).eval());
-    add(intrinsics + 6 * static_cast<Eigen::Index>(i / count), (weight * point->by_pose).eval());
-    if (what.warp) add(warp, (weight * point->by_warp).eval());
+    add(0, (weight * point->projection.d_pixel_d_parameters).eval());
+    add(intrinsics + 6 * static_cast<Eigen::Index>(i / count),
+        (weight * point->d_pixel_d_pose).eval());
+    if (what.warp) add(warp, (weight * point->d_pixel_d_warp).eval());
   }
   for (double& each : result.scale) each = each > 0 ? 1 / std::sqrt(each) : 1;
   result.jacobian_transposed.resize(states, rows);

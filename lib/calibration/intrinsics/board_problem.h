@@ -41,22 +41,22 @@ struct BoardProblem {
   /// Ray in the camera frame and the pixel to which the lens has to project it, weighted like a
   /// corner. Such rays fix the frame of a splined lens, whose control points can compensate any
   /// rotation.
-  struct Held {
+  struct FixedRay {
     Eigen::Vector2d pixel;
     Eigen::Vector3d ray;
   };
-  std::vector<Held> held = {};
+  std::vector<FixedRay> fixed_rays = {};
 
-  std::size_t points_of_a_board() const {
+  std::size_t points_per_board() const {
     return static_cast<std::size_t>(cols) * static_cast<std::size_t>(rows);
   }
 };
 
 /// Returns the measured pixels of the points that are not outliers.
-std::vector<Eigen::Vector2d> seen_px(const BoardProblem& problem);
+std::vector<Eigen::Vector2d> collect_inlier_pixels(const BoardProblem& problem);
 
 /// Parameters that a solve may change in addition to the poses.
-struct SolveFor {
+struct SolveOptions {
   bool core = false;         // fx fy cx cy
   bool distortions = false;  // regularized as in mrcal
   bool warp = false;
@@ -74,7 +74,7 @@ struct SolveFor {
 ///
 /// @return false if the solve fails: no lens of the model can project the points, too few points
 ///     for the unknowns, or a focal length that is not positive
-bool solve(BoardProblem& problem, const SolveFor& what);
+bool solve(BoardProblem& problem, const SolveOptions& what);
 
 /// Residuals and Jacobian of a problem. State and Jacobian are packed: the state is divided by
 /// `scale`, so that its entries have similar magnitudes.
@@ -94,16 +94,16 @@ struct Linearization {
   Eigen::Index first_intrinsic, poses;
 };
 /// Linearizes a problem at its current parameters.
-Linearization linearized(const BoardProblem& problem, const SolveFor& what);
+Linearization linearize(const BoardProblem& problem, const SolveOptions& what);
 
 /// Returns true if mrcal has the lens model.
 bool has_mrcal(LensModel model);
 /// Implementations of solve() and linearize().
-bool solve_by_mrcal(BoardProblem& problem, const SolveFor& what);
-bool solve_by_ceres(BoardProblem& problem, const SolveFor& what);
-Linearization linearized_by_mrcal(const BoardProblem& problem, const SolveFor& what);
+bool solve_by_mrcal(BoardProblem& problem, const SolveOptions& what);
+bool solve_by_ceres(BoardProblem& problem, const SolveOptions& what);
+Linearization linearize_by_mrcal(const BoardProblem& problem, const SolveOptions& what);
 /// Linearizes with analytic Jacobians, with respect to all intrinsics and poses, and to the warp if
 /// what.warp.
-Linearization linearized_by_us(const BoardProblem& problem, const SolveFor& what);
+Linearization linearize_analytically(const BoardProblem& problem, const SolveOptions& what);
 
 }  // namespace vlp

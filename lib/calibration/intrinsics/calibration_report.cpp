@@ -27,7 +27,7 @@ namespace {
 void add_uncertainty_over_image(const ProjectionUncertainty& uncertainty, const Lens& lens,
                                 const std::array<int, 2>& imager_px, CalibrationReport& report) {
   double inside = 0;
-  for (const Eigen::Vector2d& pixel : pixel_grid(imager_px)) {
+  for (const Eigen::Vector2d& pixel : make_pixel_grid(imager_px)) {
     // A fisheye or a spline may end beyond the farthest corner and has no rays there.
     const bool can_end = lens.model() == LensModel::fisheye || is_splined(lens.model());
     if (can_end && !lens.unproject(pixel)) continue;
@@ -49,14 +49,14 @@ std::optional<ProjectionDifference> compare_halves(const IntrinsicsSolution& sol
                                                    const IntrinsicsInput& input,
                                                    const ProjectionUncertainty& uncertainty,
                                                    const ImageRegion& region) {
-  const IntrinsicsSolution even = solve_every_other(solution, 0);
-  const IntrinsicsSolution odd = solve_every_other(solution, 1);
+  const IntrinsicsSolution even = solve_every_second_view(solution, 0);
+  const IntrinsicsSolution odd = solve_every_second_view(solution, 1);
   if (!even.ok() || !odd.ok()) return std::nullopt;
   // Half of the views may not determine all parts of a splined lens.
   std::vector<ProjectionUncertainty> halves;
   if (is_splined(solution.lens().model())) halves = {{even, input.lattice}, {odd, input.lattice}};
   constexpr double max_ratio = 3;  // typically sqrt(2)
-  return projection_difference(
+  return compute_projection_difference(
       even.lens(), odd.lens(), input.imager_px, [&](const Eigen::Vector2d& pixel) {
         const double sigma_px = uncertainty.worst_px(pixel);
         const bool is_determined =
@@ -70,27 +70,29 @@ std::optional<ProjectionDifference> compare_halves(const IntrinsicsSolution& sol
 
 }  // namespace
 
-CalibrationReport report_on(const IntrinsicsSolution& solution, const IntrinsicsInput& input) {
+CalibrationReport compute_report(const IntrinsicsSolution& solution, const IntrinsicsInput& input) {
   const ProjectionUncertainty uncertainty(solution, input.lattice);
   const Lens lens = solution.lens();
-  const Eigen::MatrixXd by_views = covariance_by_views(solution);
+  const Eigen::MatrixXd by_views = estimate_covariance_by_views(solution);
   ImageRegion region =
-      known_region(seen_px(solution.problem), input.imager_px, lens.model(), solution.another_fits);
+      compute_known_region(collect_inlier_pixels(solution.problem), input.imager_px, lens.model(),
+                           solution.other_model_fits);
   // Splines are undetermined outside the region.
   const ImageRegion compared = is_splined(lens.model()) ? region : ImageRegion();
-  const auto expected =
-      expected_difference(lens, input.imager_px, uncertainty.intrinsics_covariance(), compared);
-  const double region_share = share_of_image(region, input.imager_px);
-  CalibrationReport report{std::move(region),
-                           region_share,
-                           0,
-                           0,
-                           0,
-                           uncertainty.focal_sd_px(),
-                           std::sqrt(by_views(0, 0)),
-                           expected.rms_px,
-                           expected_difference(lens, input.imager_px, by_views, compared).rms_px,
-                           {}};
+  const auto expected = compute_expected_difference(lens, input.imager_px,
+                                                    uncertainty.intrinsics_covariance(), compared);
+  const double region_fraction = compute_image_fraction(region, input.imager_px);
+  CalibrationReport report{
+      std::move(region),
+      region_fraction,
+      0,
+      0,
+      0,
+      uncertainty.focal_sd_px(),
+      std::sqrt(by_views(0, 0)),
+      expected.rms_px,
+      compute_expected_difference(lens, input.imager_px, by_views, compared).rms_px,
+      {}};
   add_uncertainty_over_image(uncertainty, lens, input.imager_px, report);
   if (!is_splined(lens.model())) {
     // With few views each of these covariances may be too small by chance.
@@ -100,35 +102,35 @@ CalibrationReport report_on(const IntrinsicsSolution& solution, const Intrinsics
       if (!covariance.allFinite()) continue;
       report.uncertainty_worst_px =
           std::max(report.uncertainty_worst_px,
-                   expected_worst_px(lens, input.imager_px, covariance, report.region));
+                   estimate_expected_worst_px(lens, input.imager_px, covariance, report.region));
     }
   }
   report.halves = compare_halves(solution, input, uncertainty, report.region);
   return report;
 }
 
-std::vector<double> held_out_rms_px(const IntrinsicsSolution& solution,
-                                    const IntrinsicsInput& held_out) {
+std::vector<double> compute_held_out_rms_px(const IntrinsicsSolution& solution,
+                                            const IntrinsicsInput& held_out) {
   const Lens lens = solution.lens();
   auto views = held_out.views;
   for (auto& view : views) {
-    take_bows_of_lens(view, lens);
-    view = held_out.lattice.bent(std::move(view), solution.problem.warp_m);
+    apply_lens_edge_curvature(view, lens);
+    view = held_out.lattice.with_warp(std::move(view), solution.problem.warp_m);
   }
-  const auto shifts = edge_shifts(views, lens);
+  const auto shifts = estimate_edge_shifts(views, lens);
   std::vector<double> rms_px;
   for (std::size_t i = 0; i < views.size(); ++i) {
-    take_out_shift(views[i], shifts[i]);
-    const auto pose = view_pose(views[i], lens);
+    correct_edge_shift(views[i], shifts[i]);
+    const auto pose = estimate_view_pose(views[i], lens);
     rms_px.push_back(pose ? pose->rms_px : std::numeric_limits<double>::infinity());
   }
   return rms_px;
 }
 
-HeldOut held_out_fit(const IntrinsicsSolution& solution, const IntrinsicsInput& held_out) {
+HeldOut compute_held_out_fit(const IntrinsicsSolution& solution, const IntrinsicsInput& held_out) {
   HeldOut fit;
   double squares = 0;
-  const auto rms_px = held_out_rms_px(solution, held_out);
+  const auto rms_px = compute_held_out_rms_px(solution, held_out);
   for (std::size_t i = 0; i < rms_px.size(); ++i) {
     if (!std::isfinite(rms_px[i])) continue;
     const std::size_t corners = held_out.views[i].size();
@@ -140,7 +142,8 @@ HeldOut held_out_fit(const IntrinsicsSolution& solution, const IntrinsicsInput& 
   return fit;
 }
 
-ViewCoverage coverage_of(const IntrinsicsSolution& solution, const IntrinsicsInput& input) {
+ViewCoverage compute_view_coverage(const IntrinsicsSolution& solution,
+                                   const IntrinsicsInput& input) {
   const auto [width, height] = input.imager_px;
   ViewCoverage coverage;
   ImageCoverage parts(input.imager_px);
@@ -152,7 +155,7 @@ ViewCoverage coverage_of(const IntrinsicsSolution& solution, const IntrinsicsInp
       parts.add(corner.pixel);
     }
   }
-  coverage.share = parts.fraction();
+  coverage.covered_fraction = parts.fraction();
   std::vector<Eigen::Vector3d> normals;
   for (const BoardPose& pose : solution.problem.poses) {
     // Points away from the camera; the board is nearer on the side to which it is tilted.
@@ -175,7 +178,7 @@ ViewCoverage coverage_of(const IntrinsicsSolution& solution, const IntrinsicsInp
   return coverage;
 }
 
-std::string next_view(const ViewCoverage& coverage) {
+std::string recommend_next_view(const ViewCoverage& coverage) {
   constexpr std::array places{"top left",    "top middle",    "top right",
                               "left middle", "middle",        "right middle",
                               "bottom left", "bottom middle", "bottom right"};

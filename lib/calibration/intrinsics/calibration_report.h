@@ -16,42 +16,43 @@ namespace vlp {
 
 /// Uncertainty of a solution.
 struct CalibrationReport {
-  /// Region of the image where the lens is calibrated (known_region()), and its fraction of the
-  /// image.
+  /// Region of the image where the lens is calibrated (compute_known_region()), and its fraction of
+  /// the image.
   ImageRegion region;
-  double region_share;
-  /// Mean and maximum of ProjectionUncertainty::worst_px() by tags, px, over the pixel_grid() of
-  /// the region.
+  double region_fraction;
+  /// Mean and maximum of ProjectionUncertainty::worst_px() by tags, px, over the make_pixel_grid()
+  /// of the region.
   ///
-  /// The maximum is at least expected_worst_px() over the region for each of three covariances: by
-  /// tags, by independent corners and by views. Splined lenses are excluded from this rule. If
-  /// another lens model fits equally well, estimate_lens() raises the maximum to the largest
-  /// difference between the two lenses.
+  /// The maximum is at least estimate_expected_worst_px() over the region for each of three
+  /// covariances: by tags, by independent corners and by views. Splined lenses are excluded from
+  /// this rule. If another lens model fits equally well, estimate_lens() raises the maximum to the
+  /// largest difference between the two lenses.
   double uncertainty_mean_px, uncertainty_worst_px;
   /// Maximum of ProjectionUncertainty::worst_px() outside the region, px.
   double uncertainty_beyond_px;
-  /// Standard deviation of fx, px: from the noise of the tags, and from covariance_by_views().
+  /// Standard deviation of fx, px: from the noise of the tags, and from
+  /// estimate_covariance_by_views().
   double focal_sd_px, focal_sd_by_views_px;
-  /// Expected projection_difference() from the true lens, RMS per axis, px: from the noise of the
-  /// tags, and from covariance_by_views(). For splined lenses over the region only.
+  /// Expected compute_projection_difference() from the true lens, RMS per axis, px: from the noise
+  /// of the tags, and from estimate_covariance_by_views(). For splined lenses over the region only.
   double expected_rms_px, expected_by_views_rms_px;
   /// Difference over the region between the lens of every second view and that of the other views
-  /// (solve_every_other()). It is about twice expected_rms_px if the lens model fits and the errors
-  /// of tags are independent, and larger otherwise. For splined lenses only pixels that both halves
-  /// determine are compared. std::nullopt if a half does not determine a lens.
+  /// (solve_every_second_view()). It is about twice expected_rms_px if the lens model fits and the
+  /// errors of tags are independent, and larger otherwise. For splined lenses only pixels that both
+  /// halves determine are compared. std::nullopt if a half does not determine a lens.
   std::optional<ProjectionDifference> halves;
 };
 /// Computes the report of a solution; solves twice for `halves`. `input`: input of its solve.
 /// @pre solution.ok()
-CalibrationReport report_on(const IntrinsicsSolution& solution, const IntrinsicsInput& input);
+CalibrationReport compute_report(const IntrinsicsSolution& solution, const IntrinsicsInput& input);
 
 /// Returns the RMS residual of each held-out view, per axis, px; infinity for a view without a
 /// pose.
 ///
 /// Fits only the poses of the views and the shifts of their edges. All corners keep their given
 /// weights, so that lens models can be compared.
-std::vector<double> held_out_rms_px(const IntrinsicsSolution& solution,
-                                    const IntrinsicsInput& held_out);
+std::vector<double> compute_held_out_rms_px(const IntrinsicsSolution& solution,
+                                            const IntrinsicsInput& held_out);
 
 /// Fit of all held-out views together.
 struct HeldOut {
@@ -59,15 +60,16 @@ struct HeldOut {
   /// RMS residual per axis, px.
   double rms_px = 0;
 };
-/// Computes the fit of the held-out views as held_out_rms_px(), without views that have no pose.
-HeldOut held_out_fit(const IntrinsicsSolution& solution, const IntrinsicsInput& held_out);
+/// Computes the fit of the held-out views as compute_held_out_rms_px(), without views that have no
+/// pose.
+HeldOut compute_held_out_fit(const IntrinsicsSolution& solution, const IntrinsicsInput& held_out);
 
 /// Distribution of the corners over the image, and tilts of the boards.
 struct ViewCoverage {
   /// Number of corners in each of 3 x 3 parts of the image, row by row from the top left.
   std::array<int, 9> corners{};
   /// Fraction of 8 x 6 parts of the image that contain corners.
-  double share = 0;
+  double covered_fraction = 0;
   /// Largest angle over the views by which the left, right, upper and lower side of the board, as
   /// in the image, is nearer to the camera; rad.
   std::array<double, 4> tilts_rad{};
@@ -75,10 +77,11 @@ struct ViewCoverage {
   double tilt_rad = 0;
 };
 /// Computes the coverage of the views in a solution. `input`: input of its solve.
-ViewCoverage coverage_of(const IntrinsicsSolution& solution, const IntrinsicsInput& input);
+ViewCoverage compute_view_coverage(const IntrinsicsSolution& solution,
+                                   const IntrinsicsInput& input);
 
 /// Recommends the next view in one line: the board in the part of the image with the fewest
 /// corners, tilted towards the side that was tilted least.
-std::string next_view(const ViewCoverage& coverage);
+std::string recommend_next_view(const ViewCoverage& coverage);
 
 }  // namespace vlp

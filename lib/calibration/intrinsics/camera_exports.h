@@ -16,18 +16,18 @@ namespace vlp {
 /// Formats ROS camera_info: plumb_bob for PINHOLE, OPENCV4 and OPENCV5, rational_polynomial for
 /// OPENCV8, equidistant for OPENCV_FISHEYE. Throws std::invalid_argument also if the name of the
 /// camera has control characters or is not UTF-8.
-std::string ros_camera_info(const Camera& camera);
+std::string format_ros_camera_info(const Camera& camera);
 /// Formats Kalibr's camchain: pinhole with radtan for PINHOLE and OPENCV4, or with equidistant for
 /// OPENCV_FISHEYE.
-std::string kalibr_camchain(const Camera& camera);
+std::string format_kalibr_camchain(const Camera& camera);
 /// Formats OpenCV's FileStorage with camera_matrix and distortion_coefficients, for all models but
 /// STEREOGRAPHIC and splined lenses. The coefficients of OPENCV_FISHEYE are those of cv::fisheye,
 /// with "distortion_model: fisheye".
-std::string opencv_camera(const Camera& camera);
+std::string format_opencv_camera(const Camera& camera);
 /// Formats mrcal's .cameramodel, a Python literal, for all models but OPENCV_FISHEYE. `region`:
 /// valid_intrinsics_region, left out if empty.
-std::string mrcal_cameramodel(const Camera& camera, const ImageRegion& region = {});
+std::string format_mrcal_cameramodel(const Camera& camera, const ImageRegion& region = {});
 /// Formats the line valid_intrinsics_region of a .cameramodel; "" if the region is empty.
-std::string mrcal_region(const ImageRegion& region);
+std::string format_mrcal_region(const ImageRegion& region);
 
 }  // namespace vlp

@@ -35,8 +35,8 @@ constexpr std::size_t kMaxCameraBytes = std::size_t{64} << 20;
 constexpr int kMaxImager_px = 1 << 20;
 
 /// Returns a Python literal without comments, which begin with a # outside strings.
-std::string without_comments(const std::string& text) {
-  std::string rest;
+std::string strip_comments(const std::string& text) {
+  std::string result;
   char quote = 0;  // that ends the string; 0 outside
   for (std::size_t i = 0; i < text.size(); ++i) {
     if (quote == 0 && text[i] == '#') {
@@ -44,21 +44,21 @@ std::string without_comments(const std::string& text) {
       if (i == std::string::npos) break;
     }
     const char here = text[i];
-    rest += here;
+    result += here;
     if (quote != 0 && here == '\\' && i + 1 < text.size()) {
-      rest += text[++i];
+      result += text[++i];
     } else if (here == quote) {
       quote = 0;
     } else if (quote == 0 && (here == '\'' || here == '"')) {
       quote = here;
     }
   }
-  return rest;
+  return result;
 }
 
 /// Returns the value of `key` in a Python literal, a list, tuple or string, without its delimiters;
 /// std::nullopt if the key is missing.
-std::optional<std::string> python_value(const std::string& text, const std::string& key) {
+std::optional<std::string> find_python_value(const std::string& text, const std::string& key) {
   constexpr const char* blanks = " \t\r\n";
   for (const char quote : {'\'', '"'}) {
     const std::string quoted = quote + key + quote;
@@ -85,13 +85,13 @@ std::optional<std::string> python_value(const std::string& text, const std::stri
 }
 
 std::string required_value(const fs::path& file, const std::string& text, const std::string& key) {
-  const auto value = python_value(text, key);
+  const auto value = find_python_value(text, key);
   if (!value) throw InputError(file, "lacks '" + key + "'");
   return *value;
 }
 
 /// Parses the numbers of a list, or of a list of lists.
-std::vector<double> numbers_in(const fs::path& file, std::string list, const std::string& key) {
+std::vector<double> parse_numbers(const fs::path& file, std::string list, const std::string& key) {
   std::vector<double> numbers;
   constexpr std::string_view between = ",[]()";
   std::ranges::replace_if(
@@ -103,18 +103,18 @@ std::vector<double> numbers_in(const fs::path& file, std::string list, const std
   return numbers;
 }
 
-std::vector<double> python_numbers(const fs::path& file, const std::string& text,
-                                   const std::string& key) {
-  return numbers_in(file, required_value(file, text, key), key);
+std::vector<double> parse_python_numbers(const fs::path& file, const std::string& text,
+                                         const std::string& key) {
+  return parse_numbers(file, required_value(file, text, key), key);
 }
 
 /// Reads the valid region. mrcal closes the contour; an empty contour means that the lens is
 /// calibrated nowhere.
-ImageRegion region_from_mrcal(const fs::path& file, const std::string& text) {
+ImageRegion parse_mrcal_region(const fs::path& file, const std::string& text) {
   const std::string key = "valid_intrinsics_region";
-  const auto value = python_value(text, key);
+  const auto value = find_python_value(text, key);
   if (!value) return {};
-  const auto numbers = numbers_in(file, *value, key);
+  const auto numbers = parse_numbers(file, *value, key);
   if (numbers.empty())
     throw InputError(
         file,
@@ -131,16 +131,16 @@ ImageRegion region_from_mrcal(const fs::path& file, const std::string& text) {
   return region;
 }
 
-AnyCamera camera_from_mrcal(const fs::path& file, const std::string& text) {
+AnyCamera parse_mrcal_camera(const fs::path& file, const std::string& text) {
   // The inputs of the optimization are long and not needed.
-  const std::string literal = without_comments(text);
+  const std::string literal = strip_comments(text);
   const std::string head = literal.substr(0, literal.find("'optimization_inputs'"));
   const std::string name = required_value(file, head, "lensmodel");
   const auto model = lens_model_from_name(name);
   if (!model) {
     throw InputError(file, "has lens model " + name + "; the models are: " + lens_model_names());
   }
-  const auto imager = python_numbers(file, head, "imagersize");
+  const auto imager = parse_python_numbers(file, head, "imagersize");
   const auto is_size = [](double value) { return value >= 1 && value <= kMaxImager_px; };
   if (imager.size() != 2 || !std::ranges::all_of(imager, is_size)) {
     throw InputError(file, "'imagersize' should be the image's width and height in pixels");
@@ -148,11 +148,11 @@ AnyCamera camera_from_mrcal(const fs::path& file, const std::string& text) {
   Camera camera;
   camera.lens_model = *model;
   camera.imager_px = {static_cast<int>(imager[0]), static_cast<int>(imager[1])};
-  camera.intrinsics = python_numbers(file, head, "intrinsics");
-  return {camera, region_from_mrcal(file, head)};
+  camera.intrinsics = parse_python_numbers(file, head, "intrinsics");
+  return {camera, parse_mrcal_region(file, head)};
 }
 
-std::vector<double> yaml_numbers(const YAML::Node& node) {
+std::vector<double> parse_yaml_numbers(const YAML::Node& node) {
   const YAML::Node list = node.IsMap() ? node["data"] : node;
   if (!list || !list.IsSequence()) throw std::invalid_argument("a list of numbers is missing");
   return list.as<std::vector<double>>();
@@ -160,7 +160,7 @@ std::vector<double> yaml_numbers(const YAML::Node& node) {
 
 /// Returns the lens model and removes trailing coefficients of zero. The last two of OpenCV's 14
 /// coefficients tilt the sensor and must be 0. If all are zero, the model is a pinhole.
-LensModel model_of(const std::string& name, std::vector<double>& distortions) {
+LensModel find_lens_model(const std::string& name, std::vector<double>& distortions) {
   constexpr std::size_t with_tilt = 14, without = 12;
   if (name == "fisheye" || name == "equidistant") {
     if (distortions.size() != 4) throw std::invalid_argument(name + " takes four coefficients");
@@ -193,7 +193,7 @@ LensModel model_of(const std::string& name, std::vector<double>& distortions) {
   }
 }
 
-Camera camera_from_yaml(const YAML::Node& document) {
+Camera parse_yaml_camera(const YAML::Node& document) {
   const YAML::Node kalibr = document["cam0"];
   Camera camera;
   std::vector<double> distortions;
@@ -201,20 +201,20 @@ Camera camera_from_yaml(const YAML::Node& document) {
     if (const auto model = kalibr["camera_model"].as<std::string>(); model != "pinhole") {
       throw std::invalid_argument("camera_model " + model + " is not known here, pinhole is");
     }
-    camera.intrinsics = yaml_numbers(kalibr["intrinsics"]);
+    camera.intrinsics = parse_yaml_numbers(kalibr["intrinsics"]);
     const auto model = kalibr["distortion_model"].as<std::string>("none");
-    if (model != "none") distortions = yaml_numbers(kalibr["distortion_coeffs"]);
-    camera.lens_model = model_of(model, distortions);
+    if (model != "none") distortions = parse_yaml_numbers(kalibr["distortion_coeffs"]);
+    camera.lens_model = find_lens_model(model, distortions);
     camera.imager_px = kalibr["resolution"].as<std::array<int, 2>>();
   } else {
-    const auto matrix = yaml_numbers(document["camera_matrix"]);
+    const auto matrix = parse_yaml_numbers(document["camera_matrix"]);
     if (matrix.size() != 9) throw std::invalid_argument("camera_matrix should be 3 x 3");
     if (matrix[1] != 0) throw std::invalid_argument("camera_matrix is skewed");
     camera.intrinsics = {matrix[0], matrix[4], matrix[2], matrix[5]};
-    distortions = yaml_numbers(document["distortion_coefficients"]);
+    distortions = parse_yaml_numbers(document["distortion_coefficients"]);
     std::string model = document["distortion_model"].as<std::string>("");
     if (model.empty() && document["fisheye_model"].as<int>(0) != 0) model = "fisheye";
-    camera.lens_model = model_of(model, distortions);
+    camera.lens_model = find_lens_model(model, distortions);
     camera.imager_px = {document["image_width"].as<int>(), document["image_height"].as<int>()};
     if (const YAML::Node name = document["camera_name"]) camera.id = name.as<std::string>();
   }
@@ -231,8 +231,8 @@ struct LensFit {
   Eigen::VectorXd right;
 };
 
-LensFit lens_fit_at(const std::vector<double>& parameters, LensModel model,
-                    const std::vector<std::pair<Eigen::Vector2d, Eigen::Vector3d>>& rays) {
+LensFit evaluate_lens_fit(const std::vector<double>& parameters, LensModel model,
+                          const std::vector<std::pair<Eigen::Vector2d, Eigen::Vector3d>>& rays) {
   const Lens lens(model, parameters);
   constexpr Eigen::Index core = 4;
   const Eigen::Index size = is_splined(model) ? core : std::ssize(parameters);
@@ -242,11 +242,11 @@ LensFit lens_fit_at(const std::vector<double>& parameters, LensModel model,
   for (const auto& [pixel, ray] : rays) {
     const auto at = lens.project_with_jacobians(ray);
     if (!at) continue;
-    const Eigen::Vector2d off = pixel - at->pixel;
-    step.squares += off.squaredNorm();
+    const Eigen::Vector2d residual = pixel - at->pixel;
+    step.squares += residual.squaredNorm();
     ++step.count;
     step.normal += at->d_pixel_d_parameters.transpose() * at->d_pixel_d_parameters;
-    step.right += at->d_pixel_d_parameters.transpose() * off;
+    step.right += at->d_pixel_d_parameters.transpose() * residual;
   }
   return step;
 }
@@ -259,11 +259,11 @@ void fit_parameters(const Camera& camera, const Lens& from, LensModel model,
   constexpr int max_iterations = 200;
   constexpr double function_tolerance = 1e-12, min_damping = 1e-12, max_damping = 1e12;
   std::vector<std::pair<Eigen::Vector2d, Eigen::Vector3d>> rays;
-  for (const Eigen::Vector2d& pixel : pixel_grid(camera.imager_px)) {
+  for (const Eigen::Vector2d& pixel : make_pixel_grid(camera.imager_px)) {
     if (const auto ray = from.unproject(pixel)) rays.emplace_back(pixel, ray->direction);
   }
   double damping = 1e-3;
-  LensFit fit = lens_fit_at(parameters, model, rays);
+  LensFit fit = evaluate_lens_fit(parameters, model, rays);
   for (int i = 0; i < max_iterations && fit.count > 0 && !is_splined(model); ++i) {
     Eigen::MatrixXd damped = fit.normal;
     damped.diagonal() *= 1 + damping;
@@ -271,7 +271,7 @@ void fit_parameters(const Camera& camera, const Lens& from, LensModel model,
     std::vector<double> next = parameters;
     for (std::size_t k = 0; k < next.size(); ++k) next[k] += change[static_cast<Eigen::Index>(k)];
     const bool is_possible = change.allFinite() && next[0] > 0 && next[1] > 0;
-    LensFit trial = is_possible ? lens_fit_at(next, model, rays) : LensFit{};
+    LensFit trial = is_possible ? evaluate_lens_fit(next, model, rays) : LensFit{};
     const bool is_better = trial.count > 0 && trial.count >= fit.count &&
                            (trial.count > fit.count || trial.squares < fit.squares);
     if (!is_better) {
@@ -287,8 +287,8 @@ void fit_parameters(const Camera& camera, const Lens& from, LensModel model,
     if (has_converged) break;
   }
   if (fit.count == 0 || !std::isfinite(fit.squares)) {
-    throw std::invalid_argument(std::string(name_of(model)) + " has no lens near " +
-                                std::string(name_of(camera.lens_model)));
+    throw std::invalid_argument(std::string(to_string(model)) + " has no lens near " +
+                                std::string(to_string(camera.lens_model)));
   }
 }
 
@@ -297,16 +297,16 @@ void fit_parameters(const Camera& camera, const Lens& from, LensModel model,
 void compare_lenses(const Lens& from, const Lens& to, const std::array<int, 2>& imager_px,
                     FittedCamera& fitted) {
   constexpr int points_per_row = 201;
-  const auto pixels = pixel_grid(imager_px, points_per_row);
-  std::size_t shared = 0;
+  const auto pixels = make_pixel_grid(imager_px, points_per_row);
+  std::size_t num_common = 0;
   for (const Eigen::Vector2d& pixel : pixels) {
     const auto ray = from.unproject(pixel);
     const auto found = ray ? to.project(ray->direction) : std::nullopt;
     if (!found) continue;
     fitted.worst_px = std::max(fitted.worst_px, (*found - pixel).norm());
-    ++shared;
+    ++num_common;
   }
-  fitted.share = static_cast<double>(shared) / static_cast<double>(pixels.size());
+  fitted.common_fraction = static_cast<double>(num_common) / static_cast<double>(pixels.size());
 }
 
 }  // namespace
@@ -317,7 +317,7 @@ AnyCamera read_any_camera(const fs::path& file) {
   Camera& camera = found.camera;
   if (text.find("'lensmodel'") != std::string::npos ||
       text.find("\"lensmodel\"") != std::string::npos) {
-    found = camera_from_mrcal(file, text);
+    found = parse_mrcal_camera(file, text);
   } else {
     if (text.starts_with("<?xml")) {
       throw InputError(file, "is XML, which is not read: have OpenCV write it as .yaml");
@@ -335,7 +335,7 @@ AnyCamera read_any_camera(const fs::path& file) {
         const auto& report = calibration.intrinsics_report;
         return {calibration.camera, report ? report->region_px : ImageRegion()};
       }
-      camera = camera_from_yaml(document);
+      camera = parse_yaml_camera(document);
     } catch (const YAML::Exception& error) {
       throw InputError(file, "holds no camera that is known here: " + error.msg);
     } catch (const std::invalid_argument& error) {
@@ -356,7 +356,7 @@ AnyCamera read_any_camera(const fs::path& file) {
   return found;
 }
 
-FittedCamera with_lens_model(const Camera& camera, LensModel model) {
+FittedCamera fit_lens_model(const Camera& camera, LensModel model) {
   if (camera.lens_model == model) return {camera, 0, 1};
   const Lens from(camera.lens_model, camera.intrinsics);
   FittedCamera fitted{camera, 0, 0};
@@ -366,11 +366,12 @@ FittedCamera with_lens_model(const Camera& camera, LensModel model) {
   parameters.resize(parameter_count(is_splined(model) ? LensModel::stereographic : model), 0);
   if (is_splined(model)) {
     if (camera.lens_model != LensModel::stereographic) {
-      parameters = with_lens_model(camera, LensModel::stereographic).camera.intrinsics;
+      parameters = fit_lens_model(camera, LensModel::stereographic).camera.intrinsics;
     }
-    const auto splined = splined_like(from, camera.imager_px, model, parameters);
+    const auto splined = fit_splined_lens(from, camera.imager_px, model, parameters);
     if (!splined) {
-      throw std::invalid_argument(why_too_coarse(from, camera.imager_px, model, parameters));
+      throw std::invalid_argument(
+          describe_too_coarse_grid(from, camera.imager_px, model, parameters));
     }
     parameters = *splined;
   }

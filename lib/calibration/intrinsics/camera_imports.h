@@ -31,13 +31,13 @@ struct FittedCamera {
   Camera camera;
   /// Largest distance between the pixels to which the two lenses project a ray, px; fraction of the
   /// image whose rays both lenses project.
-  double worst_px, share;
+  double worst_px, common_fraction;
 };
 /// Fits a lens of another model to the rays of a camera over the image, by least squares in pixels
-/// (pixel_grid(); splined lenses: splined_like()). Returns a camera that already has the model
-/// unchanged.
+/// (make_pixel_grid(); splined lenses: fit_splined_lens()). Returns a camera that already has the
+/// model unchanged.
 /// @throws std::invalid_argument if the model has no lens close to the camera's, or if a splined
 ///     model has too few control points in the field of view
-FittedCamera with_lens_model(const Camera& camera, LensModel model);
+FittedCamera fit_lens_model(const Camera& camera, LensModel model);
 
 }  // namespace vlp

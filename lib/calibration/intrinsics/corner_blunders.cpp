@@ -17,11 +17,11 @@ constexpr std::size_t kNeighbours = 8;
 using Corners = std::vector<BoardLattice::Corner>;
 
 /// Returns the nearest corners on the board, without those in `out`.
-std::vector<std::size_t> around(const Corners& corners, const std::vector<bool>& out,
-                                std::size_t middle) {
+std::vector<std::size_t> find_nearest(const Corners& corners, const std::vector<bool>& is_outlier,
+                                      std::size_t middle) {
   std::vector<std::pair<double, std::size_t>> away;
   for (std::size_t i = 0; i < corners.size(); ++i) {
-    if (i == middle || out[i]) continue;
+    if (i == middle || is_outlier[i]) continue;
     away.emplace_back((corners[i].in_board_m - corners[middle].in_board_m).squaredNorm(), i);
   }
   const std::size_t count = std::min(kNeighbours, away.size());
@@ -33,9 +33,9 @@ std::vector<std::size_t> around(const Corners& corners, const std::vector<bool>&
 
 /// Returns the distance of a corner from its predicted position, relative to the limit; 0 with too
 /// few neighbors.
-double misplaced(const Corners& corners, const std::vector<std::size_t>& nearest,
-                 std::size_t middle) {
-  constexpr double share = 0.25, least_px = 3;
+double compute_displacement_ratio(const Corners& corners, const std::vector<std::size_t>& nearest,
+                                  std::size_t middle) {
+  constexpr double max_fraction = 0.25, min_px = 3;
   if (nearest.size() < kNeighbours) return 0;
   std::vector<PlanePair> pairs;
   pairs.reserve(nearest.size());
@@ -43,49 +43,51 @@ double misplaced(const Corners& corners, const std::vector<std::size_t>& nearest
   for (const std::size_t i : nearest) {
     pairs.push_back({corners[i].in_board_m.head<2>(), corners[i].pixel});
   }
-  const Eigen::Matrix3d px_from_board = homography(pairs);
-  const auto put = [&](const Eigen::Vector3d& at_m) -> Eigen::Vector2d {
+  const Eigen::Matrix3d px_from_board = estimate_homography(pairs);
+  const auto predict = [&](const Eigen::Vector3d& at_m) -> Eigen::Vector2d {
     return (px_from_board * at_m.head<2>().homogeneous()).hnormalized();
   };
-  const Eigen::Vector2d expected = put(corners[middle].in_board_m);
+  const Eigen::Vector2d expected = predict(corners[middle].in_board_m);
   for (const std::size_t i : nearest) {
-    step_px = std::min(step_px, (put(corners[i].in_board_m) - expected).norm());
+    step_px = std::min(step_px, (predict(corners[i].in_board_m) - expected).norm());
   }
-  const double off_px = (corners[middle].pixel - expected).norm();
-  return off_px / std::max(least_px, share * step_px);
+  const double displacement_px = (corners[middle].pixel - expected).norm();
+  return displacement_px / std::max(min_px, max_fraction * step_px);
 }
 
 }  // namespace
 
-std::vector<std::size_t> corner_blunders(const Corners& corners) {
-  constexpr std::size_t most = 10;  // at most one in ten
-  std::vector<bool> out(corners.size(), false);
+std::vector<std::size_t> find_corner_outliers(const Corners& corners) {
+  constexpr std::size_t min_corners_per_outlier = 10;  // at most one in ten
+  std::vector<bool> is_outlier(corners.size(), false);
   std::vector<std::vector<std::size_t>> nearest(corners.size());
-  std::vector<double> off(corners.size());
-  const auto look = [&](std::size_t i) {
-    nearest[i] = around(corners, out, i);
-    off[i] = misplaced(corners, nearest[i], i);
+  std::vector<double> ratios(corners.size());
+  const auto test_corner = [&](std::size_t i) {
+    nearest[i] = find_nearest(corners, is_outlier, i);
+    ratios[i] = compute_displacement_ratio(corners, nearest[i], i);
   };
-  for (std::size_t i = 0; i < corners.size(); ++i) look(i);
+  for (std::size_t i = 0; i < corners.size(); ++i) test_corner(i);
   std::vector<std::size_t> found;
   while (!corners.empty()) {
     const auto worst =
-        static_cast<std::size_t>(std::max_element(off.begin(), off.end()) - off.begin());
-    if (off[worst] <= 1) break;
-    if ((found.size() + 1) * most > corners.size()) return {};  // another board, or another order
+        static_cast<std::size_t>(std::max_element(ratios.begin(), ratios.end()) - ratios.begin());
+    if (ratios[worst] <= 1) break;
+    if ((found.size() + 1) * min_corners_per_outlier > corners.size())
+      return {};  // another board, or another order
     found.push_back(worst);
-    out[worst] = true;
-    off[worst] = 0;
+    is_outlier[worst] = true;
+    ratios[worst] = 0;
     for (std::size_t i = 0; i < corners.size(); ++i) {
       const auto& others = nearest[i];
-      if (!out[i] && std::find(others.begin(), others.end(), worst) != others.end()) look(i);
+      if (!is_outlier[i] && std::find(others.begin(), others.end(), worst) != others.end())
+        test_corner(i);
     }
   }
   // An outlier may have biased the predictions of its neighbors before it was found itself.
   std::erase_if(found, [&](std::size_t i) {
-    look(i);
-    out[i] = off[i] > 1;
-    return !out[i];
+    test_corner(i);
+    is_outlier[i] = ratios[i] > 1;
+    return !is_outlier[i];
   });
   std::sort(found.begin(), found.end());
   return found;

@@ -18,6 +18,6 @@ namespace vlp {
 /// Each corner is predicted by the homography of its nearest eight corners on the board, which
 /// holds for any lens. The worst corner is removed and its neighbors are tested again. Returns no
 /// corner if more than a tenth would be outliers: then the board or the order is another one.
-std::vector<std::size_t> corner_blunders(const std::vector<BoardLattice::Corner>& corners);
+std::vector<std::size_t> find_corner_outliers(const std::vector<BoardLattice::Corner>& corners);
 
 }  // namespace vlp

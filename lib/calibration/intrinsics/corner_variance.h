@@ -13,19 +13,19 @@ struct CornerError {
 };
 
 /// Variance model of a corner position, per axis:
-///   variance = rest_px2 + scale2 sd_px^2.
+///   variance = floor_px2 + scale2 sd_px^2.
 /// `sd_px` is the standard deviation predicted from pixel noise. `scale2` allows for correlated
-/// noise. `rest_px2` covers errors that the pixels do not show, such as printing errors of the
+/// noise. `floor_px2` covers errors that the pixels do not show, such as printing errors of the
 /// board.
 ///
 /// A least-squares solve has to weight residuals by their variances (Gauss and Markov). Behind
 /// JPEG, corners in the dark corners of an image are five times as uncertain as those in the
 /// middle.
 struct CornerVariance {
-  double rest_px2 = 0, scale2 = 0;
+  double floor_px2 = 0, scale2 = 0;
 
   /// Returns the variance of a corner, px^2.
-  double of(double sd_px) const { return rest_px2 + scale2 * sd_px * sd_px; }
+  double at(double sd_px) const { return floor_px2 + scale2 * sd_px * sd_px; }
 };
 
 /// Estimates the variance components by least squares of the squared residuals, each divided by its
@@ -34,7 +34,7 @@ struct CornerVariance {
 /// A residual beyond three standard deviations counts as three. The standard deviation of a corner
 /// is at least 4 % of the RMS residual of all, so that no corner dominates.
 /// @pre at least one error, not all of them 0; standard deviations are finite
-CornerVariance corner_variance(std::span<const CornerError> errors);
+CornerVariance estimate_corner_variance(std::span<const CornerError> errors);
 
 /// Factors by which a solve multiplies residuals:
 ///   weight^2 = mean of the squared residuals / variance.
@@ -48,14 +48,14 @@ class CornerWeights {
  public:
   /// @param known    corners with a predicted standard deviation; at least one, not all residuals 0
   /// @param unknown  corners without one
-  CornerWeights(std::span<const CornerError> told, std::span<const CornerError> untold);
+  CornerWeights(std::span<const CornerError> known, std::span<const CornerError> unknown);
 
   /// Returns the weight of a corner. `sd_px`: its predicted standard deviation, px; 0 if unknown.
-  double of(double sd_px) const;
+  double at(double sd_px) const;
 
  private:
   CornerVariance variance_;
-  double untold_px2_, mean_px2_;
+  double unknown_px2_, mean_px2_;
 };
 
 }  // namespace vlp

@@ -24,31 +24,33 @@ struct Chord {
 
 /// Returns the distance, px, outside of a chord at which the lens projects the straight line
 /// between its ends, at w.
-std::optional<double> bow_of_lens(const Chord& chord, const Eigen::Vector3d& from_ray,
-                                  const Eigen::Vector3d& to_ray, const Lens& lens, double w) {
-  constexpr int rounds = 3;
+std::optional<double> compute_lens_offset(const Chord& chord, const Eigen::Vector3d& from_ray,
+                                          const Eigen::Vector3d& to_ray, const Lens& lens,
+                                          double w) {
+  constexpr int max_iterations = 3;
   const Eigen::Vector2d length = chord.to - chord.from;
-  double share = (1 + w) / 2;
-  for (int round = 0;; ++round) {
-    const auto pixel = lens.project((1 - share) * from_ray + share * to_ray);
+  double fraction = (1 + w) / 2;
+  for (int iteration = 0;; ++iteration) {
+    const auto pixel = lens.project((1 - fraction) * from_ray + fraction * to_ray);
     if (!pixel) return {};
-    const Eigen::Vector2d off = *pixel - chord.from;
-    if (round + 1 == rounds) return chord.outwards.dot(off);
-    share += (1 + w) / 2 - length.dot(off) / length.squaredNorm();
+    const Eigen::Vector2d offset = *pixel - chord.from;
+    if (iteration + 1 == max_iterations) return chord.outwards.dot(offset);
+    fraction += (1 + w) / 2 - length.dot(offset) / length.squaredNorm();
   }
 }
 
 /// Outward displacements of the ends of an edge, and the curvature by the lens.
 struct MovedEdge {
   std::array<double, 2> outwards_px;
-  EdgeBow bow;
+  EdgeCurvature bow;
 };
 
-std::optional<MovedEdge> moved(const Chord& chord, const EdgeBow& seen, const Lens& lens) {
+std::optional<MovedEdge> compute_moved_edge(const Chord& chord, const EdgeCurvature& seen,
+                                            const Lens& lens) {
   const auto from_ray = lens.unproject(chord.from), to_ray = lens.unproject(chord.to);
   if (!from_ray || !to_ray) return {};
   const auto lens_at = [&](double w) {
-    return bow_of_lens(chord, from_ray->direction, to_ray->direction, lens, w);
+    return compute_lens_offset(chord, from_ray->direction, to_ray->direction, lens, w);
   };
   // Nodes and weights of Gauss-Legendre quadrature.
   constexpr std::array<std::array<double, 2>, 4> rule{{{-0.8611363115940526, 0.3478548451374538},
@@ -58,11 +60,11 @@ std::optional<MovedEdge> moved(const Chord& chord, const EdgeBow& seen, const Le
   double mean = 0, slope = 0;
   for (const auto& [place, weight] : rule) {
     const double w = seen.reach * place;
-    const auto by_lens = lens_at(w);
-    if (!by_lens) return {};
-    const double apart = seen.at(w) - *by_lens;
-    mean += weight / 2 * apart;
-    slope += 3 * weight / 2 * apart * place / seen.reach;
+    const auto lens_offset = lens_at(w);
+    if (!lens_offset) return {};
+    const double difference = seen.at(w) - *lens_offset;
+    mean += weight / 2 * difference;
+    slope += 3 * weight / 2 * difference * place / seen.reach;
   }
   const auto middle = lens_at(0), before = lens_at(-0.5), after = lens_at(0.5);
   if (!middle || !before || !after) return {};
@@ -71,9 +73,9 @@ std::optional<MovedEdge> moved(const Chord& chord, const EdgeBow& seen, const Le
 
 }  // namespace
 
-double take_bows_of_lens(std::vector<BoardLattice::Corner>& corners, const Lens& lens) {
-  constexpr double much = 0.25;  // of an edge; beyond it the corner or the edges are wrong
-  double most_px = 0;
+double apply_lens_edge_curvature(std::vector<BoardLattice::Corner>& corners, const Lens& lens) {
+  constexpr double max_fraction = 0.25;  // of an edge; beyond it the corner or the edges are wrong
+  double max_displacement_px = 0;
   for (std::size_t first = 0; first + 4 <= corners.size(); first += 4) {
     const auto tag = corners.begin() + static_cast<std::ptrdiff_t>(first);
     if (!std::all_of(tag, tag + 4, [](const auto& corner) { return corner.bow.reach > 0; })) {
@@ -87,11 +89,11 @@ double take_bows_of_lens(std::vector<BoardLattice::Corner>& corners, const Lens&
                  next = static_cast<std::ptrdiff_t>((k + 1) % 4);
       const Chord chord(tag[at].pixel, tag[next].pixel, inside);
       outwards[k] = chord.outwards;
-      edges[k] = moved(chord, tag[at].bow, lens);
+      edges[k] = compute_moved_edge(chord, tag[at].bow, lens);
     }
     if (!std::all_of(edges.begin(), edges.end(), [](const auto& edge) { return edge; })) continue;
     std::array<Eigen::Vector2d, 4> steps;
-    bool small = true;
+    bool is_small = true;
     for (std::size_t k = 0; k < 4; ++k) {
       const std::size_t previous = (k + 3) % 4, next = (k + 1) % 4;
       Eigen::Matrix2d normals;
@@ -99,17 +101,18 @@ double take_bows_of_lens(std::vector<BoardLattice::Corner>& corners, const Lens&
       steps[k] = normals.inverse() *
                  Eigen::Vector2d(edges[previous]->outwards_px[1], edges[k]->outwards_px[0]);
       const auto at = static_cast<std::ptrdiff_t>(k), after = static_cast<std::ptrdiff_t>(next);
-      small = small && steps[k].norm() < much * (tag[after].pixel - tag[at].pixel).norm();
+      is_small =
+          is_small && steps[k].norm() < max_fraction * (tag[after].pixel - tag[at].pixel).norm();
     }
-    if (!small) continue;
+    if (!is_small) continue;
     for (std::size_t k = 0; k < 4; ++k) {
       BoardLattice::Corner& corner = tag[static_cast<std::ptrdiff_t>(k)];
       corner.pixel += steps[k];
       corner.bow = edges[k]->bow;
-      most_px = std::max(most_px, steps[k].norm());
+      max_displacement_px = std::max(max_displacement_px, steps[k].norm());
     }
   }
-  return most_px;
+  return max_displacement_px;
 }
 
 }  // namespace vlp

@@ -24,6 +24,6 @@ namespace vlp {
 /// Corners without a measured curvature are kept: those of touching squares, and of files without
 /// it. Tags are also kept if a corner would move by a quarter of an edge or more.
 /// @return largest displacement of a corner, px
-double take_bows_of_lens(std::vector<BoardLattice::Corner>& corners, const Lens& lens);
+double apply_lens_edge_curvature(std::vector<BoardLattice::Corner>& corners, const Lens& lens);
 
 }  // namespace vlp

@@ -23,25 +23,25 @@ struct ShiftEquations {
   Square normal = Square::Zero();
   Column right = Column::Zero();
   EdgeShift shift;
-  bool any = false;
+  bool is_valid = false;
 
   /// Solves with priors: the terms of the shift are `usual`, with the given weights.
-  EdgeShift solved(const Eigen::Vector4d& usual, const Eigen::Vector4d& weights) const {
+  EdgeShift solve_with_prior(const Eigen::Vector4d& prior, const Eigen::Vector4d& weights) const {
     Square all = normal;
     Column sum = right;
     all.diagonal().tail<4>() += weights;
-    sum.tail<4>() += weights.cwiseProduct(usual);
+    sum.tail<4>() += weights.cwiseProduct(prior);
     const Column solution = solve_symmetric(all, sum);
     EdgeShift result = shift;
-    if (solution.allFinite()) result.by = solution.tail<4>();
+    if (solution.allFinite()) result.coefficients = solution.tail<4>();
     return result;
   }
 };
 
-ShiftEquations equations_of(const std::vector<BoardLattice::Corner>& corners, const Lens& lens) {
-  constexpr std::size_t least_corners = 12;
-  if (corners.size() < least_corners || corners.front().inward.isZero(0)) return {};
-  const auto pose = view_pose(corners, lens);
+ShiftEquations make_equations(const std::vector<BoardLattice::Corner>& corners, const Lens& lens) {
+  constexpr std::size_t min_corners = 12;
+  if (corners.size() < min_corners || corners.front().inward.isZero(0)) return {};
+  const auto pose = estimate_view_pose(corners, lens);
   if (!pose) return {};
   ShiftEquations equations;
   const auto count = static_cast<double>(corners.size());
@@ -50,55 +50,57 @@ ShiftEquations equations_of(const std::vector<BoardLattice::Corner>& corners, co
   for (const auto& corner : corners) {
     squares += (corner.pixel - equations.shift.middle).squaredNorm() / count;
   }
-  equations.shift.reach_px = std::max(1.0, std::sqrt(squares));
+  equations.shift.radius_px = std::max(1.0, std::sqrt(squares));
   const auto& [rotation, translation_m] = pose->camera_from_board;
-  const Eigen::Matrix3d turn = rotation_by(rotation);
+  const Eigen::Matrix3d rotation_matrix = rotation_by(rotation);
   for (const auto& corner : corners) {
-    const Eigen::Vector3d turned = turn * corner.in_board_m;
-    const auto projection = lens.project_with_jacobians(turned + translation_m);
+    const Eigen::Vector3d rotated = rotation_matrix * corner.in_board_m;
+    const auto projection = lens.project_with_jacobians(rotated + translation_m);
     if (!projection) return {};
-    const Eigen::Vector2d x = (corner.pixel - equations.shift.middle) / equations.shift.reach_px;
+    const Eigen::Vector2d x = (corner.pixel - equations.shift.middle) / equations.shift.radius_px;
     Eigen::Matrix<double, 2, kUnknowns> jacobian;
-    jacobian << -projection->d_pixel_d_point * cross_matrix(turned), projection->d_pixel_d_point,
+    jacobian << -projection->d_pixel_d_point * cross_matrix(rotated), projection->d_pixel_d_point,
         corner.inward * Eigen::RowVector4d(1, x.x(), x.y(), x.squaredNorm());
     jacobian *= corner.weight;
     equations.normal += jacobian.transpose() * jacobian;
     equations.right += jacobian.transpose() * (corner.weight * (corner.pixel - projection->pixel));
   }
-  equations.any = true;
+  equations.is_valid = true;
   return equations;
 }
 
 }  // namespace
 
-std::vector<EdgeShift> edge_shifts(std::span<const std::vector<BoardLattice::Corner>> views,
-                                   const Lens& lens, ShiftForm form) {
+std::vector<EdgeShift> estimate_edge_shifts(
+    std::span<const std::vector<BoardLattice::Corner>> views, const Lens& lens, ShiftForm form) {
   // Corner noise of 0.05 px; shifts differ by 0.1 px from view to view and within a view.
   constexpr double weight = 0.25, none = 1e-6, all = 1e9;
-  const double uneven = form == ShiftForm::even ? all : weight;
-  const Eigen::Vector4d alone(none, uneven, uneven, uneven), beside(weight, uneven, uneven, uneven);
+  const double uneven = form == ShiftForm::constant ? all : weight;
+  const Eigen::Vector4d weak_weights(none, uneven, uneven, uneven),
+      prior_weights(weight, uneven, uneven, uneven);
   std::vector<ShiftEquations> equations;
   std::vector<double> alone_px;
   for (const auto& corners : views) {
-    equations.push_back(equations_of(corners, lens));
-    if (equations.back().any) {
-      alone_px.push_back(equations.back().solved(Eigen::Vector4d::Zero(), alone).by[0]);
+    equations.push_back(make_equations(corners, lens));
+    if (equations.back().is_valid) {
+      alone_px.push_back(
+          equations.back().solve_with_prior(Eigen::Vector4d::Zero(), weak_weights).coefficients[0]);
     }
   }
   std::vector<EdgeShift> shifts(views.size());
   if (alone_px.empty()) return shifts;
-  const Eigen::Vector4d usual(upper_median(alone_px), 0, 0, 0);
+  const Eigen::Vector4d prior(upper_median(alone_px), 0, 0, 0);
   for (std::size_t i = 0; i < views.size(); ++i) {
-    if (equations[i].any) {
-      shifts[i] = equations[i].solved(usual, beside);
+    if (equations[i].is_valid) {
+      shifts[i] = equations[i].solve_with_prior(prior, prior_weights);
     } else if (!views[i].empty() && !views[i].front().inward.isZero(0)) {
-      shifts[i].by = usual;
+      shifts[i].coefficients = prior;
     }
   }
   return shifts;
 }
 
-double take_out_shift(std::vector<BoardLattice::Corner>& corners, const EdgeShift& shift) {
+double correct_edge_shift(std::vector<BoardLattice::Corner>& corners, const EdgeShift& shift) {
   double sum_px = 0;
   for (auto& corner : corners) {
     const double shift_px = shift.at(corner.pixel);

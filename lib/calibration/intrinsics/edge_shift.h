@@ -12,22 +12,22 @@
 namespace vlp {
 
 /// Displacement of the tag edges in a view inwards, towards the dark, as a function of the pixel:
-///   shift = coefficients . (1, x, y, x^2 + y^2),  (x, y) = (pixel - middle) / reach_px,  px.
+///   shift = coefficients . (1, x, y, x^2 + y^2),  (x, y) = (pixel - middle) / radius_px,  px.
 /// It varies over the view like the illumination if white is overexposed.
 struct EdgeShift {
-  Eigen::Vector4d by = Eigen::Vector4d::Zero();
+  Eigen::Vector4d coefficients = Eigen::Vector4d::Zero();
   Eigen::Vector2d middle{0, 0};
-  double reach_px = 1;
+  double radius_px = 1;
 
   /// Returns the displacement at a pixel, px.
   double at(const Eigen::Vector2d& pixel) const {
-    const Eigen::Vector2d x = (pixel - middle) / reach_px;
-    return by.dot(Eigen::Vector4d(1, x.x(), x.y(), x.squaredNorm()));
+    const Eigen::Vector2d x = (pixel - middle) / radius_px;
+    return coefficients.dot(Eigen::Vector4d(1, x.x(), x.y(), x.squaredNorm()));
   }
 };
 
 /// Variation of the shift within a view: constant, or as in EdgeShift.
-enum class ShiftForm { even, changing };
+enum class ShiftForm { constant, varying };
 
 /// Estimates the edge shift in each view.
 ///
@@ -43,10 +43,11 @@ enum class ShiftForm { even, changing };
 ///
 /// Use ShiftForm::constant as long as the warp of the board is unknown: a varying shift would
 /// absorb it.
-std::vector<EdgeShift> edge_shifts(std::span<const std::vector<BoardLattice::Corner>> views,
-                                   const Lens& lens, ShiftForm form = ShiftForm::changing);
+std::vector<EdgeShift> estimate_edge_shifts(
+    std::span<const std::vector<BoardLattice::Corner>> views, const Lens& lens,
+    ShiftForm form = ShiftForm::varying);
 
 /// Moves the edges back by a shift. Returns the mean displacement, px.
-double take_out_shift(std::vector<BoardLattice::Corner>& corners, const EdgeShift& shift);
+double correct_edge_shift(std::vector<BoardLattice::Corner>& corners, const EdgeShift& shift);
 
 }  // namespace vlp

@@ -10,13 +10,13 @@
 
 namespace vlp {
 
-/// Expected projection_difference() between a lens and the true one.
+/// Expected compute_projection_difference() between a lens and the true one.
 struct ExpectedDifference {
   /// Root of the expected mean square over the image, per axis, px.
   double rms_px;
   /// Effective number of independent terms of similar size in the mean square, whose relative
   /// standard deviation is sqrt(2 / freedoms).
-  double freedoms;
+  double degrees_of_freedom;
 };
 
 /// Computes the expected difference from the covariance of the intrinsics, to first order, with
@@ -25,16 +25,18 @@ struct ExpectedDifference {
 /// The difference is smaller than the projection uncertainty, which includes rotations of the
 /// camera relative to the boards. Aligning two lenses removes such rotations. Infinite if the
 /// covariance is not finite.
-ExpectedDifference expected_difference(const Lens& lens, const std::array<int, 2>& imager_px,
-                                       const Eigen::MatrixXd& covariance,
-                                       const ImageRegion& region = {});
+ExpectedDifference compute_expected_difference(const Lens& lens,
+                                               const std::array<int, 2>& imager_px,
+                                               const Eigen::MatrixXd& covariance,
+                                               const ImageRegion& region = {});
 
 /// Estimates the root of the expected square of the largest difference over the same pixels, px,
 /// from 200 random draws with a fixed seed.
 ///
 /// It exceeds the largest standard deviation of a single pixel, because the maximum is over many
 /// pixels. Infinite if the covariance is not finite.
-double expected_worst_px(const Lens& lens, const std::array<int, 2>& imager_px,
-                         const Eigen::MatrixXd& covariance, const ImageRegion& region = {});
+double estimate_expected_worst_px(const Lens& lens, const std::array<int, 2>& imager_px,
+                                  const Eigen::MatrixXd& covariance,
+                                  const ImageRegion& region = {});
 
 }  // namespace vlp

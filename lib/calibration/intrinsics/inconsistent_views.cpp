@@ -45,7 +45,7 @@ ViewFit measure_fit(const BoardProblem& problem, const std::vector<Eigen::Vector
 
 InconsistentViews find_inconsistent_views(const IntrinsicsSolution& solution) {
   const BoardProblem& problem = solution.problem;
-  const auto residuals = residuals_of(problem);
+  const auto residuals = compute_residuals(problem);
   const std::size_t points_of_view = problem.points.size() / solution.views.size();
   std::vector<ViewFit> fits;
   std::vector<double> medians_px;

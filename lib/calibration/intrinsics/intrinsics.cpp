@@ -13,11 +13,13 @@ namespace vlp {
 
 namespace {
 
-IntrinsicsSolution failure(IntrinsicsStatus status) { return {status, {}, {}, {}, {}, 0, 0, 0}; }
+IntrinsicsSolution make_failure(IntrinsicsStatus status) {
+  return {status, {}, {}, {}, {}, 0, 0, 0};
+}
 
 }  // namespace
 
-std::string_view explanation_of(IntrinsicsStatus status) {
+std::string_view describe(IntrinsicsStatus status) {
   switch (status) {
     case IntrinsicsStatus::ok:
       return "ok";
@@ -25,7 +27,7 @@ std::string_view explanation_of(IntrinsicsStatus status) {
       return "fewer than three views can be used; add views of the board, tilted by 20 to 45 "
              "degrees "
              "to different sides and all over the image";
-    case IntrinsicsStatus::all_alike:
+    case IntrinsicsStatus::all_parallel:
       return "all views show the board at the same angle, so that any focal length fits; add views "
              "with the board tilted by 20 to 45 degrees to different sides";
     case IntrinsicsStatus::no_solution:
@@ -34,10 +36,10 @@ std::string_view explanation_of(IntrinsicsStatus status) {
   return "";
 }
 
-void IntrinsicsSolution::set_fit() {
+void IntrinsicsSolution::compute_fit() {
   double squares = 0;
   corners = outliers = 0;
-  const auto residuals = residuals_of(problem);
+  const auto residuals = compute_residuals(problem);
   for (std::size_t i = 0; i < residuals.size(); ++i) {
     const double weight = problem.points[i].z();
     if (weight > 0) {
@@ -51,65 +53,66 @@ void IntrinsicsSolution::set_fit() {
 }
 
 IntrinsicsSolution solve_intrinsics(const IntrinsicsInput& input) {
-  constexpr std::size_t most_starts = 4;
-  if (input.views.size() < IntrinsicsSolver::kLeastViews)
-    return failure(IntrinsicsStatus::too_few_views);
-  auto starts = focal_lengths(input);
-  starts.resize(std::min(starts.size(), most_starts));
-  for (const double focal_px : starts) {
+  constexpr std::size_t max_starts = 4;
+  if (input.views.size() < IntrinsicsSolver::kMinViews)
+    return make_failure(IntrinsicsStatus::too_few_views);
+  auto initial_focal_lengths_px = rank_focal_lengths(input);
+  initial_focal_lengths_px.resize(std::min(initial_focal_lengths_px.size(), max_starts));
+  for (const double focal_px : initial_focal_lengths_px) {
     IntrinsicsSolver solver(input);
     if (!solver.start(focal_px)) continue;
-    solver.start_symmetric();
-    if (!solver.refine() || !solver.weigh_regularization() || !solver.take_bows() ||
-        !solver.take_out_shifts(ShiftForm::even) || !solver.bend() || !solver.weigh_corners() ||
-        !solver.take_bows() || !solver.take_out_shifts(ShiftForm::changing) ||
-        !solver.weigh_corners() || !solver.weigh_regularization() || !solver.leave_out_outliers() ||
-        !solver.weigh_regularization() || !solver.turn_to_axis()) {
+    solver.initialize_symmetric();
+    if (!solver.refine() || !solver.scale_regularization() || !solver.apply_edge_curvature() ||
+        !solver.correct_edge_shifts(ShiftForm::constant) || !solver.solve_board_warp() ||
+        !solver.reweight_corners() || !solver.apply_edge_curvature() ||
+        !solver.correct_edge_shifts(ShiftForm::varying) || !solver.reweight_corners() ||
+        !solver.scale_regularization() || !solver.reject_outliers() ||
+        !solver.scale_regularization() || !solver.align_frame_to_optical_axis()) {
       continue;
     }
     IntrinsicsSolution solution = solver.solution();
-    if (all_alike(solution.problem)) return failure(IntrinsicsStatus::all_alike);
+    if (all_parallel(solution.problem)) return make_failure(IntrinsicsStatus::all_parallel);
     if (2 * solution.views.size() > input.views.size()) return solution;
   }
-  return failure(IntrinsicsStatus::no_solution);
+  return make_failure(IntrinsicsStatus::no_solution);
 }
 
-IntrinsicsSolution solve_every_other(const IntrinsicsSolution& whole, std::size_t first) {
+IntrinsicsSolution solve_every_second_view(const IntrinsicsSolution& whole, std::size_t first) {
   const BoardProblem& all = whole.problem;
   const std::size_t parts = all.poses.size() / whole.views.size();
-  const std::size_t points = parts * all.points_of_a_board();
+  const std::size_t points = parts * all.points_per_board();
   IntrinsicsSolution half = whole;
   half.views.clear();
   half.edge_shifts_px.clear();
   half.problem.poses.clear();
   half.problem.points.clear();
-  const auto take = [](const auto& from, std::size_t view, std::size_t count, auto& to) {
+  const auto copy_part = [](const auto& from, std::size_t view, std::size_t count, auto& to) {
     const auto begin = from.begin() + static_cast<std::ptrdiff_t>(view * count);
     to.insert(to.end(), begin, begin + static_cast<std::ptrdiff_t>(count));
   };
   for (std::size_t view = first; view < whole.views.size(); view += 2) {
-    take(whole.views, view, 1, half.views);
-    take(whole.edge_shifts_px, view, 1, half.edge_shifts_px);
-    take(all.poses, view, parts, half.problem.poses);
-    take(all.points, view, points, half.problem.points);
+    copy_part(whole.views, view, 1, half.views);
+    copy_part(whole.edge_shifts_px, view, 1, half.edge_shifts_px);
+    copy_part(all.poses, view, parts, half.problem.poses);
+    copy_part(all.points, view, points, half.problem.points);
   }
-  if (half.views.size() < IntrinsicsSolver::kLeastViews) {
-    return failure(IntrinsicsStatus::too_few_views);
+  if (half.views.size() < IntrinsicsSolver::kMinViews) {
+    return make_failure(IntrinsicsStatus::too_few_views);
   }
   if (!solve_for_lens(half.problem, half.solved_for)) {
-    return failure(IntrinsicsStatus::no_solution);
+    return make_failure(IntrinsicsStatus::no_solution);
   }
-  if (all_alike(half.problem)) return failure(IntrinsicsStatus::all_alike);
-  half.set_fit();
+  if (all_parallel(half.problem)) return make_failure(IntrinsicsStatus::all_parallel);
+  half.compute_fit();
   return half;
 }
 
-std::vector<Eigen::Vector2d> residuals_of(const BoardProblem& problem) {
+std::vector<Eigen::Vector2d> compute_residuals(const BoardProblem& problem) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   const Lens lens(problem.lens_model, problem.intrinsics);
   std::vector<Eigen::Vector2d> residuals(problem.points.size(), Eigen::Vector2d::Constant(nan));
   const std::size_t cols = static_cast<std::size_t>(problem.cols),
-                    count = problem.points_of_a_board();
+                    count = problem.points_per_board();
   const Eigen::Array2d last(problem.cols - 1, problem.rows - 1);
   for (std::size_t pose = 0; pose < problem.poses.size(); ++pose) {
     const Eigen::Vector3d& r = problem.poses[pose].rotation;
@@ -119,9 +122,10 @@ std::vector<Eigen::Vector2d> residuals_of(const BoardProblem& problem) {
       if (seen.z() == BoardProblem::kUnseen) continue;
       const std::size_t col = i % cols, row = i / cols;
       const Eigen::Array2d node(static_cast<double>(col), static_cast<double>(row));
-      const Eigen::Array2d share = 2 * node / last - 1;
+      const Eigen::Array2d normalized_position = 2 * node / last - 1;
       Eigen::Vector3d point;
-      point << problem.spacing_m * node.matrix(), problem.warp_m.dot((1 - share.square()).matrix());
+      point << problem.spacing_m * node.matrix(),
+          problem.warp_m.dot((1 - normalized_position.square()).matrix());
       const auto pixel = lens.project(rotation * point + problem.poses[pose].translation_m);
       if (pixel) residuals[pose * count + i] = seen.head<2>() - *pixel;
     }

@@ -30,11 +30,11 @@ struct IntrinsicsInput {
 enum class IntrinsicsStatus {
   ok,
   too_few_views,  // fewer than three that can be used
-  all_alike,      // every view shows the board at the same angle: any focal length fits
+  all_parallel,   // every view shows the board at the same angle: any focal length fits
   no_solution,    // no lens of the model fits
 };
 /// Describes a status in one line, with the remedy.
-std::string_view explanation_of(IntrinsicsStatus status);
+std::string_view describe(IntrinsicsStatus status);
 
 /// Solution and its fit.
 struct IntrinsicsSolution {
@@ -51,7 +51,7 @@ struct IntrinsicsSolution {
   };
   std::vector<Dropped> dropped;
   /// Mean shift of the tag edges towards the dark in each of `views`, px. The corners are corrected
-  /// for it (edge_shifts()).
+  /// for it (estimate_edge_shifts()).
   std::vector<double> edge_shifts_px;
   /// RMS of the weighted residuals per axis, without outliers: sqrt(sum of squares / (2 corners)),
   /// px.
@@ -61,14 +61,14 @@ struct IntrinsicsSolution {
 
   bool ok() const { return status == IntrinsicsStatus::ok; }
   /// Computes rms_px, corners and outliers from `problem`.
-  void set_fit();
+  void compute_fit();
   Lens lens() const { return Lens(problem.lens_model, problem.intrinsics); }
   /// Estimated parameters: the intrinsics (splined lenses: without the core), and the warp if
   /// selected.
-  SolveFor solved_for{true, true, true, false};
+  SolveOptions solved_for{true, true, true, false};
   /// True if another lens model fits the corners equally well. The lens is then undetermined
   /// outside the region of the corners.
-  bool another_fits = false;
+  bool other_model_fits = false;
 };
 
 /// Estimates lens, poses and warp of the board. Needs no initial focal length. Stages:
@@ -79,8 +79,10 @@ struct IntrinsicsSolution {
 ///   convergence.
 /// 3. Solves the requested model, regularized as in mrcal, and re-estimates the poses. Drops views
 ///   that fit no pose. Splined lenses: see below.
-/// 4. Corrects the corners of the tags for the edge curvature of this lens (take_bows_of_lens()).
-/// 5. Corrects the shift of the tag edges, constant over a view (edge_shifts()), and solves again,
+/// 4. Corrects the corners of the tags for the edge curvature of this lens
+/// (apply_lens_edge_curvature()).
+/// 5. Corrects the shift of the tag edges, constant over a view (estimate_edge_shifts()), and
+/// solves again,
 ///   at most twice.
 /// 6. Estimates the warp of the board (WarpChoice).
 /// 7. Weights the corners by their variances if the images provide them (CornerWeights). Repeats
@@ -104,17 +106,17 @@ struct IntrinsicsSolution {
 /// points.
 ///
 /// Both poses of each view are tried with each lens, to resolve the planar pose ambiguity
-/// (view_pose()). The result depends on the input only, not on threads.
+/// (estimate_view_pose()). The result depends on the input only, not on threads.
 IntrinsicsSolution solve_intrinsics(const IntrinsicsInput& input);
 
 /// Solves for every second view of a solution, beginning with view `first`, starting from that
 /// solution. Estimates lens, poses and warp. Keeps from `whole` the edge shifts, the weights, the
 /// outliers, and whether the warp is estimated.
 /// @pre whole.ok()
-IntrinsicsSolution solve_every_other(const IntrinsicsSolution& whole, std::size_t first);
+IntrinsicsSolution solve_every_second_view(const IntrinsicsSolution& whole, std::size_t first);
 
 /// Returns the residuals of the points of a problem, measured minus projected, px, including
 /// outliers. NaN for points that were not seen or cannot be projected.
-std::vector<Eigen::Vector2d> residuals_of(const BoardProblem& problem);
+std::vector<Eigen::Vector2d> compute_residuals(const BoardProblem& problem);
 
 }  // namespace vlp

@@ -26,12 +26,12 @@ namespace vlp {
 
 namespace {
 
-Eigen::Vector3d normal_of(const BoardPose& pose) {
+Eigen::Vector3d compute_normal(const BoardPose& pose) {
   return Eigen::AngleAxisd(pose.rotation.norm(), pose.rotation.normalized()) *
          Eigen::Vector3d::UnitZ();
 }
 
-void turn(std::vector<BoardPose>& poses, const Eigen::Matrix3d& new_from_old) {
+void rotate_poses(std::vector<BoardPose>& poses, const Eigen::Matrix3d& new_from_old) {
   for (BoardPose& pose : poses) {
     const Eigen::AngleAxisd rotation(new_from_old * rotation_by(pose.rotation));
     pose = {rotation.angle() * rotation.axis(), new_from_old * pose.translation_m};
@@ -46,79 +46,81 @@ IntrinsicsSolver::IntrinsicsSolver(const IntrinsicsInput& input) : input_(input)
 }
 
 bool IntrinsicsSolver::start(double focal_px) {
-  constexpr int rounds = 4;
-  constexpr double settled = 1e-3;
+  constexpr int max_iterations = 4;
+  constexpr double convergence = 1e-3;
   Lens lens = stereographic(input_, focal_px);
-  for (int round = 0; round < rounds; ++round) {
+  for (int iteration = 0; iteration < max_iterations; ++iteration) {
     const double before_px = lens.focal_px().x();
-    seed(lens);
-    if (used_.size() < kLeastViews) return false;
+    initialize_poses(lens);
+    if (used_.size() < kMinViews) return false;
     assemble(lens);
     if (!solve({true, false, false, false})) return false;
     lens = this->lens();
-    if (std::abs(lens.focal_px().x() / before_px - 1) < settled) break;
+    if (std::abs(lens.focal_px().x() / before_px - 1) < convergence) break;
   }
   return true;
 }
 
-void IntrinsicsSolver::start_symmetric() {
+void IntrinsicsSolver::initialize_symmetric() {
   if (!is_splined(input_.lens_model)) return;
   IntrinsicsSolver symmetric = *this;
   symmetric.input_.lens_model = LensModel::fisheye;
   if (!symmetric.refine()) return;  // keeps STEREOGRAPHIC
   symmetric_ = symmetric.problem_.intrinsics;
-  slips_ = symmetric.slips();
+  displaced_corners_ = symmetric.find_displaced_corners();
   const Lens fisheye = symmetric.lens();
   for (const std::size_t view : used_) {
-    if (const auto pose = view_pose(input_.views[view], fisheye)) {
-      seeds_.poses[view] = pose->camera_from_board;
+    if (const auto pose = estimate_view_pose(input_.views[view], fisheye)) {
+      initial_poses_.poses[view] = pose->camera_from_board;
     }
   }
-  const std::vector<double> core = core_like(fisheye, seen_px(symmetric.problem_));
+  const std::vector<double> core =
+      fit_spline_core(fisheye, collect_inlier_pixels(symmetric.problem_));
   // With too few control points, STEREOGRAPHIC with that core is used.
   problem_.intrinsics =
-      splined_like(fisheye, input_.imager_px, input_.lens_model, core).value_or(core);
+      fit_splined_lens(fisheye, input_.imager_px, input_.lens_model, core).value_or(core);
   problem_.lens_model = input_.lens_model;
   problem_.intrinsics.resize(parameter_count(input_.lens_model), 0);
   // The axis, and two rays next to it that prevent a rotation about it.
   for (const double beside : {0.0, -0.25, 0.25}) {
     const Eigen::Vector2d pixel =
         fisheye.center_px() + Eigen::Vector2d(beside * input_.imager_px[0], 0);
-    if (const auto ray = fisheye.unproject(pixel)) problem_.held.push_back({pixel, ray->direction});
+    if (const auto ray = fisheye.unproject(pixel))
+      problem_.fixed_rays.push_back({pixel, ray->direction});
   }
   assemble(lens());
 }
 
-bool IntrinsicsSolver::turn_to_axis() {
-  constexpr int rounds = 4;
-  constexpr double settled_rad = 1e-4;  // 0.006 degrees
+bool IntrinsicsSolver::align_frame_to_optical_axis() {
+  constexpr int max_iterations = 4;
+  constexpr double tolerance_rad = 1e-4;  // 0.006 degrees
   if (symmetric_.empty()) return true;
-  for (int round = 0; round < rounds; ++round) {
-    const auto pixels = seen_px(problem_);
+  for (int iteration = 0; iteration < max_iterations; ++iteration) {
+    const auto pixels = collect_inlier_pixels(problem_);
     BoardProblem symmetric = problem_;
     symmetric.lens_model = LensModel::fisheye;
     symmetric.intrinsics = symmetric_;
-    const auto start = b_from_a(lens(), Lens(LensModel::fisheye, symmetric_), pixels);
+    const auto start = fit_rotation(lens(), Lens(LensModel::fisheye, symmetric_), pixels);
     if (!start) return true;
-    turn(symmetric.poses, *start);
+    rotate_poses(symmetric.poses, *start);
     if (!vlp::solve(symmetric, {true, true, solved_for_.warp, false})) return true;
     const Lens fisheye(LensModel::fisheye, symmetric.intrinsics);
     symmetric_ = symmetric.intrinsics;
-    const auto new_from_old = b_from_a(lens(), fisheye, pixels);
+    const auto new_from_old = fit_rotation(lens(), fisheye, pixels);
     if (!new_from_old) return true;
     const double turned_rad = Eigen::AngleAxisd(*new_from_old).angle();
-    if (turned_rad < settled_rad) return true;
-    for (auto& [pixel, ray] : problem_.held) {
+    if (turned_rad < tolerance_rad) return true;
+    for (auto& [pixel, ray] : problem_.fixed_rays) {
       if (const auto seen = lens().project(new_from_old->transpose() * ray)) pixel = *seen;
     }
-    turn(problem_.poses, *new_from_old);
+    rotate_poses(problem_.poses, *new_from_old);
     if (!solve(solved_for_)) return false;
   }
   return true;
 }
 
 bool IntrinsicsSolver::refine() {
-  constexpr int rounds = 6;
+  constexpr int max_iterations = 6;
   constexpr std::size_t core = 4;
   problem_.lens_model = input_.lens_model;
   // The core of a splined lens would only compensate the control points; mrcal fixes it, too.
@@ -129,81 +131,82 @@ bool IntrinsicsSolver::refine() {
   for (std::size_t i = given; i < core + distortions.size(); ++i) {
     problem_.intrinsics[i] = distortions[i - core].start;
   }
-  bool settled = false;
-  for (int round = 0; round < rounds; ++round) {
+  bool convergence = false;
+  for (int iteration = 0; iteration < max_iterations; ++iteration) {
     if (!solve(solved_for_)) return false;
-    settled = !change_poses();
-    if (settled) break;
-    if (used_.size() < kLeastViews) return false;
+    convergence = !reestimate_poses();
+    if (convergence) break;
+    if (used_.size() < kMinViews) return false;
     assemble(lens());
   }
-  if (take_back()) {
+  if (reinstate_views()) {
     assemble(lens());
-  } else if (settled) {
-    return sees_most();
+  } else if (convergence) {
+    return projects_most_views();
   }
-  return solve(solved_for_) && sees_most();
+  return solve(solved_for_) && projects_most_views();
 }
 
-bool IntrinsicsSolver::weigh_regularization() {
-  constexpr int rounds = 3;
-  constexpr double least_px = 0.01, settled = 0.1;
+bool IntrinsicsSolver::scale_regularization() {
+  constexpr int max_iterations = 3;
+  constexpr double min_px = 0.01, convergence = 0.1;
   if (!is_splined(problem_.lens_model)) return true;
-  for (int round = 0; round < rounds; ++round) {
-    const double noise_px = std::clamp(solution().rms_px, least_px, 1.0);
-    if (std::abs(noise_px / problem_.noise_px - 1) < settled) break;
+  for (int iteration = 0; iteration < max_iterations; ++iteration) {
+    const double noise_px = std::clamp(solution().rms_px, min_px, 1.0);
+    if (std::abs(noise_px / problem_.noise_px - 1) < convergence) break;
     problem_.noise_px = noise_px;
     if (!solve(solved_for_)) return false;
   }
   return true;
 }
 
-std::size_t IntrinsicsSolver::point_of(std::size_t used, const BoardLattice::Corner& corner) const {
+std::size_t IntrinsicsSolver::problem_index(std::size_t used,
+                                            const BoardLattice::Corner& corner) const {
   return (used * input_.lattice.parts() + corner.part) * input_.lattice.points() + corner.point;
 }
 
-void IntrinsicsSolver::move_points() {
+void IntrinsicsSolver::update_points() {
   for (std::size_t i = 0; i < used_.size(); ++i) {
     for (const auto& corner : input_.views[used_[i]]) {
-      Eigen::Vector3d& point = problem_.points[point_of(i, corner)];
+      Eigen::Vector3d& point = problem_.points[problem_index(i, corner)];
       point << corner.pixel, std::copysign(corner.weight, point.z());
     }
   }
 }
 
-bool IntrinsicsSolver::take_bows() {
-  constexpr double settled_px = 0.002;
-  double most_px = 0;
+bool IntrinsicsSolver::apply_edge_curvature() {
+  constexpr double tolerance_px = 0.002;
+  double max_px = 0;
   const Lens lens = this->lens();
-  for (auto& view : input_.views) most_px = std::max(most_px, take_bows_of_lens(view, lens));
-  if (most_px < settled_px) return true;
-  move_points();
+  for (auto& view : input_.views) max_px = std::max(max_px, apply_lens_edge_curvature(view, lens));
+  if (max_px < tolerance_px) return true;
+  update_points();
   return solve(solved_for_);
 }
 
-bool IntrinsicsSolver::take_out_shifts(ShiftForm form) {
-  constexpr int rounds = 2;
-  constexpr double settled_px = 0.002;
-  for (int round = 0; round < rounds; ++round) {
+bool IntrinsicsSolver::correct_edge_shifts(ShiftForm form) {
+  constexpr int max_iterations = 2;
+  constexpr double tolerance_px = 0.002;
+  for (int iteration = 0; iteration < max_iterations; ++iteration) {
     auto views = input_.views;
-    for (auto& view : views) view = input_.lattice.bent(std::move(view), problem_.warp_m);
-    const auto shifts = edge_shifts(views, lens(), form);
+    for (auto& view : views) view = input_.lattice.with_warp(std::move(view), problem_.warp_m);
+    const auto shifts = estimate_edge_shifts(views, lens(), form);
     if (std::all_of(shifts.begin(), shifts.end(), [](const EdgeShift& shift) {
-          return shift.by.lpNorm<Eigen::Infinity>() < settled_px;
+          return shift.coefficients.lpNorm<Eigen::Infinity>() < tolerance_px;
         })) {
       return true;
     }
     for (std::size_t view = 0; view < input_.views.size(); ++view) {
-      edge_shifts_px_[view] += take_out_shift(input_.views[view], shifts[view]);
+      edge_shifts_px_[view] += correct_edge_shift(input_.views[view], shifts[view]);
     }
-    move_points();
+    update_points();
     if (!solve(solved_for_)) return false;
   }
   return true;
 }
 
-bool IntrinsicsSolver::bend() {
-  constexpr double much = 20;
+bool IntrinsicsSolver::solve_board_warp() {
+  constexpr double min_reduction = 20;
   if (input_.warp == WarpChoice::off) return true;
   const auto squares = [](const IntrinsicsSolution& solution) {
     return solution.rms_px * solution.rms_px * 2 * solution.corners;
@@ -211,41 +214,41 @@ bool IntrinsicsSolver::bend() {
   const IntrinsicsSolution flat = solution();
   solved_for_.warp = true;
   if (!solve(solved_for_)) return false;
-  const IntrinsicsSolution bent = solution();
+  const IntrinsicsSolution with_warp = solution();
   if (input_.warp == WarpChoice::automatic &&
-      squares(flat) - squares(bent) <= much * bent.rms_px * bent.rms_px) {
+      squares(flat) - squares(with_warp) <= min_reduction * with_warp.rms_px * with_warp.rms_px) {
     problem_ = flat.problem;
     solved_for_.warp = false;
   }
   return true;
 }
 
-bool IntrinsicsSolver::weigh_corners() {
-  const auto residuals = residuals_of(problem_);
-  std::vector<CornerError> told, untold;
+bool IntrinsicsSolver::reweight_corners() {
+  const auto residuals = compute_residuals(problem_);
+  std::vector<CornerError> known, unknown;
   for (std::size_t i = 0; i < used_.size(); ++i) {
     for (const auto& corner : input_.views[used_[i]]) {
-      const Eigen::Vector2d& residual = residuals[point_of(i, corner)];
+      const Eigen::Vector2d& residual = residuals[problem_index(i, corner)];
       if (!residual.allFinite()) continue;
-      (corner.sd_px > 0 ? told : untold).push_back({residual.squaredNorm() / 2, corner.sd_px});
+      (corner.sd_px > 0 ? known : unknown).push_back({residual.squaredNorm() / 2, corner.sd_px});
     }
   }
-  if (std::ranges::all_of(told, [](const auto& error) { return error.square_px2 == 0; })) {
+  if (std::ranges::all_of(known, [](const auto& error) { return error.square_px2 == 0; })) {
     return true;
   }
-  const CornerWeights weights(told, untold);
+  const CornerWeights weights(known, unknown);
   for (auto& view : input_.views) {
-    for (auto& corner : view) corner.weight = weights.of(corner.sd_px);
+    for (auto& corner : view) corner.weight = weights.at(corner.sd_px);
   }
-  move_points();
+  update_points();
   return solve(solved_for_);
 }
 
-bool IntrinsicsSolver::leave_out_outliers() {
+bool IntrinsicsSolver::reject_outliers() {
   // Without noise, residuals are caused by the regularization and are not outliers.
   constexpr double exact_px = 0.005;
   if (solution().rms_px < exact_px) return true;
-  SolveFor without_outliers = solved_for_;
+  SolveOptions without_outliers = solved_for_;
   without_outliers.without_outliers = true;
   return solve(without_outliers) && std::isfinite(solution().rms_px);
 }
@@ -254,27 +257,27 @@ IntrinsicsSolution IntrinsicsSolver::solution() const {
   IntrinsicsSolution result{IntrinsicsStatus::ok, problem_, used_, dropped_, {}, 0, 0, 0};
   result.solved_for = solved_for_;
   for (const std::size_t view : used_) result.edge_shifts_px.push_back(edge_shifts_px_[view]);
-  result.set_fit();
+  result.compute_fit();
   return result;
 }
 
-bool IntrinsicsSolver::solve(SolveFor what) { return solve_for_lens(problem_, what); }
+bool IntrinsicsSolver::solve(SolveOptions what) { return solve_for_lens(problem_, what); }
 
 namespace {
 
 /// Returns the limit of the RMS residual of a view, px, given those of all views.
-double limit_for(const std::vector<double>& rms) {
+double compute_rms_limit(const std::vector<double>& rms) {
   constexpr double fair_px = 1, fair = 4;
   return std::max(fair_px, fair * upper_median(rms));
 }
 
 }  // namespace
 
-void IntrinsicsSolver::seed(const Lens& lens) {
-  seeds_ = poses_through(input_, lens);
+void IntrinsicsSolver::initialize_poses(const Lens& lens) {
+  initial_poses_ = estimate_poses(input_, lens);
   used_.clear();
   for (std::size_t i = 0; i < input_.views.size(); ++i) {
-    if (std::isfinite(seeds_.rms_px[i])) used_.push_back(i);
+    if (std::isfinite(initial_poses_.rms_px[i])) used_.push_back(i);
   }
 }
 
@@ -294,20 +297,22 @@ void IntrinsicsSolver::assemble(const Lens& lens) {
                          {-1, -1, BoardProblem::kUnseen});
   for (std::size_t i = 0; i < used_.size(); ++i) {
     for (std::size_t part = 0; part < lattice.parts(); ++part) {
-      problem_.poses.push_back(lattice.pose_of_part(seeds_.poses[used_[i]], part));
+      problem_.poses.push_back(lattice.compute_part_pose(initial_poses_.poses[used_[i]], part));
     }
     const auto& corners = input_.views[used_[i]];
     for (std::size_t k = 0; k < corners.size(); ++k) {
-      const double sign = slips_.contains({used_[i], k}) ? -1 : 1;
-      problem_.points[point_of(i, corners[k])] << corners[k].pixel, sign * corners[k].weight;
+      const double sign = displaced_corners_.contains({used_[i], k}) ? -1 : 1;
+      problem_.points[problem_index(i, corners[k])] << corners[k].pixel, sign * corners[k].weight;
     }
   }
 }
 
-bool IntrinsicsSolver::sees_most() const { return std::isfinite(upper_median(rms_of_views())); }
+bool IntrinsicsSolver::projects_most_views() const {
+  return std::isfinite(upper_median(compute_view_rms()));
+}
 
-std::vector<double> IntrinsicsSolver::rms_of_views() const {
-  const auto residuals = residuals_of(problem_);
+std::vector<double> IntrinsicsSolver::compute_view_rms() const {
+  const auto residuals = compute_residuals(problem_);
   const std::size_t count = input_.lattice.parts() * input_.lattice.points();
   std::vector<double> rms;
   for (std::size_t i = 0; i < used_.size(); ++i) {
@@ -323,19 +328,19 @@ std::vector<double> IntrinsicsSolver::rms_of_views() const {
   return rms;
 }
 
-std::set<IntrinsicsSolver::CornerOfView> IntrinsicsSolver::slips() const {
+std::set<IntrinsicsSolver::CornerOfView> IntrinsicsSolver::find_displaced_corners() const {
   constexpr std::size_t neighbours = 8;
-  constexpr double sigmas = 8, least_px = 0.1, median_of_normal = 0.6745;
+  constexpr double sigmas = 8, min_px = 0.1, median_of_normal = 0.6745;
   // If OPENCV_FISHEYE does not fit the lens, the residuals of neighbors also differ from each
   // other.
   constexpr double beside_sigmas = 5;
-  const auto residuals = residuals_of(problem_);
-  std::map<CornerOfView, double> apart_px;
+  const auto residuals = compute_residuals(problem_);
+  std::map<CornerOfView, double> deviations_px;
   std::vector<double> all_px;
   for (std::size_t i = 0; i < used_.size(); ++i) {
     const auto& corners = input_.views[used_[i]];
     const auto residual = [&](std::size_t k) -> const Eigen::Vector2d& {
-      return residuals[point_of(i, corners[k])];
+      return residuals[problem_index(i, corners[k])];
     };
     for (std::size_t k = 0; k < corners.size(); ++k) {
       std::vector<std::pair<double, std::size_t>> near;
@@ -345,7 +350,7 @@ std::set<IntrinsicsSolver::CornerOfView> IntrinsicsSolver::slips() const {
       }
       if (near.size() < neighbours || !residual(k).allFinite()) continue;
       std::partial_sort(near.begin(), near.begin() + neighbours, near.end());
-      double most_px = 0;
+      double max_px = 0;
       for (Eigen::Index axis = 0; axis < 2; ++axis) {
         std::vector<double> beside;
         for (std::size_t n = 0; n < neighbours; ++n) {
@@ -353,91 +358,91 @@ std::set<IntrinsicsSolver::CornerOfView> IntrinsicsSolver::slips() const {
         }
         const double middle = upper_median(beside);
         for (double& value : beside) value = std::abs(value - middle);
-        const double spread = upper_median(beside) / median_of_normal;
+        const double robust_sd = upper_median(beside) / median_of_normal;
         const double off = std::abs(residual(k)[axis] - middle);
-        const double off_px = off * corners[k].weight;
-        all_px.push_back(off_px);
-        if (off > beside_sigmas * spread) most_px = std::max(most_px, off_px);
+        const double weighted_deviation_px = off * corners[k].weight;
+        all_px.push_back(weighted_deviation_px);
+        if (off > beside_sigmas * robust_sd) max_px = std::max(max_px, weighted_deviation_px);
       }
-      apart_px[{used_[i], k}] = most_px;
+      deviations_px[{used_[i], k}] = max_px;
     }
   }
   std::set<CornerOfView> found;
   if (all_px.empty()) return found;
-  const double limit_px = std::max(least_px, sigmas * upper_median(all_px) / median_of_normal);
-  for (const auto& [slip, px] : apart_px) {
+  const double limit_px = std::max(min_px, sigmas * upper_median(all_px) / median_of_normal);
+  for (const auto& [outlier, px] : deviations_px) {
     if (px <= limit_px) continue;
-    const auto& corners = input_.views[slip.first];
-    const std::size_t tag = input_.lattice.tag_of(corners[slip.second].point);
+    const auto& corners = input_.views[outlier.first];
+    const std::size_t tag = input_.lattice.tag_index(corners[outlier.second].point);
     for (std::size_t k = 0; k < corners.size(); ++k) {
-      if (input_.lattice.tag_of(corners[k].point) == tag) found.insert({slip.first, k});
+      if (input_.lattice.tag_index(corners[k].point) == tag) found.insert({outlier.first, k});
     }
   }
   // A view with many such corners is not improved by its other corners.
-  std::map<std::size_t, std::size_t> of_view;
-  for (const auto& [view, corner] : found) ++of_view[view];
-  std::erase_if(found, [&](const CornerOfView& slip) {
-    return 4 * of_view[slip.first] > input_.views[slip.first].size();
+  std::map<std::size_t, std::size_t> count_per_view;
+  for (const auto& [view, corner] : found) ++count_per_view[view];
+  std::erase_if(found, [&](const CornerOfView& outlier) {
+    return 4 * count_per_view[outlier.first] > input_.views[outlier.first].size();
   });
   return found;
 }
 
-bool IntrinsicsSolver::change_poses() {
-  constexpr double better = 0.7;
-  const auto rms = rms_of_views();
-  const double limit_px = limit_for(rms);
+bool IntrinsicsSolver::reestimate_poses() {
+  constexpr double max_ratio = 0.7;
+  const auto rms = compute_view_rms();
+  const double limit_px = compute_rms_limit(rms);
   const double worst_px = *std::max_element(rms.begin(), rms.end());
   if (worst_px <= limit_px) return false;
   const Lens lens = this->lens();
   std::vector<std::size_t> kept;
   for (std::size_t i = 0; i < used_.size(); ++i) {
-    const auto pose = view_pose(input_.views[used_[i]], lens);
-    const bool helps = pose && pose->rms_px < better * rms[i];
+    const auto pose = estimate_view_pose(input_.views[used_[i]], lens);
+    const bool helps = pose && pose->rms_px < max_ratio * rms[i];
     const bool bad = rms[i] > limit_px && rms[i] > worst_px / 2 && !helps;
     if (bad || !pose) {
       dropped_.push_back({used_[i], rms[i]});
       continue;
     }
-    seeds_.poses[used_[i]] = pose->camera_from_board;
+    initial_poses_.poses[used_[i]] = pose->camera_from_board;
     kept.push_back(used_[i]);
   }
   used_ = kept;
   return true;
 }
 
-bool IntrinsicsSolver::take_back() {
-  const double limit_px = limit_for(rms_of_views());
+bool IntrinsicsSolver::reinstate_views() {
+  const double limit_px = compute_rms_limit(compute_view_rms());
   const Lens lens = this->lens();
   const std::size_t before = dropped_.size();
   std::erase_if(dropped_, [&](const auto& dropped) {
-    const auto pose = view_pose(input_.views[dropped.view], lens);
+    const auto pose = estimate_view_pose(input_.views[dropped.view], lens);
     if (!pose || pose->rms_px > limit_px) return false;
-    seeds_.poses[dropped.view] = pose->camera_from_board;
+    initial_poses_.poses[dropped.view] = pose->camera_from_board;
     used_.push_back(dropped.view);
     return true;
   });
   std::sort(used_.begin(), used_.end());
   for (std::size_t i = 0; i < used_.size() && dropped_.size() < before; ++i) {
-    if (const auto pose = view_pose(input_.views[used_[i]], lens)) {
-      seeds_.poses[used_[i]] = pose->camera_from_board;
+    if (const auto pose = estimate_view_pose(input_.views[used_[i]], lens)) {
+      initial_poses_.poses[used_[i]] = pose->camera_from_board;
     }
   }
   return dropped_.size() < before;
 }
 
-bool all_alike(const BoardProblem& problem) {
-  constexpr double least_rad = 0.09;  // five degrees
+bool all_parallel(const BoardProblem& problem) {
+  constexpr double min_rad = 0.09;  // five degrees
   double widest_rad = 0;
   for (const BoardPose& a : problem.poses) {
     for (const BoardPose& b : problem.poses) {
-      const double cosine = normal_of(a).dot(normal_of(b));
+      const double cosine = compute_normal(a).dot(compute_normal(b));
       widest_rad = std::max(widest_rad, std::acos(std::clamp(cosine, -1.0, 1.0)));
     }
   }
-  return widest_rad < least_rad;
+  return widest_rad < min_rad;
 }
 
-bool solve_for_lens(BoardProblem& problem, SolveFor what) {
+bool solve_for_lens(BoardProblem& problem, SolveOptions what) {
   what.distortions = what.distortions && problem.intrinsics.size() > 4;
   return solve(problem, what);
 }

@@ -15,7 +15,7 @@ namespace vlp {
 /// Stages of solve_intrinsics(), in their order. Each returns false if it fails.
 class IntrinsicsSolver {
  public:
-  static constexpr std::size_t kLeastViews = 3;
+  static constexpr std::size_t kMinViews = 3;
 
   explicit IntrinsicsSolver(const IntrinsicsInput& input);
 
@@ -23,26 +23,26 @@ class IntrinsicsSolver {
   bool start(double focal_px);
   /// Splined lenses only: initializes stage 3 with the rotationally symmetric lens OPENCV_FISHEYE.
   /// Keeps the initial lens STEREOGRAPHIC if that fails.
-  void start_symmetric();
+  void initialize_symmetric();
   /// Stage 3.
   bool refine();
   /// Splined lenses only: scales the regularization to the noise of the corners.
-  bool weigh_regularization();
-  /// Stages 4 and 7: applies take_bows_of_lens() to all views and solves again.
-  bool take_bows();
+  bool scale_regularization();
+  /// Stages 4 and 7: applies apply_lens_edge_curvature() to all views and solves again.
+  bool apply_edge_curvature();
   /// Stages 5 (ShiftForm::constant) and 7 (ShiftForm::varying): corrects the corners for
-  /// edge_shifts() and solves again, at most twice, until the terms of the shifts are below 0.002
-  /// px.
-  bool take_out_shifts(ShiftForm form);
+  /// estimate_edge_shifts() and solves again, at most twice, until the terms of the shifts are
+  /// below 0.002 px.
+  bool correct_edge_shifts(ShiftForm form);
   /// Stage 6: estimates the warp of the board if WarpChoice permits it.
-  bool bend();
+  bool solve_board_warp();
   /// Stage 7: weights the corners by their variances (CornerWeights) if standard deviations of some
   /// corners are known.
-  bool weigh_corners();
+  bool reweight_corners();
   /// Stage 8.
-  bool leave_out_outliers();
+  bool reject_outliers();
   /// Stage 9, splined lenses only. Returns true also if the rotation has not converged.
-  bool turn_to_axis();
+  bool align_frame_to_optical_axis();
 
   /// Returns the current solution.
   IntrinsicsSolution solution() const;
@@ -52,38 +52,38 @@ class IntrinsicsSolver {
   using CornerOfView = std::pair<std::size_t, std::size_t>;
 
   Lens lens() const { return Lens(problem_.lens_model, problem_.intrinsics); }
-  bool solve(SolveFor what);
+  bool solve(SolveOptions what);
   /// Estimates the pose of every view with a lens. Views without a pose are unused until the next
   /// call.
-  void seed(const Lens& lens);
+  void initialize_poses(const Lens& lens);
   /// Sets up the problem of the views used, at their initial poses.
   void assemble(const Lens& lens);
   /// Returns the index of a corner in the points of the problem; `used` is the index of its view in
   /// used_.
-  std::size_t point_of(std::size_t used, const BoardLattice::Corner& corner) const;
+  std::size_t problem_index(std::size_t used, const BoardLattice::Corner& corner) const;
   /// Copies pixels and weights of the corners from the input to the problem; outliers are kept.
-  void move_points();
+  void update_points();
   /// Returns the RMS residual of each view used, px, in the order of used_; infinity if not finite.
-  std::vector<double> rms_of_views() const;
+  std::vector<double> compute_view_rms() const;
   /// Returns true if the lens projects all corners of most views. mrcal also solves for points
   /// behind the camera, and takes long.
-  bool sees_most() const;
+  bool projects_most_views() const;
   /// Returns the corners of tags with a corner whose residual differs from those of its neighbors.
   /// Skips views in which these would be more than a quarter of the corners.
-  std::set<CornerOfView> slips() const;
+  std::set<CornerOfView> find_displaced_corners() const;
   /// If a view fits badly, re-estimates the poses of all views used and drops the worst of the
   /// views that still fit badly. Returns true if the problem has to be solved again.
-  bool change_poses();
+  bool reestimate_poses();
   /// Reinstates dropped views that fit the current lens: a worse view had distorted the earlier
   /// lens. Returns true if there are any.
-  bool take_back();
+  bool reinstate_views();
 
   IntrinsicsInput input_;
   /// Mean shift by which the corners of each view of the input were corrected, px.
   std::vector<double> edge_shifts_px_;
   /// Parameters to estimate; the warp only after solve_board_warp().
-  SolveFor solved_for_{true, true, false, false};
-  PoseSeeds seeds_;
+  SolveOptions solved_for_{true, true, false, false};
+  InitialPoses initial_poses_;
   std::vector<std::size_t> used_;
   std::vector<IntrinsicsSolution::Dropped> dropped_;
   BoardProblem problem_{};
@@ -92,13 +92,13 @@ class IntrinsicsSolver {
   std::vector<double> symmetric_;
   /// Splined lenses only: corners that the lens would overfit where corners are sparse. Outliers
   /// from the start.
-  std::set<CornerOfView> slips_;
+  std::set<CornerOfView> displaced_corners_;
 };
 
 /// Returns true if all board normals lie within five degrees of each other.
-bool all_alike(const BoardProblem& problem);
+bool all_parallel(const BoardProblem& problem);
 
 /// Calls solve(), without the distortions if the model has none.
-bool solve_for_lens(BoardProblem& problem, SolveFor what);
+bool solve_for_lens(BoardProblem& problem, SolveOptions what);
 
 }  // namespace vlp

@@ -17,7 +17,7 @@ double side(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vec
 }
 
 /// Computes the convex hull by Andrew's monotone chain (1979); empty if all points are on a line.
-ImageRegion hull_of(std::vector<Eigen::Vector2d> points) {
+ImageRegion compute_convex_hull(std::vector<Eigen::Vector2d> points) {
   std::sort(points.begin(), points.end(), [](const auto& a, const auto& b) {
     return a.x() < b.x() || (a.x() == b.x() && a.y() < b.y());
   });
@@ -40,47 +40,48 @@ ImageRegion hull_of(std::vector<Eigen::Vector2d> points) {
 }
 
 /// Returns the part of a polygon with sign * (x[axis] - limit) <= 0 (Sutherland and Hodgman, 1974).
-ImageRegion cut(const ImageRegion& region, int axis, double limit, double sign) {
-  ImageRegion rest;
+ImageRegion clip_polygon(const ImageRegion& region, int axis, double limit, double sign) {
+  ImageRegion clipped;
   for (std::size_t i = 0; i < region.size(); ++i) {
     const Eigen::Vector2d &from = region[i], &to = region[(i + 1) % region.size()];
     const double from_out = sign * (from[axis] - limit), to_out = sign * (to[axis] - limit);
-    if (from_out <= 0) rest.push_back(from);
+    if (from_out <= 0) clipped.push_back(from);
     if ((from_out < 0 && to_out > 0) || (from_out > 0 && to_out < 0)) {
       Eigen::Vector2d crossing = from + (to - from) * (from_out / (from_out - to_out));
       crossing[axis] = limit;
-      rest.push_back(crossing);
+      clipped.push_back(crossing);
     }
   }
-  return rest;
+  return clipped;
 }
 
 }  // namespace
 
-ImageRegion known_region(const std::vector<Eigen::Vector2d>& corners_px,
-                         const std::array<int, 2>& imager_px, LensModel model, bool another_fits) {
-  const double margin = is_splined(model) || another_fits ? 0 : 0.04;
+ImageRegion compute_known_region(const std::vector<Eigen::Vector2d>& corners_px,
+                                 const std::array<int, 2>& imager_px, LensModel model,
+                                 bool other_model_fits) {
+  const double margin = is_splined(model) || other_model_fits ? 0 : 0.04;
   const Eigen::Vector2d last(imager_px[0] - 1, imager_px[1] - 1);
   const double margin_px = margin * last.norm();
   // Extends the hull by a square: near a corner of the image it reaches both edges.
   std::vector<Eigen::Vector2d> grown;
-  for (const Eigen::Vector2d& corner : hull_of(corners_px)) {
+  for (const Eigen::Vector2d& corner : compute_convex_hull(corners_px)) {
     for (const double x : {-margin_px, margin_px}) {
       for (const double y : {-margin_px, margin_px})
         grown.emplace_back(corner + Eigen::Vector2d(x, y));
     }
   }
-  ImageRegion region = hull_of(std::move(grown));
+  ImageRegion region = compute_convex_hull(std::move(grown));
   for (const int axis : {0, 1}) {
-    region = cut(region, axis, 0, -1);
-    region = cut(region, axis, last[axis], 1);
+    region = clip_polygon(region, axis, 0, -1);
+    region = clip_polygon(region, axis, last[axis], 1);
   }
   constexpr double whole = 0.985;
-  if (share_of_image(region, imager_px) < whole) return region;
+  if (compute_image_fraction(region, imager_px) < whole) return region;
   return {{0, 0}, {last.x(), 0}, last, {0, last.y()}};
 }
 
-double share_of_image(const ImageRegion& region, const std::array<int, 2>& imager_px) {
+double compute_image_fraction(const ImageRegion& region, const std::array<int, 2>& imager_px) {
   return compute_polygon_area(region) / ((imager_px[0] - 1.0) * (imager_px[1] - 1.0));
 }
 

@@ -21,13 +21,13 @@ using ImageRegion = std::vector<Eigen::Vector2d>;
 /// it no corner contradicts a wrong lens model.
 ///
 /// There is no margin for splined lenses, which are undetermined outside the corners, and if the
-/// corners do not distinguish the model from another one (another_fits).
-ImageRegion known_region(const std::vector<Eigen::Vector2d>& corners_px,
-                         const std::array<int, 2>& imager_px, LensModel model,
-                         bool another_fits = false);
+/// corners do not distinguish the model from another one (other_model_fits).
+ImageRegion compute_known_region(const std::vector<Eigen::Vector2d>& corners_px,
+                                 const std::array<int, 2>& imager_px, LensModel model,
+                                 bool other_model_fits = false);
 
 /// Computes the area of a region as a fraction of the image, which extends from the center of its
 /// first pixel to that of its last.
-double share_of_image(const ImageRegion& region, const std::array<int, 2>& imager_px);
+double compute_image_fraction(const ImageRegion& region, const std::array<int, 2>& imager_px);
 
 }  // namespace vlp

@@ -27,7 +27,7 @@ constexpr std::array kModels{LensModel::opencv4, LensModel::fisheye, LensModel::
 
 /// Returns the mean squared residual per axis of each view, px^2, from solves without it; infinity
 /// if it has no pose. Returns std::nullopt if a solve fails.
-std::optional<Squares> judged(const IntrinsicsInput& input) {
+std::optional<Squares> cross_validate(const IntrinsicsInput& input) {
   constexpr std::size_t parts = 3;
   Squares squares;
   for (std::size_t part = 0; part < parts; ++part) {
@@ -39,52 +39,52 @@ std::optional<Squares> judged(const IntrinsicsInput& input) {
     }
     const IntrinsicsSolution solution = solve_intrinsics(solved);
     if (!solution.ok()) return {};
-    for (const double rms_px : held_out_rms_px(solution, held_out)) {
+    for (const double rms_px : compute_held_out_rms_px(solution, held_out)) {
       squares.push_back(rms_px * rms_px);
     }
   }
   return squares;
 }
 
-double mean_of(const Squares& squares) {
+double mean_square(const Squares& squares) {
   return std::accumulate(squares.begin(), squares.end(), 0.0) / static_cast<double>(squares.size());
 }
 
 /// Mean over the views of log(a / b), and its standard error.
-struct Excess {
+struct MeanLogRatio {
   double mean, error;
 };
 
-Excess excess(const Squares& a, const Squares& b) {
+MeanLogRatio compare_residuals(const Squares& a, const Squares& b) {
   const auto n = static_cast<double>(a.size());
-  double sum = 0, spread = 0;
+  double sum = 0, sum_of_squares = 0;
   for (std::size_t i = 0; i < a.size(); ++i) sum += std::log(a[i] / b[i]);
   for (std::size_t i = 0; i < a.size(); ++i) {
-    spread += std::pow(std::log(a[i] / b[i]) - sum / n, 2);
+    sum_of_squares += std::pow(std::log(a[i] / b[i]) - sum / n, 2);
   }
-  return {sum / n, std::sqrt(spread / (n - 1) / n)};
+  return {sum / n, std::sqrt(sum_of_squares / (n - 1) / n)};
 }
 
 /// Removes the views that no model fits from all models: the lens is not the cause of their
 /// residuals.
-void leave_out_bad_views(std::vector<std::optional<Squares>>& of_models) {
-  constexpr double much = 9;
+void remove_bad_views(std::vector<std::optional<Squares>>& model_squares) {
+  constexpr double max_ratio = 9;
   constexpr double inf = std::numeric_limits<double>::infinity();
-  double usual = inf;
-  Squares least;
-  for (const auto& squares : of_models) {
+  double typical = inf;
+  Squares smallest;
+  for (const auto& squares : model_squares) {
     if (!squares) continue;
-    usual = std::min(usual, upper_median(*squares));
-    least.resize(squares->size(), inf);
-    for (std::size_t view = 0; view < least.size(); ++view) {
-      least[view] = std::min(least[view], (*squares)[view]);
+    typical = std::min(typical, upper_median(*squares));
+    smallest.resize(squares->size(), inf);
+    for (std::size_t view = 0; view < smallest.size(); ++view) {
+      smallest[view] = std::min(smallest[view], (*squares)[view]);
     }
   }
-  for (auto& squares : of_models) {
+  for (auto& squares : model_squares) {
     if (!squares) continue;
     Squares kept;
-    for (std::size_t view = 0; view < least.size(); ++view) {
-      if (least[view] <= much * usual && std::isfinite(least[view])) {
+    for (std::size_t view = 0; view < smallest.size(); ++view) {
+      if (smallest[view] <= max_ratio * typical && std::isfinite(smallest[view])) {
         kept.push_back((*squares)[view]);
       }
     }
@@ -97,24 +97,24 @@ void leave_out_bad_views(std::vector<std::optional<Squares>>& of_models) {
 }  // namespace
 
 std::optional<FisheyeFit> fit_fisheye(IntrinsicsInput input) {
-  constexpr double fits_px = 2;
+  constexpr double max_rms_px = 2;
   input.lens_model = LensModel::fisheye;
   IntrinsicsSolution solution = solve_intrinsics(input);
-  if (!solution.ok() || solution.rms_px > fits_px) return {};
+  if (!solution.ok() || solution.rms_px > max_rms_px) return {};
   const Lens lens = solution.lens();
-  double least = 1;
-  for (const Eigen::Vector2d& pixel : seen_px(solution.problem)) {
+  double smallest = 1;
+  for (const Eigen::Vector2d& pixel : collect_inlier_pixels(solution.problem)) {
     if (const auto ray = lens.unproject(pixel)) {
-      least = std::min(least, ray->direction.normalized().z());
+      smallest = std::min(smallest, ray->direction.normalized().z());
     }
   }
-  return FisheyeFit{std::move(solution), std::acos(least)};
+  return FisheyeFit{std::move(solution), std::acos(smallest)};
 }
 
 bool may_be_wide(const IntrinsicsInput& input) {
   constexpr double wide_rad = 0.7;
   if (input.views.empty()) return false;
-  const Lens lens = stereographic(input, focal_lengths(input).front());
+  const Lens lens = stereographic(input, rank_focal_lengths(input).front());
   double farthest_px = 0;
   for (const auto& corners : input.views) {
     for (const auto& corner : corners) {
@@ -125,7 +125,7 @@ bool may_be_wide(const IntrinsicsInput& input) {
 }
 
 std::optional<LensChoice> choose_lens(const IntrinsicsInput& input) {
-  if (input.views.size() < kLeastViewsToChoose) return {};
+  if (input.views.size() < kMinViewsToChoose) return {};
   LensChoice choice{};
   choice.fisheye = fit_fisheye(input);
   if (choice.fisheye && choice.fisheye->farthest_rad >= kRightAngle_rad) {
@@ -135,22 +135,22 @@ std::optional<LensChoice> choose_lens(const IntrinsicsInput& input) {
   for (const LensModel model : kModels) {
     IntrinsicsInput with_model = input;
     with_model.lens_model = model;
-    const bool can_be = model == LensModel::fisheye || choice.beyond_rad == 0;
-    squares.push_back(can_be ? judged(with_model) : std::nullopt);
+    const bool is_candidate = model == LensModel::fisheye || choice.beyond_rad == 0;
+    squares.push_back(is_candidate ? cross_validate(with_model) : std::nullopt);
   }
-  leave_out_bad_views(squares);
+  remove_bad_views(squares);
   constexpr double errors = 2;
   const Squares* best = nullptr;
   for (std::size_t i = 0; i < kModels.size(); ++i) {
     choice.tried.push_back({kModels[i]});
     if (!squares[i]) continue;
-    choice.tried.back().rms_px = std::sqrt(mean_of(*squares[i]));
-    if (best == nullptr || excess(*squares[i], *best).mean < 0) best = &*squares[i];
+    choice.tried.back().rms_px = std::sqrt(mean_square(*squares[i]));
+    if (best == nullptr || compare_residuals(*squares[i], *best).mean < 0) best = &*squares[i];
   }
   if (best == nullptr) return {};
   for (std::size_t i = 0; i < kModels.size(); ++i) {
     if (!squares[i]) continue;
-    const auto [mean, error] = excess(*squares[i], *best);
+    const auto [mean, error] = compare_residuals(*squares[i], *best);
     if (mean > errors * error) continue;
     choice.model = kModels[i];
     break;
@@ -158,7 +158,7 @@ std::optional<LensChoice> choose_lens(const IntrinsicsInput& input) {
   return choice;
 }
 
-std::string words_of(const LensChoice& choice) {
+std::string describe(const LensChoice& choice) {
   std::string taken, others;
   if (choice.beyond_rad > 0) {
     others = fmt::format(
@@ -170,9 +170,9 @@ std::string words_of(const LensChoice& choice) {
     const std::string left =
         std::isfinite(rms_px) ? fmt::format("{:.3f} px", rms_px) : std::string("no lens");
     if (model == choice.model) {
-      taken = fmt::format("{}, {}", name_of(model), left);
+      taken = fmt::format("{}, {}", to_string(model), left);
     } else if (choice.beyond_rad == 0) {
-      others += fmt::format("{}{} {}", others.empty() ? "" : ", ", name_of(model), left);
+      others += fmt::format("{}{} {}", others.empty() ? "" : ", ", to_string(model), left);
     }
   }
   return fmt::format("{} rms in views left out; {}", taken, others);

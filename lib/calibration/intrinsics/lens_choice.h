@@ -14,7 +14,7 @@
 namespace vlp {
 
 /// Residuals of one lens model in views that took no part in its solves.
-struct TriedLens {
+struct LensCandidate {
   LensModel model;
   /// RMS per axis, px, over the views that count; infinity if no lens of the model fits all of
   /// them.
@@ -22,7 +22,7 @@ struct TriedLens {
 };
 
 /// Minimum number of views for choose_lens().
-constexpr std::size_t kLeastViewsToChoose = 6;
+constexpr std::size_t kMinViewsToChoose = 6;
 
 /// Fit of OPENCV_FISHEYE, and the largest angle of a corner off its axis.
 struct FisheyeFit {
@@ -34,7 +34,7 @@ struct FisheyeFit {
 struct LensChoice {
   LensModel model;
   /// Candidates in the order of their number of parameters; OPENCV4 before OPENCV_FISHEYE.
-  std::vector<TriedLens> tried;
+  std::vector<LensCandidate> tried;
   /// Largest angle of a corner off the axis of OPENCV_FISHEYE if it is at least a right angle,
   /// where no OPENCVn has rays; 0 otherwise.
   double beyond_rad = 0;
@@ -57,8 +57,9 @@ bool may_be_wide(const IntrinsicsInput& input);
 ///
 /// Each model with distortion is solved with two parts (solve_intrinsics()) and evaluated with the
 /// third, so that each view is evaluated once. The evaluation fits only poses and edge shifts
-/// (held_out_rms_px()). Two models are compared by the mean, over the views, of the logarithm of
-/// the ratio of their squared residuals. The views of a few positions do not dominate this mean.
+/// (compute_held_out_rms_px()). Two models are compared by the mean, over the views, of the
+/// logarithm of the ratio of their squared residuals. The views of a few positions do not dominate
+/// this mean.
 ///
 /// Selects the model with the fewest parameters whose mean exceeds that of the best by at most two
 /// standard errors: the one-standard-error rule of Breiman, Friedman, Olshen and Stone,
@@ -68,10 +69,10 @@ bool may_be_wide(const IntrinsicsInput& input);
 /// Views in which the residuals of every model exceed three times the typical residual do not
 /// count. OPENCVn models are skipped if OPENCV_FISHEYE fits and has corners at 90 degrees off the
 /// axis or more. Ignores input.lens_model.
-/// @return std::nullopt if no model fits the views, or with fewer than kLeastViewsToChoose views
+/// @return std::nullopt if no model fits the views, or with fewer than kMinViewsToChoose views
 std::optional<LensChoice> choose_lens(const IntrinsicsInput& input);
 
 /// Describes the candidates with their residuals, the selected one first.
-std::string words_of(const LensChoice& choice);
+std::string describe(const LensChoice& choice);
 
 }  // namespace vlp

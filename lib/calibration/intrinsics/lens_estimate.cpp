@@ -38,7 +38,7 @@ SplitViews split_views(const LensViews& input, LensEstimate& result) {
                               {},
                               input.views.front().imager_px,
                               input.lens_model,
-                              possible_warp(input.board, input.warp)};
+                              select_warp(input.board, input.warp)};
   SplitViews split{empty, empty};
   int count = 0;
   for (const BoardView& view : result.views) {
@@ -75,7 +75,7 @@ struct BoardReach {
 BoardReach measure_reach(const IntrinsicsSolution& fisheye, const Eigen::Vector2d& grid_reach) {
   const Lens lens = fisheye.lens();
   const BoardProblem& problem = fisheye.problem;
-  const std::size_t points = problem.points_of_a_board();
+  const std::size_t points = problem.points_per_board();
   BoardReach reach;
   for (std::size_t board = 0; board < problem.poses.size(); ++board) {
     Eigen::Vector2d board_reach(0, 0);
@@ -109,24 +109,24 @@ std::string explain_unsuitable_grid(IntrinsicsInput input) {
   const BoardReach reach = measure_reach(solution, grid_reach);
   if (10 * reach.boards_within >= 9 * reach.boards) {
     const Lens lens = solution.lens();
-    const auto core = core_like(lens, seen_px(solution.problem));
-    return splined_like(lens, input.imager_px, splined, core)
+    const auto core = fit_spline_core(lens, collect_inlier_pixels(solution.problem));
+    return fit_splined_lens(lens, input.imager_px, splined, core)
                ? ""
-               : why_too_coarse(lens, input.imager_px, splined, core);
+               : describe_too_coarse_grid(lens, input.imager_px, splined, core);
   }
   const auto angle_deg = [](double u) { return deg_from_rad(2 * std::atan(u / 2)); };
   return fmt::format(
       "the control points of {} reach {:.0f} degrees off the axis to the sides and {:.0f} up and "
       "down, but the board is seen {:.0f} and {:.0f} degrees off: take --lens {}",
-      name_of(grid), angle_deg(grid_reach.x()), angle_deg(grid_reach.y()),
+      to_string(grid), angle_deg(grid_reach.x()), angle_deg(grid_reach.y()),
       angle_deg(reach.farthest.x()), angle_deg(reach.farthest.y()),
-      name_of(reaching(grid, grid_reach.cwiseMax(margin * reach.farthest))));
+      to_string(extend_grid(grid, grid_reach.cwiseMax(margin * reach.farthest))));
 }
 
 std::string recommend_model(LensModel requested, const IntrinsicsSolution& other) {
-  const std::string name(name_of(other.problem.lens_model));
+  const std::string name(to_string(other.problem.lens_model));
   return fmt::format("no lens of {} is found, but {} fits to {:.2f} px: take --lens {}",
-                     name_of(requested), name, other.rms_px, name);
+                     to_string(requested), name, other.rms_px, name);
 }
 
 /// Recommends another model that fits if the requested one does not; empty if there is none.
@@ -162,15 +162,16 @@ bool fits_as_well(const IntrinsicsSolution& lens, const IntrinsicsSolution& othe
 /// the lens is known.
 void include_difference(const Lens& lens, const Lens& other, const std::array<int, 2>& imager_px,
                         CalibrationReport& report) {
-  std::vector<Eigen::Vector2d> pixels = pixel_grid(imager_px);
+  std::vector<Eigen::Vector2d> pixels = make_pixel_grid(imager_px);
   std::erase_if(pixels, [&](const auto& pixel) { return !polygon_contains(report.region, pixel); });
-  const auto lens_from_other = b_from_a(other, lens, pixels);
+  const auto lens_from_other = fit_rotation(other, lens, pixels);
   if (!lens_from_other) return;
   for (const Eigen::Vector2d& pixel : pixels) {
     const auto ray = other.unproject(pixel);
     const auto seen = ray ? lens.project(*lens_from_other * ray->direction) : std::nullopt;
-    const double apart_px = seen ? (*seen - pixel).norm() : std::numeric_limits<double>::infinity();
-    report.uncertainty_worst_px = std::max(report.uncertainty_worst_px, apart_px);
+    const double difference_px =
+        seen ? (*seen - pixel).norm() : std::numeric_limits<double>::infinity();
+    report.uncertainty_worst_px = std::max(report.uncertainty_worst_px, difference_px);
   }
 }
 
@@ -184,15 +185,15 @@ void recommend_fisheye(const FisheyeFit& fisheye, LensEstimate& result) {
       fisheye.farthest_rad < min_angle_rad) {
     result.details.push_back(
         fmt::format("{} fits the views as well as {}, so that nothing is known beyond the corners",
-                    name_of(LensModel::fisheye), name_of(model)));
+                    to_string(LensModel::fisheye), to_string(model)));
     return;
   }
   result.better_model = LensModel::fisheye;
   result.warnings.push_back(fmt::format(
       "the board is seen up to {:.0f} degrees off the axis, and {} fits it to {:.3f} px, {} to "
       "{:.3f} px, with no rays from 90 degrees on: take --lens {}",
-      deg_from_rad(fisheye.farthest_rad), name_of(LensModel::fisheye), fisheye.solution.rms_px,
-      name_of(model), solution.rms_px, name_of(LensModel::fisheye)));
+      deg_from_rad(fisheye.farthest_rad), to_string(LensModel::fisheye), fisheye.solution.rms_px,
+      to_string(model), solution.rms_px, to_string(LensModel::fisheye)));
 }
 
 /// Warns of a displacement of the edges that a wrong gap between the tags causes, not a camera.
@@ -213,7 +214,7 @@ void warn_of_dropped_views(LensEstimate& result) {
       result.warnings.push_back(
           fmt::format("{}: shows the board where {} has no control points; take a larger "
                       "fov_x_deg, or Ny; dropped",
-                      result.images[view], name_of(model)));
+                      result.images[view], to_string(model)));
       continue;
     }
     result.warnings.push_back(fmt::format(
@@ -232,11 +233,11 @@ void warn_of_inconsistent_views(LensEstimate& result) {
 /// Selects the lens model of the views. Returns false if there are too few.
 bool choose_model(SplitViews& views, LensEstimate& result) {
   result.choice = choose_lens(views.solved);
-  if (views.solved.views.size() < kLeastViewsToChoose) {
+  if (views.solved.views.size() < kMinViewsToChoose) {
     fail(result, LensStatus::too_few_views,
          fmt::format("{} views with the board do not determine the lens model, which takes {}; "
                      "add views, or name the model with --lens",
-                     views.solved.views.size(), kLeastViewsToChoose));
+                     views.solved.views.size(), kMinViewsToChoose));
     return false;
   }
   // If no model fits, the solve with the stated one gives the reason.
@@ -249,22 +250,22 @@ std::string explain_no_lens(const SplitViews& views, const std::optional<Fisheye
                             IntrinsicsStatus status) {
   std::string problem;
   if (status == IntrinsicsStatus::no_solution) problem = explain_no_fit(views.solved, fisheye);
-  return problem.empty() ? std::string(explanation_of(status)) : problem;
+  return problem.empty() ? std::string(describe(status)) : problem;
 }
 
 /// Adds the uncertainty of a solution. `print_sd` is Board::print_sd.
 void add_uncertainty(const SplitViews& views, const std::optional<FisheyeFit>& fisheye,
                      bool is_chosen, double print_sd, LensEstimate& result) {
   IntrinsicsSolution& solution = result.solution;
-  solution.another_fits = fisheye && fits_as_well(fisheye->solution, solution);
-  result.report = report_on(solution, views.solved);
-  if (solution.another_fits) {
+  solution.other_model_fits = fisheye && fits_as_well(fisheye->solution, solution);
+  result.report = compute_report(solution, views.solved);
+  if (solution.other_model_fits) {
     include_difference(solution.lens(), fisheye->solution.lens(), views.solved.imager_px,
                        result.report);
     if (!is_chosen) recommend_fisheye(*fisheye, result);
   }
-  result.coverage = coverage_of(solution, views.solved);
-  result.held_out = held_out_fit(solution, views.held_out);
+  result.coverage = compute_view_coverage(solution, views.solved);
+  result.held_out = compute_held_out_fit(solution, views.held_out);
   result.lattice = views.solved.lattice;
   result.sharpness = measure_sharpness(result.views, views.solved.imager_px);
   std::optional<PrintEffect> print;
@@ -284,15 +285,15 @@ void add_uncertainty(const SplitViews& views, const std::optional<FisheyeFit>& f
   // The covariance of hundreds of control points would fill the file, without use for fixes.
   if (is_splined(solution.problem.lens_model)) return;
   const ProjectionUncertainty uncertainty(solution, views.solved.lattice);
-  const Eigen::VectorXd& pull = uncertainty.intrinsics_pull();
-  MatrixX covariance = uncertainty.intrinsics_covariance() + pull * pull.transpose();
+  const Eigen::VectorXd& bias = uncertainty.regularization_bias();
+  MatrixX covariance = uncertainty.intrinsics_covariance() + bias * bias.transpose();
   if (print) covariance += print->intrinsics * print->intrinsics.transpose();
   if (covariance.allFinite()) result.intrinsics_covariance = covariance;
 }
 
 }  // namespace
 
-WarpChoice possible_warp(const Board& board, WarpChoice warp) {
+WarpChoice select_warp(const Board& board, WarpChoice warp) {
   if (board.kind != BoardKind::chessboard || board.cols != board.rows) return warp;
   if (warp == WarpChoice::on) {
     throw std::invalid_argument(
@@ -306,7 +307,7 @@ LensEstimate estimate_lens(LensViews input) {
   LensEstimate result;
   result.views = std::move(input.views);
   input.views = {result.views.front()};
-  result.gamma = take_common_curve(result.views, input.board);
+  result.gamma = estimate_and_apply_tone_curve(result.views, input.board);
   const BoardCheck layout = check_board(input.board, result.views, {});
   if (!layout.problem.empty()) {
     fail(result, LensStatus::wrong_board, layout.problem);
@@ -330,8 +331,8 @@ LensEstimate estimate_lens(LensViews input) {
           result, views,
           fmt::format("it is seen up to {:.0f} degrees off the axis, where {} has no rays: take "
                       "--lens {}",
-                      deg_from_rad(fisheye->farthest_rad), name_of(model),
-                      name_of(LensModel::fisheye)));
+                      deg_from_rad(fisheye->farthest_rad), to_string(model),
+                      to_string(LensModel::fisheye)));
       return result;
     }
   }

@@ -77,11 +77,11 @@ struct LensEstimate {
 /// Returns `warp`, or WarpChoice::off for a square chessboard. Such a board looks the same after a
 /// quarter turn, so that the direction of its warp cannot be determined.
 /// @throws std::invalid_argument if the warp of such a board is requested
-WarpChoice possible_warp(const Board& board, WarpChoice warp);
+WarpChoice select_warp(const Board& board, WarpChoice warp);
 
 /// Estimates a lens from views of a board in these stages: tone curve of the camera
-/// (take_common_curve()), layout of the board (check_board()), lens model, solve
-/// (solve_intrinsics()), board again with the lens, uncertainty (report_on()).
+/// (estimate_and_apply_tone_curve()), layout of the board (check_board()), lens model, solve
+/// (solve_intrinsics()), board again with the lens, uncertainty (compute_report()).
 /// @throws std::invalid_argument as BoardLattice
 LensEstimate estimate_lens(LensViews input);
 

@@ -35,14 +35,14 @@ class ViewValues {
   template <typename Statistic>
   void add(const std::vector<Eigen::Vector2d>& at_px, const std::vector<double>& values,
            const Statistic& statistic) {
-    std::vector<std::vector<double>> of_view(parts_.size());
+    std::vector<std::vector<double>> values_by_part(parts_.size());
     for (std::size_t i = 0; i < values.size(); ++i) {
       const int col = ImageCoverage::part(at_px[i].x(), imager_px_[0], cols_);
       const int row = ImageCoverage::part(at_px[i].y(), imager_px_[1], rows_);
-      of_view[static_cast<std::size_t>(row * cols_ + col)].push_back(values[i]);
+      values_by_part[static_cast<std::size_t>(row * cols_ + col)].push_back(values[i]);
     }
     for (std::size_t i = 0; i < parts_.size(); ++i) {
-      if (!of_view[i].empty()) parts_[i].push_back(statistic(of_view[i]));
+      if (!values_by_part[i].empty()) parts_[i].push_back(statistic(values_by_part[i]));
     }
   }
 
@@ -65,10 +65,10 @@ struct MeasuredEdge {
   EdgeStep step;
 };
 
-std::vector<MeasuredEdge> collect_edges(const SeenBoard& seen) {
+std::vector<MeasuredEdge> collect_edges(const BoardDetection& seen) {
   std::vector<MeasuredEdge> edges;
   edges.reserve(4 * seen.tags.size());
-  for (const SeenTag& tag : seen.tags) {
+  for (const TagDetection& tag : seen.tags) {
     for (std::size_t k = 0; k < tag.steps.size(); ++k) {
       const EdgeStep& step = tag.steps[k];
       if (!(step.blur_px > 0 && step.bright > 0)) continue;
@@ -84,13 +84,13 @@ std::vector<MeasuredEdge> collect_edges(const SeenBoard& seen) {
 std::vector<double> compute_relative_lights(const std::vector<MeasuredEdge>& edges) {
   std::vector<double> lights;
   if (edges.size() < kMinEdgesOfField) return lights;
-  std::vector<EdgeFigure> figures;
-  figures.reserve(edges.size());
+  std::vector<EdgeSample> edge_values;
+  edge_values.reserve(edges.size());
   lights.reserve(edges.size());
   for (const auto& [middle_px, along, step] : edges) {
-    figures.push_back({middle_px, along, step.bright, 0});
+    edge_values.push_back({middle_px, along, step.bright, 0});
   }
-  const EdgeField field(figures, EdgeField::Terms::place);
+  const EdgeField field(edge_values, EdgeField::Terms::place);
   for (const auto& [middle_px, along, step] : edges) {
     lights.push_back(step.bright / field.value(middle_px, along));
   }
@@ -218,24 +218,24 @@ void fill_maps(std::span<const BoardView> views, const std::array<int, 2>& image
     lights.add(at_px, compute_relative_lights(edges), compute_mean);
   }
   blurs.summarize(
-      kMinViewsOfQuartile,
-      [](const auto& values) { return mtf50_from_blur(lower_quartile(values)); }, result.mtf50);
+      kMinViewsOfQuartile, [](const auto& values) { return compute_mtf50(lower_quartile(values)); },
+      result.mtf50);
   ratios.summarize(kMinViews, compute_median, result.black_to_white);
   lights.summarize(kMinViews, compute_median, result.light);
 }
 
 }  // namespace
 
-double mtf50_from_blur(double sigma_px) {
+double compute_mtf50(double sigma_px) {
   return std::sqrt(std::numbers::ln2 / 2) / (std::numbers::pi * sigma_px);
 }
 
-std::optional<double> mtf50_of_view(const SeenBoard& seen) {
+std::optional<double> compute_view_mtf50(const BoardDetection& seen) {
   std::vector<double> blurs_px;
   blurs_px.reserve(4 * seen.tags.size());
   for (const MeasuredEdge& edge : collect_edges(seen)) blurs_px.push_back(edge.step.blur_px);
   if (blurs_px.empty()) return std::nullopt;
-  return mtf50_from_blur(upper_median(std::move(blurs_px)));
+  return compute_mtf50(upper_median(std::move(blurs_px)));
 }
 
 std::optional<LensSharpness> measure_sharpness(std::span<const BoardView> views,

@@ -18,10 +18,10 @@ namespace vlp {
 /// cycles per pixel:
 ///   exp(-2 (pi sigma f)^2) = 0.5,     f = sqrt(ln 2 / 2) / (pi sigma) = 0.1874 / sigma.
 /// `sigma_px` is positive. It includes the pixel's own aperture, about 0.29 px.
-double mtf50_from_blur(double sigma_px);
+double compute_mtf50(double sigma_px);
 
 /// Returns the median MTF50 of the edges of a view; std::nullopt if no edge has a known blur.
-std::optional<double> mtf50_of_view(const SeenBoard& seen);
+std::optional<double> compute_view_mtf50(const BoardDetection& seen);
 
 /// Sharpness and contrast of lens and pixel together over the image, from the light profiles across
 /// tag edges (slanted edges as in ISO 12233). The line spread is a Gaussian with an excess
@@ -68,9 +68,9 @@ struct LensSharpness {
 };
 
 /// Measures sharpness and contrast from views of a board of AprilTags, with corners corrected for
-/// the tone curve (take_common_curve()). Returns std::nullopt if fewer than half of the parts of
-/// the image are known, from at least five views each. This is always so for boards with corner
-/// squares and for boards of squares.
+/// the tone curve (estimate_and_apply_tone_curve()). Returns std::nullopt if fewer than half of the
+/// parts of the image are known, from at least five views each. This is always so for boards with
+/// corner squares and for boards of squares.
 std::optional<LensSharpness> measure_sharpness(std::span<const BoardView> views,
                                                const std::array<int, 2>& imager_px);
 

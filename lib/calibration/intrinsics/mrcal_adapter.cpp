@@ -34,10 +34,10 @@ static_assert(sizeof(Eigen::Vector2d) == sizeof(mrcal_calobject_warp_t));
 /// Arguments of mrcal for a problem.
 struct Arguments {
   /// `fixed_rays`: rays of the problem, as points that do not move.
-  Arguments(const BoardProblem& problem, const SolveFor& what,
-            std::span<const BoardProblem::Held> held = {})
-      : frames(static_cast<int>(problem.poses.size())), fixed(static_cast<int>(held.size())) {
-    const std::string name(name_of(problem.lens_model));
+  Arguments(const BoardProblem& problem, const SolveOptions& what,
+            std::span<const BoardProblem::FixedRay> fixed_rays = {})
+      : frames(static_cast<int>(problem.poses.size())), fixed(static_cast<int>(fixed_rays.size())) {
+    const std::string name(to_string(problem.lens_model));
     if (!mrcal_lensmodel_from_name(&lens, name.c_str())) {
       throw std::runtime_error("mrcal does not know " + name);
     }
@@ -48,10 +48,10 @@ struct Arguments {
     selections.do_apply_regularization = what.distortions;
     selections.do_apply_outlier_rejection = what.without_outliers;
     for (int frame = 0; frame < frames; ++frame) observations.push_back({{0, -1}, frame});
-    for (const auto& [pixel, ray] : held) {
+    for (const auto& [pixel, ray] : fixed_rays) {
       mrcal_observation_point_t seen{{0, -1}, static_cast<int>(points.size()), {}};
       seen.px.x = pixel.x(), seen.px.y = pixel.y(), seen.px.z = 1 / problem.noise_px;
-      seen_points.push_back(seen);
+      point_observations.push_back(seen);
       mrcal_point3_t unit{};
       Eigen::Map<Eigen::Vector3d>(unit.xyz) = ray.normalized();
       points.push_back(unit);
@@ -69,7 +69,7 @@ struct Arguments {
   mrcal_problem_constants_t constants{};
   std::vector<mrcal_observation_board_t> observations;
   std::vector<mrcal_point3_t> points;
-  std::vector<mrcal_observation_point_t> seen_points;
+  std::vector<mrcal_observation_point_t> point_observations;
   int measurements, states;
 };
 
@@ -86,12 +86,12 @@ std::vector<Eigen::Vector3d> weighted_points(const BoardProblem& problem) {
 
 /// Calls an unpack function of mrcal, which has one more argument since version 2.4.
 template <typename Unpack>
-void unpack(Unpack* function, double* state, const Arguments& the) {
+void unpack(Unpack* function, double* state, const Arguments& args) {
   if constexpr (std::is_invocable_v<Unpack*, double*, int, int, int, int, int, int,
                                     mrcal_problem_selections_t, const mrcal_lensmodel_t*>) {
-    function(state, 1, 0, the.frames, 0, 0, the.frames, the.selections, &the.lens);
+    function(state, 1, 0, args.frames, 0, 0, args.frames, args.selections, &args.lens);
   } else {
-    function(state, 1, 0, the.frames, 0, 0, the.selections, &the.lens);
+    function(state, 1, 0, args.frames, 0, 0, args.selections, &args.lens);
   }
 }
 
@@ -102,15 +102,15 @@ void unpack(Unpack* function, double* state, const Arguments& the) {
 /// not grant that, or no thread, the messages of mrcal appear. Calls are sequential, because mrcal
 /// does not document concurrent use.
 template <typename Work>
-void in_silence(const Work& work) {
-  static std::mutex only_one;
-  const std::lock_guard alone(only_one);
+void with_suppressed_output(const Work& work) {
+  static std::mutex mrcal_mutex;
+  const std::lock_guard lock(mrcal_mutex);
   const auto silent_work = [&] {
     // Closes the other files, so that files which other threads close do not stay open here.
     constexpr unsigned first = STDERR_FILENO + 1, last = std::numeric_limits<unsigned>::max();
     if (::close_range(first, last, CLOSE_RANGE_UNSHARE) == 0) {
-      const int nowhere = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
-      if (nowhere >= 0) ::dup2(nowhere, STDERR_FILENO);
+      const int null_device = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
+      if (null_device >= 0) ::dup2(null_device, STDERR_FILENO);
     }
     work();
   };
@@ -123,21 +123,22 @@ void in_silence(const Work& work) {
 
 }  // namespace
 
-bool solve_by_mrcal(BoardProblem& problem, const SolveFor& what) {
-  Arguments the(problem, what, problem.held);
-  if (the.measurements < the.states) return false;
-  Eigen::VectorXd state(the.states), residuals(the.measurements);
+bool solve_by_mrcal(BoardProblem& problem, const SolveOptions& what) {
+  Arguments args(problem, what, problem.fixed_rays);
+  if (args.measurements < args.states) return false;
+  Eigen::VectorXd state(args.states), residuals(args.measurements);
   auto points = weighted_points(problem);
   mrcal_stats_t stats{};
-  in_silence([&] {
+  with_suppressed_output([&] {
     stats = mrcal_optimize(
         state.data(), bytes(state.size()), residuals.data(), bytes(residuals.size()),
         problem.intrinsics.data(), nullptr, reinterpret_cast<mrcal_pose_t*>(problem.poses.data()),
-        the.points.data(), reinterpret_cast<mrcal_calobject_warp_t*>(problem.warp_m.data()), 1, 0,
-        the.frames, the.fixed, the.fixed, the.observations.data(), the.seen_points.data(),
-        the.frames, the.fixed, reinterpret_cast<mrcal_point3_t*>(points.data()), &the.lens,
-        problem.imager_px.data(), the.selections, &the.constants, problem.spacing_m, problem.cols,
-        problem.rows, false, false);
+        args.points.data(), reinterpret_cast<mrcal_calobject_warp_t*>(problem.warp_m.data()), 1, 0,
+        args.frames, args.fixed, args.fixed, args.observations.data(),
+        args.point_observations.data(), args.frames, args.fixed,
+        reinterpret_cast<mrcal_point3_t*>(points.data()), &args.lens, problem.imager_px.data(),
+        args.selections, &args.constants, problem.spacing_m, problem.cols, problem.rows, false,
+        false);
   });
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (points[i].z() < 0 && problem.points[i].z() > 0) problem.points[i].z() *= -1;
@@ -145,22 +146,22 @@ bool solve_by_mrcal(BoardProblem& problem, const SolveFor& what) {
   return stats.rms_reproj_error__pixels >= 0 && residuals.allFinite();
 }
 
-Linearization linearized_by_mrcal(const BoardProblem& problem, const SolveFor& what) {
-  const Arguments the(problem, what);
+Linearization linearize_by_mrcal(const BoardProblem& problem, const SolveOptions& what) {
+  const Arguments args(problem, what);
   const int entries =
-      _mrcal_num_j_nonzero(the.frames, 0, problem.cols, problem.rows, 1, 0, the.frames, 0, 0,
-                           the.observations.data(), nullptr, the.selections, &the.lens);
+      _mrcal_num_j_nonzero(args.frames, 0, problem.cols, problem.rows, 1, 0, args.frames, 0, 0,
+                           args.observations.data(), nullptr, args.selections, &args.lens);
   Linearization result;
-  Eigen::VectorXd state(the.states), residuals(the.measurements);
-  std::vector<int> starts(static_cast<std::size_t>(the.measurements) + 1);
+  Eigen::VectorXd state(args.states), residuals(args.measurements);
+  std::vector<int> column_pointers(static_cast<std::size_t>(args.measurements) + 1);
   std::vector<int> rows(static_cast<std::size_t>(entries));
   std::vector<double> values(static_cast<std::size_t>(entries));
   const auto points = weighted_points(problem);
   cholmod_sparse jacobian{};
-  jacobian.nrow = static_cast<std::size_t>(the.states);
-  jacobian.ncol = static_cast<std::size_t>(the.measurements);
+  jacobian.nrow = static_cast<std::size_t>(args.states);
+  jacobian.ncol = static_cast<std::size_t>(args.measurements);
   jacobian.nzmax = static_cast<std::size_t>(entries);
-  jacobian.p = starts.data();
+  jacobian.p = column_pointers.data();
   jacobian.i = rows.data();
   jacobian.x = values.data();
   jacobian.itype = CHOLMOD_INT;
@@ -168,32 +169,35 @@ Linearization linearized_by_mrcal(const BoardProblem& problem, const SolveFor& w
   jacobian.dtype = CHOLMOD_DOUBLE;
   jacobian.sorted = 1;
   jacobian.packed = 1;
-  bool done = false;
-  in_silence([&] {
-    done = mrcal_optimizer_callback(
+  bool ok = false;
+  with_suppressed_output([&] {
+    ok = mrcal_optimizer_callback(
         state.data(), bytes(state.size()), residuals.data(), bytes(residuals.size()), &jacobian,
         problem.intrinsics.data(), nullptr,
         reinterpret_cast<const mrcal_pose_t*>(problem.poses.data()), nullptr,
-        reinterpret_cast<const mrcal_calobject_warp_t*>(problem.warp_m.data()), 1, 0, the.frames, 0,
-        0, the.observations.data(), nullptr, the.frames, 0,
-        reinterpret_cast<const mrcal_point3_t*>(points.data()), &the.lens, problem.imager_px.data(),
-        the.selections, &the.constants, problem.spacing_m, problem.cols, problem.rows, false);
+        reinterpret_cast<const mrcal_calobject_warp_t*>(problem.warp_m.data()), 1, 0, args.frames,
+        0, 0, args.observations.data(), nullptr, args.frames, 0,
+        reinterpret_cast<const mrcal_point3_t*>(points.data()), &args.lens,
+        problem.imager_px.data(), args.selections, &args.constants, problem.spacing_m, problem.cols,
+        problem.rows, false);
   });
-  if (!done) throw std::runtime_error("mrcal_optimizer_callback failed");
+  if (!ok) throw std::runtime_error("mrcal_optimizer_callback failed");
   // Scales everything back to pixels.
   residuals *= problem.noise_px;
   for (double& value : values) value *= problem.noise_px;
-  const int of_boards = mrcal_num_measurements_boards(the.frames, problem.cols, problem.rows);
-  result.residuals_px = residuals.head(of_boards);
-  result.regularization = residuals.tail(residuals.size() - of_boards);
+  const int num_board_residuals =
+      mrcal_num_measurements_boards(args.frames, problem.cols, problem.rows);
+  result.residuals_px = residuals.head(num_board_residuals);
+  result.regularization = residuals.tail(residuals.size() - num_board_residuals);
   result.jacobian_transposed = Eigen::Map<const Eigen::SparseMatrix<double>>(
-      the.states, the.measurements, starts.back(), starts.data(), rows.data(), values.data());
-  result.scale.setOnes(the.states);
-  unpack(mrcal_unpack_solver_state_vector, result.scale.data(), the);
+      args.states, args.measurements, column_pointers.back(), column_pointers.data(), rows.data(),
+      values.data());
+  result.scale.setOnes(args.states);
+  unpack(mrcal_unpack_solver_state_vector, result.scale.data(), args);
   constexpr Eigen::Index core = 4;
   result.first_intrinsic = what.core ? 0 : core;
-  result.poses =
-      mrcal_state_index_frames(0, 1, 0, the.frames, 0, 0, the.frames, the.selections, &the.lens);
+  result.poses = mrcal_state_index_frames(0, 1, 0, args.frames, 0, 0, args.frames, args.selections,
+                                          &args.lens);
   return result;
 }
 

@@ -21,7 +21,7 @@
 namespace vlp {
 namespace {
 
-constexpr std::size_t kMostBytes = std::size_t{1} << 30;
+constexpr std::size_t kMaxCornerFileBytes = std::size_t{1} << 30;
 
 /// Row of the file; without a pixel, the corner was not seen.
 struct CornerRow {
@@ -31,7 +31,7 @@ struct CornerRow {
   double weight;
 };
 
-std::vector<std::string_view> words_in(std::string_view line) {
+std::vector<std::string_view> split_words(std::string_view line) {
   constexpr std::string_view blank = " \t\r";
   std::vector<std::string_view> words;
   for (auto from = line.find_first_not_of(blank); from != line.npos;) {
@@ -43,10 +43,10 @@ std::vector<std::string_view> words_in(std::string_view line) {
 }
 
 /// Reads the rows of a file.
-class CornerRows {
+class CornerTable {
  public:
-  CornerRows(const std::filesystem::path& file, const std::array<int, 2>& imager_px)
-      : file_(file), imager_px_(imager_px), text_(read_text_file(file, kMostBytes)) {
+  CornerTable(const std::filesystem::path& file, const std::array<int, 2>& imager_px)
+      : file_(file), imager_px_(imager_px), text_(read_text_file(file, kMaxCornerFileBytes)) {
     std::size_t line = 0;
     for (std::size_t from = 0; from < text_.size();) {
       const std::size_t end = text_.find('\n', from);
@@ -54,7 +54,7 @@ class CornerRows {
       from = end + 1;
     }
     if (rows.empty()) throw InputError(file, "holds no corner");
-    if (too_many_outside(outside_, seen_)) throw InputError(*first_outside_);
+    if (too_many_outside(num_outside_, num_seen_)) throw InputError(*first_outside_);
   }
 
   InputError error(std::size_t line, const std::string& problem) const {
@@ -65,7 +65,7 @@ class CornerRows {
 
  private:
   void read(std::size_t line, std::string_view text) {
-    const auto words = words_in(text);
+    const auto words = split_words(text);
     if (words.empty()) return;
     if (words[0].front() == '#') {
       // The first is the legend; "##" and "#!" are comments.
@@ -78,38 +78,38 @@ class CornerRows {
       throw error(line, "should be: filename x y level; is it mrcal's table of corners?");
     }
     CornerRow row{line, words[0], {}, 1};
-    const auto x = number(line, words[1]), y = number(line, words[2]);
-    const auto fourth = words.size() == 4 ? number(line, words[3]) : 1;
-    if (words.size() == 4) row.weight = weight_of(line, fourth);
+    const auto x = parse_number(line, words[1]), y = parse_number(line, words[2]);
+    const auto fourth = words.size() == 4 ? parse_number(line, words[3]) : 1;
+    if (words.size() == 4) row.weight = parse_weight(line, fourth);
     if (x && y && *x >= 0 && *y >= 0 && row.weight > 0) {
       row.pixel = {*x, *y};
-      const std::string outside = outside_words(*row.pixel, imager_px_);
-      ++seen_;
-      if (!outside.empty() && outside_++ == 0) first_outside_ = error(line, outside);
+      const std::string outside = describe_outside(*row.pixel, imager_px_);
+      ++num_seen_;
+      if (!outside.empty() && num_outside_++ == 0) first_outside_ = error(line, outside);
     }
     rows.push_back(row);
   }
 
   /// Parses a number; std::nullopt for "-".
-  std::optional<double> number(std::size_t line, std::string_view word) const {
+  std::optional<double> parse_number(std::size_t line, std::string_view word) const {
     if (word == "-") return {};
     double value = 0;
     const auto [end, problem] = std::from_chars(word.data(), word.data() + word.size(), value);
     if (problem != std::errc() || end != word.data() + word.size() || !std::isfinite(value)) {
-      throw error(line, in_quotes(shortened(word, 40)) + " should be a finite number, or -");
+      throw error(line, in_quotes(truncate_text(word, 40)) + " should be a finite number, or -");
     }
     return value;
   }
 
   /// Returns the weight of a corner; 0 if it was not seen.
-  double weight_of(std::size_t line, std::optional<double> fourth) const {
-    constexpr double most_level = 30, most_weight = 1000;
+  double parse_weight(std::size_t line, std::optional<double> fourth) const {
+    constexpr double max_level = 30, max_weight = 1000;
     if (!fourth || *fourth < 0) return 0;
-    if (weights_ && *fourth > most_weight) {
+    if (weights_ && *fourth > max_weight) {
       throw error(line, fmt::format("a weight of {:.6g}: weights go up to 1000", *fourth));
     }
     if (weights_) return *fourth;
-    if (*fourth > most_level) throw error(line, "a level should be within 0 and 30");
+    if (*fourth > max_level) throw error(line, "a level should be within 0 and 30");
     return std::exp2(-std::floor(*fourth));
   }
 
@@ -118,18 +118,19 @@ class CornerRows {
   std::string text_;
   bool weights_ = false;
   bool legend_ = false;
-  std::size_t seen_ = 0, outside_ = 0;
+  std::size_t num_seen_ = 0, num_outside_ = 0;
   std::optional<InputError> first_outside_;
 };
 
 /// Describes the numbers of corners of a board, for messages.
-std::string counted(const Board& board, const BoardLattice& lattice) {
+std::string describe_size(const Board& board, const BoardLattice& lattice) {
   return fmt::format("a board of {} x {} {} has {} x {} corners", board.cols, board.rows,
                      board.has_squares() ? "squares" : "tags", lattice.cols(), lattice.rows());
 }
 
-std::string wrong_count(const Board& board, const BoardLattice& lattice, std::size_t rows) {
-  std::string words = fmt::format("{} rows, but {}", rows, counted(board, lattice));
+std::string describe_wrong_count(const Board& board, const BoardLattice& lattice,
+                                 std::size_t rows) {
+  std::string words = fmt::format("{} rows, but {}", rows, describe_size(board, lattice));
   if (lattice.parts() > 1) words += " of each kind";
   if (board.has_squares() && rows == static_cast<std::size_t>(board.cols * board.rows)) {
     words += fmt::format(
@@ -150,7 +151,7 @@ struct PartOfImage {
   std::size_t part;
 };
 
-PartOfImage parse_part(const BoardLattice& lattice, const CornerRows& table, std::size_t line,
+PartOfImage parse_part(const BoardLattice& lattice, const CornerTable& table, std::size_t line,
                        std::string_view name) {
   PartOfImage found{std::string(name), 0};
   if (lattice.parts() == 1) return found;
@@ -167,14 +168,14 @@ PartOfImage parse_part(const BoardLattice& lattice, const CornerRows& table, std
 }
 
 /// Throws InputError if the corners lie in rows of another length than that of the board.
-void check_row_length(const Board& board, const BoardLattice& lattice, const CornerRows& table,
+void check_row_length(const Board& board, const BoardLattice& lattice, const CornerTable& table,
                       const std::vector<LatticePixels>& images, std::size_t first_line) {
   const auto stated = static_cast<std::size_t>(lattice.cols());
-  const std::size_t shown = row_shown(images, stated);
-  if (shown == stated) return;
-  const bool is_swapped = shown == static_cast<std::size_t>(lattice.rows());
-  throw table.error(first_line, fmt::format("the corners lie in rows of {}, but {}{}", shown,
-                                            counted(board, lattice),
+  const std::size_t found_cols = estimate_row_length(images, stated);
+  if (found_cols == stated) return;
+  const bool is_swapped = found_cols == static_cast<std::size_t>(lattice.rows());
+  throw table.error(first_line, fmt::format("the corners lie in rows of {}, but {}{}", found_cols,
+                                            describe_size(board, lattice),
                                             is_swapped ? "; swap cols and rows of board.yaml"
                                                        : "; is board.yaml that of the board?"));
 }
@@ -184,7 +185,7 @@ void check_row_length(const Board& board, const BoardLattice& lattice, const Cor
 std::vector<BoardView> read_corners(const std::filesystem::path& file, const Board& board,
                                     const std::array<int, 2>& imager_px) {
   const BoardLattice lattice(board);
-  const CornerRows table(file, imager_px);
+  const CornerTable table(file, imager_px);
   std::vector<BoardView> views;
   std::set<std::string_view> known;
   std::unordered_map<std::string, std::size_t> view_of_image;
@@ -198,18 +199,18 @@ std::vector<BoardView> read_corners(const std::filesystem::path& file, const Boa
       throw table.error(line, fmt::format("image '{}' stands twice", name));
     }
     const auto [image, part] = parse_part(lattice, table, line, name);
-    const auto [place, is_new] = view_of_image.try_emplace(image, views.size());
+    const auto [entry, is_new] = view_of_image.try_emplace(image, views.size());
     if (is_new) views.push_back({image, imager_px, {}});
-    BoardView& view = views[place->second];
+    BoardView& view = views[entry->second];
     const bool none = end == from + 1 && !first_pixel;
     if (!none && end - from != lattice.points()) {
-      throw table.error(
-          line, fmt::format("image '{}' has {}", name, wrong_count(board, lattice, end - from)));
+      throw table.error(line, fmt::format("image '{}' has {}", name,
+                                          describe_wrong_count(board, lattice, end - from)));
     }
     for (std::size_t i = from; i < end; ++i) {
       if (!table.rows[i].pixel) continue;
       view.seen.points.push_back(
-          {lattice.index_of(part, i - from), *table.rows[i].pixel, table.rows[i].weight});
+          {lattice.point_index(part, i - from), *table.rows[i].pixel, table.rows[i].weight});
     }
     if (!none) {
       if (images.empty()) first_line = line;
@@ -221,7 +222,7 @@ std::vector<BoardView> read_corners(const std::filesystem::path& file, const Boa
   if (images.empty()) return views;
   for (BoardView& view : views) {
     std::sort(view.seen.points.begin(), view.seen.points.end(),
-              [](const SeenPoint& a, const SeenPoint& b) { return a.index < b.index; });
+              [](const PointDetection& a, const PointDetection& b) { return a.index < b.index; });
   }
   check_row_length(board, lattice, table, images, first_line);
   if (lattice.parts() == 1) {

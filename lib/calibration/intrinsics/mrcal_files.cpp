@@ -21,7 +21,7 @@ namespace {
 constexpr int kDigits = 17;
 
 /// Formats all arguments of mrcal.optimize(), at the solution.
-std::string optimization_inputs(const IntrinsicsSolution& solution) {
+std::string format_optimization_inputs(const IntrinsicsSolution& solution) {
   const BoardProblem& problem = solution.problem;
   const std::size_t boards = problem.poses.size();
   const auto rows = static_cast<std::size_t>(problem.rows);
@@ -42,7 +42,7 @@ std::string optimization_inputs(const IntrinsicsSolution& solution) {
   const std::array<std::int32_t, 2> imager{problem.imager_px[0], problem.imager_px[1]};
 
   NumpyArchive archive;
-  archive.add("lensmodel", name_of(problem.lens_model));
+  archive.add("lensmodel", to_string(problem.lens_model));
   archive.add("intrinsics", {1, problem.intrinsics.size()}, problem.intrinsics);
   archive.add("extrinsics_rt_fromref", {0, 6}, std::span<const double>{});
   archive.add("frames_rt_toref", {boards, 6}, poses);
@@ -63,41 +63,42 @@ std::string optimization_inputs(const IntrinsicsSolution& solution) {
        {"points", "observations_point", "indices_point_camintrinsics_camextrinsics"}) {
     archive.add(none, std::string_view());
   }
-  return base85(archive.bytes());
+  return encode_base85(archive.bytes());
 }
 
 }  // namespace
 
 void write_cameramodel(const std::filesystem::path& file, const IntrinsicsSolution& solution) {
   const BoardProblem& problem = solution.problem;
-  const ImageRegion region =
-      known_region(seen_px(problem), problem.imager_px, problem.lens_model, solution.another_fits);
+  const ImageRegion region = compute_known_region(collect_inlier_pixels(problem), problem.imager_px,
+                                                  problem.lens_model, solution.other_model_fits);
   std::string text = "{\n    'lensmodel':  '";
-  text.append(name_of(problem.lens_model)).append("',\n    'intrinsics': [");
+  text.append(to_string(problem.lens_model)).append("',\n    'intrinsics': [");
   for (const double value : problem.intrinsics) {
     text.append(" ").append(significant(value, kDigits)).append(",");
   }
   text += "],\n    'extrinsics': [ 0, 0, 0, 0, 0, 0 ],\n    'imagersize': [ ";
   text.append(std::to_string(problem.imager_px[0])).append(", ");
   text.append(std::to_string(problem.imager_px[1])).append(" ],\n    'icam_intrinsics': 0,\n");
-  text.append(mrcal_region(region)).append("    'optimization_inputs': b'");
-  text.append(optimization_inputs(solution)).append("',\n}\n");
+  text.append(format_mrcal_region(region)).append("    'optimization_inputs': b'");
+  text.append(format_optimization_inputs(solution)).append("',\n}\n");
   write_file(file, text);
 }
 
 namespace {
 
 /// Returns unique names of the views in the table.
-std::vector<std::string> names_in_table(const IntrinsicsSolution& solution,
-                                        std::span<const std::string> images) {
+std::vector<std::string> make_image_names_unique(const IntrinsicsSolution& solution,
+                                                 std::span<const std::string> images) {
   std::vector<std::string> names;
-  std::set<std::string> known;
+  std::set<std::string> used_names;
   for (const std::size_t view : solution.views) {
     std::string name = images[view];
     std::ranges::replace(name, ' ', '_');
-    std::string own = name;
-    for (int n = 2; !known.insert(own).second; ++n) own = name + "-" + std::to_string(n);
-    names.push_back(own);
+    std::string distinct_name = name;
+    for (int n = 2; !used_names.insert(distinct_name).second; ++n)
+      distinct_name = name + "-" + std::to_string(n);
+    names.push_back(distinct_name);
   }
   return names;
 }
@@ -108,13 +109,13 @@ void write_corners(const std::filesystem::path& file, const IntrinsicsSolution& 
                    std::span<const std::string> images) {
   const BoardProblem& problem = solution.problem;
   const std::size_t parts = problem.poses.size() / solution.views.size();
-  const std::size_t count = problem.points_of_a_board();
+  const std::size_t count = problem.points_per_board();
   // mrcal truncates levels to integers from 0 on; an option makes it read weights instead.
   const bool weights = std::ranges::any_of(problem.points, [](const Eigen::Vector3d& point) {
     const double level = -std::log2(point.z());
     return point.z() > 0 && (level < 0 || level != std::floor(level));
   });
-  const std::vector<std::string> names = names_in_table(solution, images);
+  const std::vector<std::string> names = make_image_names_unique(solution, images);
   std::string text = weights ? "# filename x y weight\n" : "# filename x y level\n";
   for (std::size_t board = 0; board < problem.poses.size(); ++board) {
     std::string name = names[board / parts];

@@ -15,7 +15,8 @@
 namespace vlp {
 
 /// Writes mrcal's .cameramodel: the lens with 17 digits, its calibrated region
-/// (valid_intrinsics_region, known_region()), and the solved problem (optimization_inputs).
+/// (valid_intrinsics_region, compute_known_region()), and the solved problem
+/// (format_optimization_inputs).
 ///
 /// mrcal's tools use the problem, such as mrcal-show-projection-uncertainty and
 /// mrcal-show-residuals. The former assumes independent errors of the corners. For a board of tags

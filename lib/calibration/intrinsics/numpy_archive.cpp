@@ -16,8 +16,12 @@ std::string little_endian(Number value) {
   return {reinterpret_cast<const char*>(&value), sizeof value};
 }
 
-std::string two(std::size_t value) { return little_endian(static_cast<std::uint16_t>(value)); }
-std::string four(std::size_t value) { return little_endian(static_cast<std::uint32_t>(value)); }
+std::string uint16_bytes(std::size_t value) {
+  return little_endian(static_cast<std::uint16_t>(value));
+}
+std::string uint32_bytes(std::size_t value) {
+  return little_endian(static_cast<std::uint32_t>(value));
+}
 
 std::uint32_t crc32(std::string_view bytes) {
   std::uint32_t crc = 0xffffffffU;
@@ -29,19 +33,19 @@ std::uint32_t crc32(std::string_view bytes) {
 }
 
 template <typename Number>
-std::string_view bytes_of(std::span<const Number> values) {
+std::string_view view_bytes(std::span<const Number> values) {
   return {reinterpret_cast<const char*>(values.data()), values.size_bytes()};
 }
 
 }  // namespace
 
 void NumpyArchive::add(std::string_view name, const Shape& shape, std::span<const double> values) {
-  add_array(name, "<f8", shape, bytes_of(values));
+  add_array(name, "<f8", shape, view_bytes(values));
 }
 
 void NumpyArchive::add(std::string_view name, const Shape& shape,
                        std::span<const std::int32_t> values) {
-  add_array(name, "<i4", shape, bytes_of(values));
+  add_array(name, "<i4", shape, view_bytes(values));
 }
 
 void NumpyArchive::add(std::string_view name, bool value) {
@@ -50,8 +54,8 @@ void NumpyArchive::add(std::string_view name, bool value) {
 
 void NumpyArchive::add(std::string_view name, std::string_view text) {
   std::string wide;
-  for (const char c : text) wide += four(static_cast<unsigned char>(c));
-  if (text.empty()) wide = four(0);
+  for (const char c : text) wide += uint32_bytes(static_cast<unsigned char>(c));
+  if (text.empty()) wide = uint32_bytes(0);
   add_array(name, "<U" + std::to_string(std::max<std::size_t>(1, text.size())), {}, wide);
 }
 
@@ -65,31 +69,44 @@ void NumpyArchive::add_array(std::string_view name, std::string_view type, const
   while ((preamble + header.size() + 1) % alignment != 0) header += ' ';
   header += '\n';
   std::string content("\x93NUMPY\x01\x00", 8);
-  content.append(two(header.size())).append(header).append(data);
+  content.append(uint16_bytes(header.size())).append(header).append(data);
   add_file(std::string(name) + ".npy", content);
 }
 
 void NumpyArchive::add_file(const std::string& name, const std::string& content) {
   constexpr std::size_t version = 20, first_of_1980 = 0x21;
-  std::string common = two(version);
-  common.append(two(0)).append(two(0)).append(two(0)).append(two(first_of_1980));
-  common.append(four(crc32(content))).append(four(content.size())).append(four(content.size()));
-  common.append(two(name.size())).append(two(0));
-  directory_.append("PK\x01\x02").append(two(version)).append(common);
-  directory_.append(two(0)).append(two(0)).append(two(0)).append(four(0));
-  directory_.append(four(files_.size())).append(name);
+  std::string common = uint16_bytes(version);
+  common.append(uint16_bytes(0))
+      .append(uint16_bytes(0))
+      .append(uint16_bytes(0))
+      .append(uint16_bytes(first_of_1980));
+  common.append(uint32_bytes(crc32(content)))
+      .append(uint32_bytes(content.size()))
+      .append(uint32_bytes(content.size()));
+  common.append(uint16_bytes(name.size())).append(uint16_bytes(0));
+  directory_.append("PK\x01\x02").append(uint16_bytes(version)).append(common);
+  directory_.append(uint16_bytes(0))
+      .append(uint16_bytes(0))
+      .append(uint16_bytes(0))
+      .append(uint32_bytes(0));
+  directory_.append(uint32_bytes(files_.size())).append(name);
   files_.append("PK\x03\x04").append(common).append(name).append(content);
   ++count_;
 }
 
 std::string NumpyArchive::bytes() const {
   std::string end = "PK\x05\x06";
-  end.append(two(0)).append(two(0)).append(two(count_)).append(two(count_));
-  end.append(four(directory_.size())).append(four(files_.size())).append(two(0));
+  end.append(uint16_bytes(0))
+      .append(uint16_bytes(0))
+      .append(uint16_bytes(count_))
+      .append(uint16_bytes(count_));
+  end.append(uint32_bytes(directory_.size()))
+      .append(uint32_bytes(files_.size()))
+      .append(uint16_bytes(0));
   return files_ + directory_ + end;
 }
 
-std::string base85(std::string_view bytes) {
+std::string encode_base85(std::string_view bytes) {
   constexpr std::string_view digits =
       "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz!#$%&()*+-;<=>?@^_`{|}~";
   static_assert(digits.size() == 85);

@@ -40,6 +40,6 @@ class NumpyArchive {
 };
 
 /// Encodes bytes as Python's base64.b85encode() does.
-std::string base85(std::string_view bytes);
+std::string encode_base85(std::string_view bytes);
 
 }  // namespace vlp

@@ -15,26 +15,27 @@ namespace vlp {
 namespace {
 
 /// Returns at most 12 evenly spaced views, which suffice to rank focal lengths.
-IntrinsicsInput some_of(const IntrinsicsInput& input) {
-  constexpr std::size_t enough = 12;
-  IntrinsicsInput some = input;
+IntrinsicsInput select_views(const IntrinsicsInput& input) {
+  constexpr std::size_t max_views = 12;
+  IntrinsicsInput selected = input;
   const std::size_t count = input.views.size();
-  if (count <= enough) return some;
-  some.views.clear();
-  for (std::size_t i = 0; i < enough; ++i) some.views.push_back(input.views[i * count / enough]);
-  return some;
+  if (count <= max_views) return selected;
+  selected.views.clear();
+  for (std::size_t i = 0; i < max_views; ++i)
+    selected.views.push_back(input.views[i * count / max_views]);
+  return selected;
 }
 
 }  // namespace
 
-PoseSeeds poses_through(const IntrinsicsInput& input, const Lens& lens) {
-  PoseSeeds seeds;
+InitialPoses estimate_poses(const IntrinsicsInput& input, const Lens& lens) {
+  InitialPoses initial_poses;
   for (const auto& corners : input.views) {
-    const auto pose = view_pose(corners, lens);
-    seeds.poses.push_back(pose ? pose->camera_from_board : BoardPose{});
-    seeds.rms_px.push_back(pose ? pose->rms_px : std::numeric_limits<double>::infinity());
+    const auto pose = estimate_view_pose(corners, lens);
+    initial_poses.poses.push_back(pose ? pose->camera_from_board : BoardPose{});
+    initial_poses.rms_px.push_back(pose ? pose->rms_px : std::numeric_limits<double>::infinity());
   }
-  return seeds;
+  return initial_poses;
 }
 
 Lens stereographic(const IntrinsicsInput& input, double focal_px) {
@@ -43,14 +44,15 @@ Lens stereographic(const IntrinsicsInput& input, double focal_px) {
   return Lens(LensModel::stereographic, parameters);
 }
 
-std::vector<double> focal_lengths(const IntrinsicsInput& input) {
-  const IntrinsicsInput some = some_of(input);
+std::vector<double> rank_focal_lengths(const IntrinsicsInput& input) {
+  const IntrinsicsInput selected = select_views(input);
   std::vector<std::pair<double, double>> tried;
-  constexpr int least = -5, most = 6;  // relative to the width of the image: 0.18 to 8
-  for (int half_octaves = least; half_octaves <= most; ++half_octaves) {
+  constexpr int min_half_octaves = -5,
+                max_half_octaves = 6;  // relative to the width of the image: 0.18 to 8
+  for (int half_octaves = min_half_octaves; half_octaves <= max_half_octaves; ++half_octaves) {
     const double focal_px = input.imager_px[0] * std::exp2(half_octaves / 2.0);
-    tried.emplace_back(upper_median(poses_through(some, stereographic(input, focal_px)).rms_px),
-                       focal_px);
+    tried.emplace_back(
+        upper_median(estimate_poses(selected, stereographic(input, focal_px)).rms_px), focal_px);
   }
   std::sort(tried.begin(), tried.end());
   std::vector<double> order;

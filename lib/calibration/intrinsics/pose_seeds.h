@@ -9,19 +9,19 @@
 namespace vlp {
 
 /// Initial poses of all views, estimated with one lens.
-struct PoseSeeds {
+struct InitialPoses {
   std::vector<BoardPose> poses;
   /// RMS residual of each view, px; infinity if it has no pose.
   std::vector<double> rms_px;
 };
 /// Estimates the poses of all views with a lens.
-PoseSeeds poses_through(const IntrinsicsInput& input, const Lens& lens);
+InitialPoses estimate_poses(const IntrinsicsInput& input, const Lens& lens);
 
 /// Returns LENSMODEL_STEREOGRAPHIC with its principal point in the middle of the image.
 Lens stereographic(const IntrinsicsInput& input, double focal_px);
 
 /// Returns focal lengths of a geometric series, px, in ascending order of the median RMS residual
 /// of the poses with them.
-std::vector<double> focal_lengths(const IntrinsicsInput& input);
+std::vector<double> rank_focal_lengths(const IntrinsicsInput& input);
 
 }  // namespace vlp

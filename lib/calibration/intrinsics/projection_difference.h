@@ -15,12 +15,12 @@ namespace vlp {
 
 /// Returns a grid of pixels over the image including its edges: `cols` columns, and rows about
 /// equally far apart.
-std::vector<Eigen::Vector2d> pixel_grid(const std::array<int, 2>& imager_px, int cols = 41);
+std::vector<Eigen::Vector2d> make_pixel_grid(const std::array<int, 2>& imager_px, int cols = 41);
 
 /// Fits the rotation of the rays of `a` at the pixels to those of `b`, by least squares over the
 /// pixels at which both have a ray; std::nullopt for fewer than three.
-std::optional<Eigen::Matrix3d> b_from_a(const Lens& a, const Lens& b,
-                                        std::span<const Eigen::Vector2d> pixels);
+std::optional<Eigen::Matrix3d> fit_rotation(const Lens& a, const Lens& b,
+                                            std::span<const Eigen::Vector2d> pixels);
 
 /// Difference of two lenses over the image.
 struct ProjectionDifference {
@@ -30,7 +30,7 @@ struct ProjectionDifference {
   double rms_px;
 };
 
-/// Compares the projections of two lenses over the image. Every pixel of pixel_grid() is
+/// Compares the projections of two lenses over the image. Every pixel of make_pixel_grid() is
 /// unprojected by `a`, rotated by the best-fitting rotation of the rays and projected by `b`. The
 /// rotation is removed because the frame of a lens is a convention (mrcal, "Projection
 /// differences").
@@ -38,7 +38,7 @@ struct ProjectionDifference {
 /// @param sigma_px  standard deviation at a pixel, for the weights of the rotation; pixels with an
 ///     infinite one are skipped
 /// @return std::nullopt if the lenses have fewer than three such pixels in common
-std::optional<ProjectionDifference> projection_difference(
+std::optional<ProjectionDifference> compute_projection_difference(
     const Lens& a, const Lens& b, const std::array<int, 2>& imager_px,
     const std::function<double(const Eigen::Vector2d&)>& sigma_px);
 

@@ -14,7 +14,7 @@
 namespace vlp {
 namespace {
 
-double standard_deviation(const BoardProblem& problem, const Eigen::VectorXd& residuals_px) {
+double compute_residual_sd(const BoardProblem& problem, const Eigen::VectorXd& residuals_px) {
   double sum = 0, squares = 0, count = 0;
   for (std::size_t i = 0; i < problem.points.size(); ++i) {
     if (problem.points[i].z() <= 0) continue;
@@ -28,16 +28,16 @@ double standard_deviation(const BoardProblem& problem, const Eigen::VectorXd& re
 
 /// Sums the rows over the residuals of each tag, weighted by the residuals: a row for each tag of
 /// each view, from a row for each residual.
-Eigen::MatrixXd by_tags(const Eigen::MatrixXd& by_residual, const Eigen::VectorXd& residuals_px,
-                        const BoardLattice& lattice) {
-  const std::size_t points = lattice.points(), of_view = lattice.parts() * points;
+Eigen::MatrixXd sum_by_tags(const Eigen::MatrixXd& by_residual, const Eigen::VectorXd& residuals_px,
+                            const BoardLattice& lattice) {
+  const std::size_t points = lattice.points(), points_per_view = lattice.parts() * points;
   const Eigen::Index corners = residuals_px.size() / 2;
-  const auto views = static_cast<std::size_t>(corners) / of_view;
+  const auto views = static_cast<std::size_t>(corners) / points_per_view;
   Eigen::MatrixXd sums =
       Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(views * points), by_residual.cols());
   for (Eigen::Index i = 0; i < corners; ++i) {
     const auto corner = static_cast<std::size_t>(i);
-    const std::size_t tag = corner / of_view * points + lattice.tag_of(corner % points);
+    const std::size_t tag = corner / points_per_view * points + lattice.tag_index(corner % points);
     sums.row(static_cast<Eigen::Index>(tag)) +=
         residuals_px.segment<2>(2 * i).transpose() * by_residual.middleRows<2>(2 * i);
   }
@@ -45,27 +45,31 @@ Eigen::MatrixXd by_tags(const Eigen::MatrixXd& by_residual, const Eigen::VectorX
 }
 
 /// Returns the factor n / (n - k) of ProjectionUncertainty.
-double for_what_was_fitted(const BoardProblem& problem, Eigen::Index states) {
-  const double count = 2 * static_cast<double>(seen_px(problem).size());
+double compute_degrees_of_freedom_factor(const BoardProblem& problem, Eigen::Index states) {
+  const double count = 2 * static_cast<double>(collect_inlier_pixels(problem).size());
   return count / std::max(count - static_cast<double>(states), 1.0);
 }
 
 /// Computes the regularization bias of the whole packed state.
-Eigen::VectorXd pull_of(const Linearization& at, double sigma_px, double regularized_for_px) {
-  constexpr double least_px = 0.01;  // bounds coefficients that the corners do not determine
-  const Eigen::Index corners = at.residuals_px.size(), pulls = at.regularization.size();
-  if (pulls == 0) return Eigen::VectorXd::Zero(at.jacobian_transposed.rows());
-  const Eigen::SparseMatrix<double> by_corners = at.jacobian_transposed.leftCols(corners);
-  const Eigen::SparseMatrix<double> by_pulls = at.jacobian_transposed.rightCols(pulls);
-  const double share =
-      std::min(1.0, std::pow(std::max(sigma_px, least_px) / regularized_for_px, 2));
+Eigen::VectorXd compute_regularization_bias(const Linearization& at, double sigma_px,
+                                            double regularization_noise_px) {
+  constexpr double min_px = 0.01;  // bounds coefficients that the corners do not determine
+  const Eigen::Index corners = at.residuals_px.size(),
+                     num_regularization = at.regularization.size();
+  if (num_regularization == 0) return Eigen::VectorXd::Zero(at.jacobian_transposed.rows());
+  const Eigen::SparseMatrix<double> corner_jacobian = at.jacobian_transposed.leftCols(corners);
+  const Eigen::SparseMatrix<double> regularization_jacobian =
+      at.jacobian_transposed.rightCols(num_regularization);
+  const double ratio =
+      std::min(1.0, std::pow(std::max(sigma_px, min_px) / regularization_noise_px, 2));
   const Eigen::SparseMatrix<double> normal =
-      by_corners * by_corners.transpose() + share * (by_pulls * by_pulls.transpose());
+      corner_jacobian * corner_jacobian.transpose() +
+      ratio * (regularization_jacobian * regularization_jacobian.transpose());
   const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(normal);
   if (factor.info() != Eigen::Success || !(factor.vectorD().minCoeff() > 0)) {
     return Eigen::VectorXd::Zero(normal.rows());
   }
-  return (1 - share) * factor.solve(by_pulls * at.regularization);
+  return (1 - ratio) * factor.solve(regularization_jacobian * at.regularization);
 }
 
 }  // namespace
@@ -80,10 +84,10 @@ ProjectionUncertainty::ProjectionUncertainty(const IntrinsicsSolution& solution,
 ProjectionUncertainty::ProjectionUncertainty(const IntrinsicsSolution& solution,
                                              const BoardLattice* lattice)
     : lens_(solution.lens()),
-      determined_(false),
-      intrinsics_pull_(Eigen::VectorXd::Zero(std::ssize(solution.problem.intrinsics))) {
+      is_determined_(false),
+      regularization_bias_(Eigen::VectorXd::Zero(std::ssize(solution.problem.intrinsics))) {
   const BoardProblem& problem = solution.problem;
-  const Linearization at = linearized(problem, solution.solved_for);
+  const Linearization at = linearize(problem, solution.solved_for);
   const Eigen::SparseMatrix<double>& jt = at.jacobian_transposed;
   const Eigen::SparseMatrix<double> normal = jt * jt.transpose();
   const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(normal);
@@ -92,39 +96,40 @@ ProjectionUncertainty::ProjectionUncertainty(const IntrinsicsSolution& solution,
   const auto intrinsics = static_cast<Eigen::Index>(problem.intrinsics.size());
   Eigen::MatrixXd wanted = Eigen::MatrixXd::Zero(jt.rows(), intrinsics + 3);
   wanted.block(0, at.first_intrinsic, at.poses, at.poses).setIdentity();
-  const double share = 1 / static_cast<double>(problem.poses.size());
+  const double ratio = 1 / static_cast<double>(problem.poses.size());
   for (std::size_t i = 0; i < problem.poses.size(); ++i) {
     wanted.block<3, 3>(at.poses + 6 * static_cast<Eigen::Index>(i), intrinsics) =
-        share * left_jacobian(problem.poses[i].rotation).transpose();
+        ratio * left_jacobian(problem.poses[i].rotation).transpose();
   }
   wanted = at.scale.asDiagonal() * wanted;
   const Eigen::MatrixXd by_residual =
       (jt.leftCols(at.residuals_px.size()).transpose() * factor.solve(wanted)).eval();
-  const double sigma_px = standard_deviation(problem, at.residuals_px);
+  const double sigma_px = compute_residual_sd(problem, at.residuals_px);
   if (lattice == nullptr) {
     covariance_ = sigma_px * sigma_px * by_residual.transpose() * by_residual;
   } else {
-    const Eigen::MatrixXd sums = by_tags(by_residual, at.residuals_px, *lattice);
-    covariance_ = for_what_was_fitted(problem, jt.rows()) * sums.transpose() * sums;
+    const Eigen::MatrixXd sums = sum_by_tags(by_residual, at.residuals_px, *lattice);
+    covariance_ = compute_degrees_of_freedom_factor(problem, jt.rows()) * sums.transpose() * sums;
   }
-  intrinsics_pull_ =
-      wanted.leftCols(intrinsics).transpose() * pull_of(at, sigma_px, problem.noise_px);
-  determined_ = covariance_.allFinite();
+  regularization_bias_ = wanted.leftCols(intrinsics).transpose() *
+                         compute_regularization_bias(at, sigma_px, problem.noise_px);
+  is_determined_ = covariance_.allFinite();
 }
 
 Eigen::Matrix2d ProjectionUncertainty::covariance(const Eigen::Vector2d& pixel) const {
   const auto ray = lens_.unproject(pixel);
   const auto projection = ray ? lens_.project_with_jacobians(ray->direction) : std::nullopt;
-  const auto by = projection ? lens_.by_parameters(ray->direction) : std::nullopt;
-  if (!determined_ || !by) {
+  const auto derivatives =
+      projection ? lens_.compute_parameter_jacobian(ray->direction) : std::nullopt;
+  if (!is_determined_ || !derivatives) {
     return Eigen::Matrix2d::Identity() * std::numeric_limits<double>::infinity();
   }
-  std::vector<Eigen::Index> states = by->parameters;
+  std::vector<Eigen::Index> states = derivatives->parameters;
   for (Eigen::Index i = covariance_.rows() - 3; i < covariance_.rows(); ++i) states.push_back(i);
   Eigen::Matrix2Xd gradient(2, std::ssize(states));
-  gradient << by->d_pixel, -projection->d_pixel_d_point * cross_matrix(ray->direction);
-  const Eigen::MatrixXd of_states = covariance_(states, states);
-  return gradient * of_states * gradient.transpose();
+  gradient << derivatives->d_pixel, -projection->d_pixel_d_point * cross_matrix(ray->direction);
+  const Eigen::MatrixXd state_covariance = covariance_(states, states);
+  return gradient * state_covariance * gradient.transpose();
 }
 
 double ProjectionUncertainty::worst_px(const Eigen::Vector2d& pixel) const {
@@ -136,13 +141,13 @@ double ProjectionUncertainty::worst_px(const Eigen::Vector2d& pixel) const {
 
 Eigen::MatrixXd ProjectionUncertainty::intrinsics_covariance() const {
   const auto count = static_cast<Eigen::Index>(parameter_count(lens_.model()));
-  if (determined_) return covariance_.topLeftCorner(count, count);
+  if (is_determined_) return covariance_.topLeftCorner(count, count);
   return Eigen::MatrixXd::Constant(count, count, std::numeric_limits<double>::infinity());
 }
 
 double ProjectionUncertainty::focal_sd_px() const {
-  return determined_ && covariance_(0, 0) > 0 ? std::sqrt(covariance_(0, 0))
-                                              : std::numeric_limits<double>::infinity();
+  return is_determined_ && covariance_(0, 0) > 0 ? std::sqrt(covariance_(0, 0))
+                                                 : std::numeric_limits<double>::infinity();
 }
 
 }  // namespace vlp

@@ -38,7 +38,7 @@ class ProjectionUncertainty {
   ProjectionUncertainty(const IntrinsicsSolution& solution, const BoardLattice& lattice);
 
   /// Returns false if the views do not determine all parameters.
-  bool determined() const { return determined_; }
+  bool is_determined() const { return is_determined_; }
 
   /// Returns the covariance of the projection of the ray at `pixel`, px^2. Infinite if the lens has
   /// no ray there, or if the views do not determine all parameters.
@@ -60,7 +60,7 @@ class ProjectionUncertainty {
   ///   (Jo' Jo + s^2 Jr' Jr)^-1 (1 - s^2) Jr' r,  s at least 0.01 and at most 1.
   /// 0 without regularization. Use it as a standard deviation of the intrinsics in addition to that
   /// from noise.
-  const Eigen::VectorXd& intrinsics_pull() const { return intrinsics_pull_; }
+  const Eigen::VectorXd& regularization_bias() const { return regularization_bias_; }
 
   /// Returns the standard deviation of the focal length along x, px. Infinite if the views do not
   /// determine all parameters, and for splined lenses, whose control points compensate the focal
@@ -71,10 +71,10 @@ class ProjectionUncertainty {
   ProjectionUncertainty(const IntrinsicsSolution& solution, const BoardLattice* lattice);
 
   Lens lens_;
-  bool determined_;
+  bool is_determined_;
   /// Covariance of the intrinsics and of the mean rotation, rad, in the camera frame.
   Eigen::MatrixXd covariance_;
-  Eigen::VectorXd intrinsics_pull_;
+  Eigen::VectorXd regularization_bias_;
 };
 
 }  // namespace vlp

@@ -27,7 +27,7 @@ struct Equations {
 };
 
 /// Adds equations for small second differences of the control points, along columns and rows.
-void keep_straight(Equations& equations, const SplineGrid& grid) {
+void add_smoothness_equations(Equations& equations, const SplineGrid& grid) {
   constexpr double weight = 3e-4;  // small: changes the fit by 1e-5 px
   const auto add = [&](int first, int apart) {
     const int row = equations.next();
@@ -47,53 +47,54 @@ void keep_straight(Equations& equations, const SplineGrid& grid) {
 
 /// Returns true if a surface without second differences is determined by its values at these
 /// points.
-bool determine_what_is_straight(const std::vector<Eigen::Vector2d>& places) {
+bool determine_bilinear_surface(const std::vector<Eigen::Vector2d>& positions) {
   constexpr Eigen::Index unknowns = 4;
-  if (std::ssize(places) < unknowns) return false;
-  Eigen::Array2d least = places.front(), most = least;
-  for (const Eigen::Vector2d& u : places) {
-    least = least.min(u.array());
-    most = most.max(u.array());
+  if (std::ssize(positions) < unknowns) return false;
+  Eigen::Array2d min_value = positions.front(), max_value = min_value;
+  for (const Eigen::Vector2d& u : positions) {
+    min_value = min_value.min(u.array());
+    max_value = max_value.max(u.array());
   }
-  Eigen::MatrixX4d terms(std::ssize(places), unknowns);
+  Eigen::MatrixX4d terms(std::ssize(positions), unknowns);
   for (Eigen::Index i = 0; i < terms.rows(); ++i) {
-    const Eigen::Array2d share =
-        (places[static_cast<std::size_t>(i)].array() - least) / (most - least).max(1e-9);
-    terms.row(i) << 1, share.x(), share.y(), share.prod();
+    const Eigen::Array2d fraction = (positions[static_cast<std::size_t>(i)].array() - min_value) /
+                                    (max_value - min_value).max(1e-9);
+    terms.row(i) << 1, fraction.x(), fraction.y(), fraction.prod();
   }
-  constexpr double beyond_rounding = 1e-6;  // the shares are 0 to 1
+  constexpr double rank_tolerance = 1e-6;  // the shares are 0 to 1
   Eigen::ColPivHouseholderQR<Eigen::MatrixX4d> decomposition(terms);
-  return decomposition.setThreshold(beyond_rounding).rank() == unknowns;
+  return decomposition.setThreshold(rank_tolerance).rank() == unknowns;
 }
 
 }  // namespace
 
-std::optional<std::vector<double>> splined_like(const Lens& lens,
-                                                const std::array<int, 2>& imager_px,
-                                                LensModel model, const std::vector<double>& core,
-                                                const Eigen::Matrix3d& lens_from_splined) {
-  constexpr int of_a_piece = 4;
-  constexpr double near = 0.05;  // of the image, around it
+std::optional<std::vector<double>> fit_splined_lens(const Lens& lens,
+                                                    const std::array<int, 2>& imager_px,
+                                                    LensModel model,
+                                                    const std::vector<double>& core,
+                                                    const Eigen::Matrix3d& lens_from_splined) {
+  constexpr int rays_per_piece = 4;
+  constexpr double margin = 0.05;  // of the image, around it
   const SplineGrid grid = grid_of(model);
   const SplineSurface straight(grid, std::vector<double>(2 * grid.control_points()));
   const Eigen::Array2d focal_px(core[0], core[1]), center_px(core[2], core[3]);
   const Eigen::Array2d size_px(imager_px[0], imager_px[1]);
   Equations equations;
-  keep_straight(equations, grid);
-  std::vector<Eigen::Vector2d> places;
-  const int columns = of_a_piece * (grid.nx - grid.order),
-            rows = of_a_piece * (grid.ny - grid.order);
+  add_smoothness_equations(equations, grid);
+  std::vector<Eigen::Vector2d> positions;
+  const int columns = rays_per_piece * (grid.nx - grid.order),
+            rows = rays_per_piece * (grid.ny - grid.order);
   for (int row = 0; row <= rows; ++row) {
     for (int column = 0; column <= columns; ++column) {
-      const Eigen::Array2d share(double(column) / columns, double(row) / rows);
-      const Eigen::Vector2d u = straight.reach().array() * (2 * share - 1);
+      const Eigen::Array2d fraction(double(column) / columns, double(row) / rows);
+      const Eigen::Vector2d u = straight.reach().array() * (2 * fraction - 1);
       const Eigen::Vector3d ray(u.x(), u.y(), 1 - u.squaredNorm() / 4);
       const auto pixel = lens.project(lens_from_splined * ray);
-      if (!pixel || (pixel->array() < -near * size_px).any() ||
-          (pixel->array() > (1 + near) * size_px).any()) {
+      if (!pixel || (pixel->array() < -margin * size_px).any() ||
+          (pixel->array() > (1 + margin) * size_px).any()) {
         continue;
       }
-      places.push_back(u);
+      positions.push_back(u);
       const SplineSurface::Weights at = straight.weights(u);
       for (int j = 0; j <= grid.order; ++j) {
         for (int i = 0; i <= grid.order; ++i) {
@@ -105,7 +106,7 @@ std::optional<std::vector<double>> splined_like(const Lens& lens,
       equations.right.emplace_back(((pixel->array() - center_px) / focal_px).matrix() - u);
     }
   }
-  if (!determine_what_is_straight(places)) return {};
+  if (!determine_bilinear_surface(positions)) return {};
   const auto points = static_cast<Eigen::Index>(grid.control_points());
   Eigen::SparseMatrix<double> left(equations.next(), points);
   left.setFromTriplets(equations.entries.begin(), equations.entries.end());
@@ -125,47 +126,47 @@ std::optional<std::vector<double>> splined_like(const Lens& lens,
   return parameters;
 }
 
-std::string why_too_coarse(const Lens& lens, const std::array<int, 2>& imager_px, LensModel model,
-                           const std::vector<double>& core) {
-  constexpr double more = 1.05;
+std::string describe_too_coarse_grid(const Lens& lens, const std::array<int, 2>& imager_px,
+                                     LensModel model, const std::vector<double>& core) {
+  constexpr double extension = 1.05;
   Eigen::Vector2d farthest(0, 0);
-  for (const Eigen::Vector2d& pixel : pixel_grid(imager_px)) {
+  for (const Eigen::Vector2d& pixel : make_pixel_grid(imager_px)) {
     const auto ray = lens.unproject(pixel);
     if (!ray) continue;
     const Eigen::Vector3d& x = ray->direction;
     farthest = farthest.cwiseMax(x.head<2>().cwiseAbs() * (2 / (x.norm() + x.z())));
   }
   SplineGrid finer = grid_of(model);
-  LensModel other = splined_lens(reaching(finer, more * farthest));
-  while (!splined_like(lens, imager_px, other, core) && 2 * finer.nx <= SplineGrid::kMostKnots) {
+  LensModel other = lens_model_for(extend_grid(finer, extension * farthest));
+  while (!fit_splined_lens(lens, imager_px, other, core) && 2 * finer.nx <= SplineGrid::kMaxKnots) {
     finer.nx *= 2;
-    other = splined_lens(reaching(finer, more * farthest));
+    other = lens_model_for(extend_grid(finer, extension * farthest));
   }
-  const bool helps = splined_like(lens, imager_px, other, core).has_value();
+  const bool helps = fit_splined_lens(lens, imager_px, other, core).has_value();
   const auto angle_deg = [](double u) { return deg_from_rad(2 * std::atan(u / 2)); };
   return fmt::format(
       "the control points of {} are too few where the lens sees, {:.0f} degrees off the axis to "
       "the sides and {:.0f} up and down: take {}",
-      name_of(model), angle_deg(farthest.x()), angle_deg(farthest.y()),
-      helps ? fmt::format("--lens {}", name_of(other)) : "another model");
+      to_string(model), angle_deg(farthest.x()), angle_deg(farthest.y()),
+      helps ? fmt::format("--lens {}", to_string(other)) : "another model");
 }
 
-SplineGrid reaching(const SplineGrid& grid, const Eigen::Vector2d& u) {
-  constexpr double rounding = 1e-9;  // keeps a grid that is wide enough
-  const auto whole_between = [](double least, double value, double most) {
-    return static_cast<int>(std::clamp(std::ceil(value - rounding), least, most));
+SplineGrid extend_grid(const SplineGrid& grid, const Eigen::Vector2d& u) {
+  constexpr double numeric_tolerance = 1e-9;  // keeps a grid that is wide enough
+  const auto ceil_and_clamp = [](double min_value, double value, double max_value) {
+    return static_cast<int>(std::clamp(std::ceil(value - numeric_tolerance), min_value, max_value));
   };
   SplineGrid wide = grid;
   wide.fov_x_deg =
-      whole_between(1, 4 * deg_from_rad(std::atan(u.x() / 2)), SplineGrid::kMostFov_deg);
+      ceil_and_clamp(1, 4 * deg_from_rad(std::atan(u.x() / 2)), SplineGrid::kMaxFov_deg);
   const double edge = 2 * std::tan(rad_from_deg(wide.fov_x_deg) / 4);
-  wide.ny = whole_between(grid.order + 1,
-                          grid.order + (grid.nx - grid.order) * std::min(u.y() / edge, 1e6),
-                          SplineGrid::kMostKnots);
+  wide.ny = ceil_and_clamp(grid.order + 1,
+                           grid.order + (grid.nx - grid.order) * std::min(u.y() / edge, 1e6),
+                           SplineGrid::kMaxKnots);
   return wide;
 }
 
-std::vector<double> core_like(const Lens& lens, std::span<const Eigen::Vector2d> pixels) {
+std::vector<double> fit_spline_core(const Lens& lens, std::span<const Eigen::Vector2d> pixels) {
   Eigen::Array2d products(0, 0), squares(0, 0);
   for (const Eigen::Vector2d& pixel : pixels) {
     const auto ray = lens.unproject(pixel);

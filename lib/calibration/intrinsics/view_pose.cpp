@@ -17,7 +17,7 @@ namespace {
 
 using Corners = std::span<const BoardLattice::Corner>;
 
-struct Placed {
+struct RigidPose {
   Eigen::Matrix3d rotation;
   Eigen::Vector3d translation_m;
 
@@ -26,7 +26,7 @@ struct Placed {
   }
 };
 
-double squares_of(Corners corners, const Lens& lens, const Placed& pose) {
+double compute_squares(Corners corners, const Lens& lens, const RigidPose& pose) {
   double squares = 0;
   for (const auto& corner : corners) {
     const auto pixel = lens.project(pose.in_camera(corner.in_board_m));
@@ -38,17 +38,17 @@ double squares_of(Corners corners, const Lens& lens, const Placed& pose) {
 
 /// Returns the pose after a step that minimizes the linearized residuals; the rotation is updated
 /// from the left.
-std::optional<Placed> stepped(Corners corners, const Lens& lens, const Placed& pose,
-                              double damping) {
+std::optional<RigidPose> compute_step(Corners corners, const Lens& lens, const RigidPose& pose,
+                                      double damping) {
   Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
   Eigen::Matrix<double, 6, 1> right = Eigen::Matrix<double, 6, 1>::Zero();
   for (const auto& corner : corners) {
     const Eigen::Vector3d point = pose.in_camera(corner.in_board_m);
     const auto projection = lens.project_with_jacobians(point);
     if (!projection) return {};
-    const Eigen::Vector3d turned = point - pose.translation_m;
+    const Eigen::Vector3d rotated = point - pose.translation_m;
     Eigen::Matrix<double, 2, 6> jacobian;
-    jacobian << -projection->d_pixel_d_point * cross_matrix(turned), projection->d_pixel_d_point;
+    jacobian << -projection->d_pixel_d_point * cross_matrix(rotated), projection->d_pixel_d_point;
     jacobian *= corner.weight;
     normal += jacobian.transpose() * jacobian;
     right += jacobian.transpose() * (corner.weight * (corner.pixel - projection->pixel));
@@ -59,25 +59,25 @@ std::optional<Placed> stepped(Corners corners, const Lens& lens, const Placed& p
   const double angle = step.head<3>().norm();
   const Eigen::Vector3d axis =
       angle > 0 ? (step.head<3>() / angle).eval() : Eigen::Vector3d::UnitX();
-  return Placed{Eigen::AngleAxisd(angle, axis) * pose.rotation,
-                pose.translation_m + step.tail<3>()};
+  return RigidPose{Eigen::AngleAxisd(angle, axis) * pose.rotation,
+                   pose.translation_m + step.tail<3>()};
 }
 
-std::optional<ViewPose> refined(Corners corners, const Lens& lens, Placed pose) {
-  constexpr int most_steps = 20;
-  constexpr double enough = 1e-4;  // relative reduction of the squares by a step
+std::optional<ViewPose> refine_pose(Corners corners, const Lens& lens, RigidPose pose) {
+  constexpr int max_iterations = 20;
+  constexpr double tolerance = 1e-4;  // relative reduction of the squares by a step
   double damping = 1e-4;
-  double squares = squares_of(corners, lens, pose);
+  double squares = compute_squares(corners, lens, pose);
   if (!std::isfinite(squares)) return {};
-  for (int step = 0; step < most_steps; ++step) {
-    const auto next = stepped(corners, lens, pose, damping);
-    const double less = next ? squares_of(corners, lens, *next) : INFINITY;
-    if (less < squares) {
-      const bool done = squares - less < enough * squares;
+  for (int step = 0; step < max_iterations; ++step) {
+    const auto next = compute_step(corners, lens, pose, damping);
+    const double next_squares = next ? compute_squares(corners, lens, *next) : INFINITY;
+    if (next_squares < squares) {
+      const bool has_converged = squares - next_squares < tolerance * squares;
       pose = *next;
-      squares = less;
+      squares = next_squares;
       damping /= 10;
-      if (done) break;
+      if (has_converged) break;
     } else {
       damping *= 10;
     }
@@ -88,7 +88,7 @@ std::optional<ViewPose> refined(Corners corners, const Lens& lens, Placed pose) 
                   std::sqrt(squares / (2 * static_cast<double>(corners.size())))};
 }
 
-Placed placed(const cv::Mat& rotation, const cv::Mat& translation) {
+RigidPose make_pose(const cv::Mat& rotation, const cv::Mat& translation) {
   const Eigen::Vector3d r(rotation.ptr<double>()), t(translation.ptr<double>());
   const double angle = r.norm();
   const Eigen::Vector3d axis = angle > 0 ? (r / angle).eval() : Eigen::Vector3d::UnitX();
@@ -97,7 +97,7 @@ Placed placed(const cv::Mat& rotation, const cv::Mat& translation) {
 
 }  // namespace
 
-std::optional<ViewPose> view_pose(Corners corners, const Lens& lens) {
+std::optional<ViewPose> estimate_view_pose(Corners corners, const Lens& lens) {
   // Rotates the camera towards the board, which may be 90 degrees off the axis.
   std::vector<std::pair<const BoardLattice::Corner*, Eigen::Vector3d>> rays;
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
@@ -111,9 +111,9 @@ std::optional<ViewPose> view_pose(Corners corners, const Lens& lens) {
   std::vector<cv::Point3d> in_board;
   std::vector<cv::Point2d> normalized;
   for (const auto& [corner, ray] : rays) {
-    const Eigen::Vector3d turned = turned_from_camera * ray;
-    if (turned.z() < 1e-3) continue;
-    const Eigen::Vector2d z = turned.hnormalized();
+    const Eigen::Vector3d rotated = turned_from_camera * ray;
+    if (rotated.z() < 1e-3) continue;
+    const Eigen::Vector2d z = rotated.hnormalized();
     in_board.emplace_back(corner->in_board_m.x(), corner->in_board_m.y(), 0);
     normalized.emplace_back(z.x(), z.y());
   }
@@ -123,10 +123,10 @@ std::optional<ViewPose> view_pose(Corners corners, const Lens& lens) {
                       translations, false, cv::SOLVEPNP_IPPE);
   std::optional<ViewPose> best;
   for (std::size_t i = 0; i < rotations.size(); ++i) {
-    const Placed turned = placed(rotations[i], translations[i]);
-    const auto pose = refined(corners, lens,
-                              {turned_from_camera.transpose() * turned.rotation,
-                               turned_from_camera.transpose() * turned.translation_m});
+    const RigidPose rotated = make_pose(rotations[i], translations[i]);
+    const auto pose = refine_pose(corners, lens,
+                                  {turned_from_camera.transpose() * rotated.rotation,
+                                   turned_from_camera.transpose() * rotated.translation_m});
     if (pose && (!best || pose->rms_px < best->rms_px)) best = pose;
   }
   return best;

@@ -14,8 +14,8 @@
 
 namespace vlp {
 
-/// Options of level_by_lamps().
-struct LevellingOptions {
+/// Options of estimate_tilt_from_lamps().
+struct TiltCalibrationOptions {
   /// Also estimates corrections of the lamp map (AdjustmentInput::frees_map_shape). Captures at
   /// different yaws separate a tilt of all lamps from that of the camera. Captures at different
   /// positions determine the distances of the lamps. Lamps that are not detected keep their
@@ -33,7 +33,7 @@ struct LevellingOptions {
 };
 
 /// Tilt of a camera, and optionally the corrected lamp map, with their uncertainties.
-struct Levelling {
+struct TiltCalibration {
   /// Reason why there is no result, and the remedy, human-readable. Empty if there is a result. The
   /// other members are then valid up to the step that failed.
   std::string undetermined;
@@ -64,7 +64,7 @@ struct Levelling {
   double residual_px = 0;
   /// Ratio of the residuals to the sigma_px of the detections, at least 1. It is 1 if any detection
   /// lacks sigma_px.
-  double excess = 1;
+  double noise_scale = 1;
 };
 
 /// Estimates the tilt of a camera from identified lamps. Three lamps or more over-determine a
@@ -84,7 +84,8 @@ struct Levelling {
 ///   - captures that all have the same position and yaw, where an error of the map resembles a tilt
 ///   - with `refine_map`, captures at one yaw, or at one position, or a lamp in one capture only
 ///   - standard deviations above the limits of `options`
-Levelling level_by_lamps(std::span<const Frame> frames, const LampMap& map, const Camera& camera,
-                         const LevellingOptions& options = {});
+TiltCalibration estimate_tilt_from_lamps(std::span<const Frame> frames, const LampMap& map,
+                                         const Camera& camera,
+                                         const TiltCalibrationOptions& options = {});
 
 }  // namespace vlp

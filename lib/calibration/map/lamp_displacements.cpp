@@ -17,7 +17,7 @@
 namespace vlp {
 namespace {
 
-using SeenLamp = CeilingView::SeenLamp;
+using ProjectedLamp = CeilingView::ProjectedLamp;
 
 std::size_t count_detections(const std::vector<CeilingView>& views) {
   std::size_t count = 0;
@@ -26,26 +26,27 @@ std::size_t count_detections(const std::vector<CeilingView>& views) {
 }
 
 /// Removes detections that do not connect a lamp to other lamps.
-void keep_tied(std::vector<CeilingView>& views) {
+void remove_unconnected(std::vector<CeilingView>& views) {
   constexpr std::size_t min_lamps = 3;
   constexpr int min_captures = 2;
   for (std::size_t removed = 1; removed > 0;) {
     std::erase_if(views, [](const CeilingView& view) { return view.lamps.size() < min_lamps; });
     std::map<int, int> captures;
     for (const CeilingView& view : views) {
-      for (const SeenLamp& seen : view.lamps) ++captures[seen.lamp];
+      for (const ProjectedLamp& projection : view.lamps) ++captures[projection.lamp];
     }
     removed = 0;
     for (CeilingView& view : views) {
-      removed += std::erase_if(
-          view.lamps, [&](const SeenLamp& seen) { return captures[seen.lamp] < min_captures; });
+      removed += std::erase_if(view.lamps, [&](const ProjectedLamp& projection) {
+        return captures[projection.lamp] < min_captures;
+      });
     }
   }
 }
 
 /// Returns an orthonormal basis of the displacements of points by shift, rotation and scale.
-Eigen::MatrixXd similarity_basis(const std::vector<Eigen::Vector2d>& points,
-                                 const std::vector<double>& scales) {
+Eigen::MatrixXd make_similarity_basis(const std::vector<Eigen::Vector2d>& points,
+                                      const std::vector<double>& scales) {
   const auto count = static_cast<Eigen::Index>(points.size());
   Eigen::MatrixXd moves(2 * count, 4);
   for (Eigen::Index i = 0; i < count; ++i) {
@@ -54,7 +55,8 @@ Eigen::MatrixXd similarity_basis(const std::vector<Eigen::Vector2d>& points,
     moves.block<2, 1>(2 * i, 2) = Eigen::Vector2d(-point.y(), point.x());
     moves.block<2, 1>(2 * i, 3) = point * scales[static_cast<std::size_t>(i)];
   }
-  const auto [squares, directions] = symmetric_eigen(Eigen::MatrixXd(moves.transpose() * moves));
+  const auto [squares, directions] =
+      decompose_symmetric(Eigen::MatrixXd(moves.transpose() * moves));
   constexpr double numeric_tolerance = 1e-12;
   const auto rank = (squares.array() > numeric_tolerance * squares.maxCoeff()).count();
   return moves * directions.rightCols(rank) *
@@ -70,9 +72,9 @@ struct ViewEquations {
 };
 
 /// `column` maps a lamp to its first column; `tilt_column` is that of the tilt if it is unknown.
-ViewEquations equations_of(const CeilingView& view, const std::map<int, Eigen::Index>& column,
-                           const std::vector<Eigen::Vector2d>& map_m,
-                           std::optional<Eigen::Index> tilt_column) {
+ViewEquations make_equations(const CeilingView& view, const std::map<int, Eigen::Index>& column,
+                             const std::vector<Eigen::Vector2d>& map_m,
+                             std::optional<Eigen::Index> tilt_column) {
   const auto size = 2 * std::ssize(view.lamps);
   std::vector<Eigen::Vector2d> points;
   std::vector<double> scales;
@@ -81,34 +83,34 @@ ViewEquations equations_of(const CeilingView& view, const std::map<int, Eigen::I
   const auto add_columns = [&](Eigen::Index first) {
     equations.columns.insert(equations.columns.end(), {first, first + 1});
   };
-  for (const SeenLamp& seen : view.lamps) {
+  for (const ProjectedLamp& projection : view.lamps) {
     const auto row = 2 * std::ssize(points);
-    points.emplace_back(seen.seen_m - view.camera_m);
-    scales.push_back(1 / seen.above_camera_m);
-    add_columns(column.at(seen.lamp));
+    points.emplace_back(projection.projected_m - view.camera_m);
+    scales.push_back(1 / projection.above_camera_m);
+    add_columns(column.at(projection.lamp));
     equations.observed_m.segment<2>(row) =
-        seen.seen_m - map_m[static_cast<std::size_t>(column.at(seen.lamp) / 2)];
+        projection.projected_m - map_m[static_cast<std::size_t>(column.at(projection.lamp) / 2)];
     if (!tilt_column) continue;
     // z = (x / z, y / z) along the axes of the world; dz = -(I + z z') t.
     const Eigen::Vector2d z = points.back() * scales.back();
-    equations.jacobian.block<2, 2>(row, size) = -seen.above_camera_m *
+    equations.jacobian.block<2, 2>(row, size) = -projection.above_camera_m *
                                                 (Eigen::Matrix2d::Identity() + z * z.transpose()) *
                                                 Eigen::Rotation2Dd(view.yaw_rad).toRotationMatrix();
   }
   if (tilt_column) add_columns(*tilt_column);
-  const Eigen::MatrixXd basis = similarity_basis(points, scales);
+  const Eigen::MatrixXd basis = make_similarity_basis(points, scales);
   equations.jacobian -= basis * (basis.transpose() * equations.jacobian).eval();
   equations.observed_m -= basis * (basis.transpose() * equations.observed_m).eval();
   return equations;
 }
 
 /// Returns a basis of the similarities of the floor plan, which captures cannot determine.
-Eigen::MatrixXd gauge_basis(const std::vector<Eigen::Vector2d>& map_m) {
+Eigen::MatrixXd make_gauge_basis(const std::vector<Eigen::Vector2d>& map_m) {
   Eigen::Vector2d mean_m(0, 0);
   for (const Eigen::Vector2d& lamp_m : map_m) mean_m += lamp_m / static_cast<double>(map_m.size());
   std::vector<Eigen::Vector2d> centered_m = map_m;
   for (Eigen::Vector2d& lamp_m : centered_m) lamp_m -= mean_m;
-  return similarity_basis(centered_m, std::vector<double>(centered_m.size(), 1));
+  return make_similarity_basis(centered_m, std::vector<double>(centered_m.size(), 1));
 }
 
 std::optional<LampDisplacements> solve(const LampMap& map, const std::vector<CeilingView>& views,
@@ -117,7 +119,7 @@ std::optional<LampDisplacements> solve(const LampMap& map, const std::vector<Cei
   std::map<int, int> captures;
   std::map<int, Eigen::Index> column;
   for (const CeilingView& view : views) {
-    for (const SeenLamp& seen : view.lamps) ++captures[seen.lamp];
+    for (const ProjectedLamp& projection : view.lamps) ++captures[projection.lamp];
   }
   if (captures.empty()) return std::nullopt;
   for (const auto& [lamp, count] : captures) {
@@ -127,7 +129,7 @@ std::optional<LampDisplacements> solve(const LampMap& map, const std::vector<Cei
     found.map_m.emplace_back(find_lamp(map.lamps, lamp)->position_m.head<2>());
   }
   const Eigen::Index size = 2 * std::ssize(found.lamps), unknowns = size + (tilt_is_free ? 2 : 0);
-  const Eigen::MatrixXd gauge = gauge_basis(found.map_m);
+  const Eigen::MatrixXd gauge = make_gauge_basis(found.map_m);
   Eigen::MatrixXd projector = Eigen::MatrixXd::Identity(unknowns, unknowns);
   projector.topLeftCorner(size, size) -= gauge * gauge.transpose();
 
@@ -136,8 +138,8 @@ std::optional<LampDisplacements> solve(const LampMap& map, const std::vector<Cei
   std::vector<ViewEquations> equations;
   Eigen::Index freedom = gauge.cols() - unknowns;
   for (const CeilingView& view : views) {
-    const auto& [jacobian, observed_m, columns] = equations.emplace_back(
-        equations_of(view, column, found.map_m, tilt_is_free ? std::optional(size) : std::nullopt));
+    const auto& [jacobian, observed_m, columns] = equations.emplace_back(make_equations(
+        view, column, found.map_m, tilt_is_free ? std::optional(size) : std::nullopt));
     normal(columns, columns) += jacobian.transpose() * jacobian;
     gradient(columns) += jacobian.transpose() * observed_m;
     freedom += jacobian.rows() - 4;
@@ -152,7 +154,7 @@ std::optional<LampDisplacements> solve(const LampMap& map, const std::vector<Cei
   }
   normal = (projector * normal * projector).eval();
   normal.topLeftCorner(size, size) += gauge * gauge.transpose();
-  const auto [weights, directions] = symmetric_eigen(normal);
+  const auto [weights, directions] = decompose_symmetric(normal);
   constexpr double numeric_tolerance = 1e-12;
   if (!(weights.minCoeff() > numeric_tolerance * weights.maxCoeff())) return std::nullopt;
   const Eigen::MatrixXd inverse =
@@ -212,11 +214,11 @@ std::optional<LampDisplacements> estimate_lamp_displacements(const LampMap& map,
                                                              std::vector<CeilingView> views,
                                                              bool tilt_is_free) {
   std::map<int, std::vector<double>> outliers_m;
-  keep_tied(views);
+  remove_unconnected(views);
   const std::size_t detections = count_detections(views);
   std::optional<LampDisplacements> found = solve(map, views, tilt_is_free);
   while (found && reject_outliers(views, *found, outliers_m)) {
-    keep_tied(views);
+    remove_unconnected(views);
     found = solve(map, views, tilt_is_free);
   }
   if (!found) return std::nullopt;
@@ -227,8 +229,8 @@ std::optional<LampDisplacements> estimate_lamp_displacements(const LampMap& map,
   return found;
 }
 
-std::optional<Eigen::Vector2d> offset_from_others(const LampDisplacements& found, std::size_t lamp,
-                                                  const std::vector<std::size_t>& excluded) {
+std::optional<Eigen::Vector2d> compute_offset_from_others(
+    const LampDisplacements& found, std::size_t lamp, const std::vector<std::size_t>& excluded) {
   std::vector<Eigen::Vector2d> from_m, to_m;
   for (std::size_t i = 0; i < found.lamps.size(); ++i) {
     if (std::find(excluded.begin(), excluded.end(), i) != excluded.end()) continue;
@@ -243,13 +245,13 @@ std::optional<Eigen::Vector2d> offset_from_others(const LampDisplacements& found
          found.map_m[lamp];
 }
 
-std::vector<LampOffset> offsets_from_other_lamps(const LampDisplacements& found) {
+std::vector<LampOffset> compute_offsets_from_others(const LampDisplacements& found) {
   constexpr double min_own_fraction = 1e-3;
   std::vector<LampOffset> offsets;
   for (std::size_t i = 0; i < found.lamps.size(); ++i) {
     const auto row = 2 * static_cast<Eigen::Index>(i);
     const double own_fraction = found.projector(row, row);
-    const auto offset_m = offset_from_others(found, i, {i});
+    const auto offset_m = compute_offset_from_others(found, i, {i});
     if (own_fraction < min_own_fraction || !offset_m) continue;
     const Eigen::Vector2d sd_m =
         found.covariance_m2.diagonal().segment<2>(row).cwiseMax(0).cwiseSqrt() / own_fraction;

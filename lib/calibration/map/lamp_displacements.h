@@ -15,15 +15,15 @@ namespace vlp {
 /// Detections of one capture, projected onto the ceiling with an approximate camera pose.
 struct CeilingView {
   /// Projection of one detection: position on the ceiling, and height of the lamp above the camera.
-  struct SeenLamp {
+  struct ProjectedLamp {
     int lamp;
-    Eigen::Vector2d seen_m;
+    Eigen::Vector2d projected_m;
     double above_camera_m;
   };
   /// Position of the camera.
   Eigen::Vector2d camera_m;
   /// Each lamp at most once.
-  std::vector<SeenLamp> lamps;
+  std::vector<ProjectedLamp> lamps;
   /// Rotation about the vertical from the level camera to the world; required for an unknown tilt.
   double yaw_rad = 0;
 };
@@ -88,11 +88,12 @@ std::optional<LampDisplacements> estimate_lamp_displacements(const LampMap& map,
 
 /// Returns the offset of a lamp after the similarity that maps the lamps without `excluded` to the
 /// map. Returns std::nullopt if there is no such similarity.
-std::optional<Eigen::Vector2d> offset_from_others(const LampDisplacements& found, std::size_t lamp,
-                                                  const std::vector<std::size_t>& excluded);
+std::optional<Eigen::Vector2d> compute_offset_from_others(const LampDisplacements& found,
+                                                          std::size_t lamp,
+                                                          const std::vector<std::size_t>& excluded);
 
 /// Computes the offset of each lamp from the similarity that fits the other lamps best. Omits lamps
 /// whose offset the other lamps do not determine.
-std::vector<LampOffset> offsets_from_other_lamps(const LampDisplacements& found);
+std::vector<LampOffset> compute_offsets_from_others(const LampDisplacements& found);
 
 }  // namespace vlp

@@ -34,8 +34,8 @@ struct LevelRay {
 };
 
 /// Returns the rays to the lamps of the map. Omits lamps that are detected twice.
-std::vector<LevelRay> level_rays(const Frame& frame, const LampMap& map, const Lens& lens,
-                                 const Eigen::Matrix3d& level_from_camera) {
+std::vector<LevelRay> compute_level_rays(const Frame& frame, const LampMap& map, const Lens& lens,
+                                         const Eigen::Matrix3d& level_from_camera) {
   std::vector<LevelRay> rays;
   std::map<int, int> counts;
   for (const Detection& detection : frame.detections) ++counts[detection.lamp];
@@ -61,29 +61,30 @@ double rms_radius(const std::vector<Eigen::Vector2d>& points) {
   return std::sqrt(std::max(0.0, squares / count - (sum / count).squaredNorm()));
 }
 
-using PlacesOfLamps = std::map<int, Eigen::Vector2d>;
+using LampPositions = std::map<int, Eigen::Vector2d>;
 
 /// Returns the displaced positions of the lamps, scaled to the size of the map.
-std::vector<Eigen::Vector2d> displaced_places(const LampDisplacements& found) {
+std::vector<Eigen::Vector2d> compute_displaced_positions(const LampDisplacements& found) {
   Eigen::Vector2d mean_m(0, 0);
-  std::vector<Eigen::Vector2d> places_m;
+  std::vector<Eigen::Vector2d> positions_m;
   for (std::size_t i = 0; i < found.lamps.size(); ++i) {
-    places_m.push_back(found.displaced_m(i));
-    mean_m += places_m.back() / static_cast<double>(found.lamps.size());
+    positions_m.push_back(found.displaced_m(i));
+    mean_m += positions_m.back() / static_cast<double>(found.lamps.size());
   }
-  const double scale = rms_radius(found.map_m) / rms_radius(places_m);
-  for (Eigen::Vector2d& place_m : places_m) place_m = mean_m + scale * (place_m - mean_m);
-  return places_m;
+  const double scale = rms_radius(found.map_m) / rms_radius(positions_m);
+  for (Eigen::Vector2d& displaced_position_m : positions_m)
+    displaced_position_m = mean_m + scale * (displaced_position_m - mean_m);
+  return positions_m;
 }
 
 /// Projects the rays onto the ceiling from the camera pose that fits the displaced lamps best. The
 /// height is the ratio of the sizes of both patterns, so that errors of the map barely change it.
 std::optional<CeilingView> project(const std::vector<LevelRay>& rays,
-                                   const PlacesOfLamps& places_m) {
+                                   const LampPositions& positions_m) {
   std::vector<Eigen::Vector2d> z, lamps_m;
   double mean_z_m = 0;
   for (const LevelRay& ray : rays) {
-    lamps_m.push_back(places_m.at(ray.lamp->id));
+    lamps_m.push_back(positions_m.at(ray.lamp->id));
     z.push_back(ray.z);
     mean_z_m += ray.lamp->position_m.z() / static_cast<double>(rays.size());
   }
@@ -122,19 +123,20 @@ struct MapCaptures {
   const Lens lens{calibration.camera.lens_model, calibration.camera.intrinsics};
   /// Projects the captures with three lamps or more.
   std::vector<CeilingView> views(const LampMap& map, const Eigen::Matrix3d& base_from_camera,
-                                 const PlacesOfLamps& places_m) const {
+                                 const LampPositions& positions_m) const {
     constexpr std::size_t min_lamps = 3;
     std::vector<CeilingView> views;
     const auto& inclinations = options.inclinations;
     const std::size_t stride = 1 + (frames.size() - 1) / options.max_captures;
     for (std::size_t i = 0; i < frames.size(); i += stride) {
       const bool is_inclined = !inclinations.empty() && inclinations[i];
-      const InclinationRotation lean =
-          is_inclined ? inclination_rotation(*inclinations[i], options.yaw_in_robot_rad)
+      const InclinationRotation inclination =
+          is_inclined ? compute_inclination_rotation(*inclinations[i], options.yaw_in_robot_rad)
                       : InclinationRotation();
-      const auto rays = level_rays(frames[i], map, lens, lean.level_from_base * base_from_camera);
+      const auto rays =
+          compute_level_rays(frames[i], map, lens, inclination.level_from_base * base_from_camera);
       if (rays.size() < min_lamps) continue;
-      if (auto view = project(rays, places_m)) views.push_back(std::move(*view));
+      if (auto view = project(rays, positions_m)) views.push_back(std::move(*view));
     }
     return views;
   }
@@ -148,19 +150,19 @@ struct MapCaptures {
     Eigen::Matrix3d base_from_camera = tilt_is_free
                                            ? Eigen::Matrix3d::Identity()
                                            : level_from_camera(calibration, Correction::all);
-    PlacesOfLamps places_m;
-    for (const Lamp& lamp : map.lamps) places_m[lamp.id] = lamp.position_m.head<2>();
+    LampPositions positions_m;
+    for (const Lamp& lamp : map.lamps) positions_m[lamp.id] = lamp.position_m.head<2>();
     std::optional<LampDisplacements> found;
     for (int iteration = 0; iteration < max_iterations; ++iteration) {
       found =
-          estimate_lamp_displacements(map, views(map, base_from_camera, places_m), tilt_is_free);
+          estimate_lamp_displacements(map, views(map, base_from_camera, positions_m), tilt_is_free);
       if (!found) return std::nullopt;
       double change_m = found->tilt.norm() * rms_radius(found->map_m);
-      const std::vector<Eigen::Vector2d> displaced_m = displaced_places(*found);
+      const std::vector<Eigen::Vector2d> displaced_m = compute_displaced_positions(*found);
       for (std::size_t i = 0; i < found->lamps.size(); ++i) {
-        Eigen::Vector2d& place_m = places_m.at(found->lamps[i]);
-        change_m = std::max(change_m, (displaced_m[i] - place_m).norm());
-        place_m = displaced_m[i];
+        Eigen::Vector2d& displaced_position_m = positions_m.at(found->lamps[i]);
+        change_m = std::max(change_m, (displaced_m[i] - displaced_position_m).norm());
+        displaced_position_m = displaced_m[i];
       }
       if (change_m < tolerance_m) break;
       const Eigen::Vector3d up(-found->tilt.x(), -found->tilt.y(), 1);
@@ -191,11 +193,11 @@ class DisplacementTest {
       variance_is_known_ = variance_is_known_ && sd_m;
       covariance(i, i) += sd_m.value_or(0) * sd_m.value_or(0) + kNumericVariance_m2;
     }
-    const auto range = symmetric_eigen(found.projector);
+    const auto range = decompose_symmetric(found.projector);
     const Eigen::Index rank = (range.values.array() > 0.5).count();
     const Eigen::MatrixXd basis = range.vectors.rightCols(rank);
     const auto [values, vectors] =
-        symmetric_eigen(Eigen::MatrixXd(basis.transpose() * covariance * basis));
+        decompose_symmetric(Eigen::MatrixXd(basis.transpose() * covariance * basis));
     variances_m2_ = values.cwiseMax(kNumericVariance_m2);
     basis_ = basis * vectors;
     coordinates_ = basis_.transpose() * found.displacement_m;
@@ -300,7 +302,7 @@ struct OtherMap {
 
 /// Returns the two maps with two lamps swapped that have the smallest residuals, best first. Omits
 /// maps whose residuals are no smaller than those of the original map.
-std::vector<OtherMap> swapped_maps(const LampDisplacements& found, const LampMap& map) {
+std::vector<OtherMap> make_swapped_maps(const LampDisplacements& found, const LampMap& map) {
   Eigen::Matrix2Xd lamps_m(2, std::ssize(found.lamps));
   for (Eigen::Index i = 0; i < lamps_m.cols(); ++i) {
     lamps_m.col(i) = found.map_m[static_cast<std::size_t>(i)];
@@ -365,7 +367,7 @@ bool explains_captures(const OtherMap& other) {
 std::optional<MapError> find_exchange(const MapCaptures& captures, const LampMap& map,
                                       const std::optional<LampDisplacements>& found) {
   std::vector<OtherMap> others;
-  if (found) others = swapped_maps(*found, map);
+  if (found) others = make_swapped_maps(*found, map);
   if (!is_contradicted(found) && others.empty()) return std::nullopt;
   LampMap mirrored = map;
   for (Lamp& lamp : mirrored.lamps) lamp.position_m.y() *= -1;
@@ -412,7 +414,7 @@ std::vector<MapError> find_moved(const LampDisplacements& found, const Displacem
     MapError& error = errors.back();
     // Exact offset; the one in d is linearized.
     error.offset_m.head<2>() =
-        offset_from_others(found, moved[k], moved).value_or(fit.offsets_m.segment<2>(row));
+        compute_offset_from_others(found, moved[k], moved).value_or(fit.offsets_m.segment<2>(row));
     error.sd_m.head<2>() = fit.covariance_m2.diagonal().segment<2>(row).cwiseSqrt();
   }
   return errors;
@@ -526,7 +528,7 @@ MapErrors find_map_errors(std::span<const Frame> frames, const LampMap& map,
   const MapCaptures captures{frames, calibration, options};
   const auto found = captures.displacements(map);
   MapErrors result;
-  if (found) result.offsets = offsets_from_other_lamps(*found);
+  if (found) result.offsets = compute_offsets_from_others(*found);
   if (auto exchange = find_exchange(captures, map, found)) {
     result.errors.push_back(std::move(*exchange));
     return result;

@@ -22,23 +22,25 @@ namespace {
 
 /// Observations of one lamp at one height, in units of the focal length.
 struct Trace {
-  std::vector<std::size_t> sightings;
+  std::vector<std::size_t> observations;
   std::vector<Eigen::Vector2d> points;
 };
 
-Trace trace_of(const SpotCaptures& spot, std::size_t lamp, std::size_t height) {
+Trace collect_trace(const RotationCaptures& rotation, std::size_t lamp, std::size_t height) {
   Trace trace;
-  for (std::size_t i = 0; i < spot.sightings.size(); ++i) {
-    const SpotObservation& sighting = spot.sightings[i];
-    if (sighting.lamp != lamp || spot.captures[sighting.capture].height != height) continue;
-    if (!(sighting.ray.z() > 0)) continue;
-    trace.sightings.push_back(i);
-    trace.points.emplace_back(sighting.ray.hnormalized());
+  for (std::size_t i = 0; i < rotation.observations.size(); ++i) {
+    const RotationObservation& observation = rotation.observations[i];
+    if (observation.lamp != lamp || rotation.captures[observation.capture].height != height)
+      continue;
+    if (!(observation.ray.z() > 0)) continue;
+    trace.observations.push_back(i);
+    trace.points.emplace_back(observation.ray.hnormalized());
   }
   return trace;
 }
 
-std::vector<double> distances(const Circle& circle, const std::vector<Eigen::Vector2d>& points) {
+std::vector<double> compute_distances(const Circle& circle,
+                                      const std::vector<Eigen::Vector2d>& points) {
   std::vector<double> off;
   off.reserve(points.size());
   for (const Eigen::Vector2d& point : points) {
@@ -49,10 +51,10 @@ std::vector<double> distances(const Circle& circle, const std::vector<Eigen::Vec
 
 /// Returns the circle through three of the points that has the smallest median distance to all
 /// points (least median of squares, Rousseeuw 1984). Tries a fixed sequence of triples.
-std::optional<Circle> typical_circle(const std::vector<Eigen::Vector2d>& points) {
+std::optional<Circle> fit_median_circle(const std::vector<Eigen::Vector2d>& points) {
   constexpr int triples = 200;
   std::optional<Circle> best;
-  double least = 0;
+  double min_median = 0;
   std::uint32_t state = 1;
   const auto next = [&] {
     state = state * 1664525 + 1013904223;
@@ -62,8 +64,8 @@ std::optional<Circle> typical_circle(const std::vector<Eigen::Vector2d>& points)
     const std::array<Eigen::Vector2d, 3> triple{next(), next(), next()};
     const auto fit = fit_circle(triple);
     if (!fit) continue;
-    const double median = upper_median(distances(fit->circle, points));
-    if (!best || median < least) best = fit->circle, least = median;
+    const double median = upper_median(compute_distances(fit->circle, points));
+    if (!best || median < min_median) best = fit->circle, min_median = median;
   }
   return best;
 }
@@ -74,21 +76,21 @@ constexpr std::size_t kMinPointsToTest = 8;
 
 /// Moves a point of the trace to `outliers`.
 void reject(Trace& trace, std::size_t point, double distance_px,
-            std::vector<SpotOutlier>& outliers) {
-  outliers.push_back({trace.sightings[point], distance_px});
-  trace.sightings.erase(trace.sightings.begin() + static_cast<std::ptrdiff_t>(point));
+            std::vector<RotationOutlier>& outliers) {
+  outliers.push_back({trace.observations[point], distance_px});
+  trace.observations.erase(trace.observations.begin() + static_cast<std::ptrdiff_t>(point));
   trace.points.erase(trace.points.begin() + static_cast<std::ptrdiff_t>(point));
 }
 
 /// Rejects points far from the circle on which most points agree.
-void reject_gross_outliers(Trace& trace, double focal_px, std::vector<SpotOutlier>& outliers) {
+void reject_gross_outliers(Trace& trace, double focal_px, std::vector<RotationOutlier>& outliers) {
   constexpr double rounding = 1e-9;
-  auto circle = typical_circle(trace.points);
+  auto circle = fit_median_circle(trace.points);
   const double freedom = static_cast<double>(trace.points.size()) - 3;
   std::vector<double> off;
   double limit = 0;
-  for (int round = 0; circle && round < 4; ++round) {
-    off = distances(*circle, trace.points);
+  for (int iteration = 0; circle && iteration < 4; ++iteration) {
+    off = compute_distances(*circle, trace.points);
     std::vector<double> squares;
     squares.reserve(off.size());
     for (const double one : off) squares.push_back(one * one);
@@ -112,9 +114,9 @@ void reject_gross_outliers(Trace& trace, double focal_px, std::vector<SpotOutlie
 /// Rejects the point that is farthest from the circle if the circle through the other points
 /// contradicts it (Student's t of the deleted residual). Returns true if a point was rejected.
 bool reject_worst(Trace& trace, const Circle& circle, double focal_px,
-                  std::vector<SpotOutlier>& outliers) {
+                  std::vector<RotationOutlier>& outliers) {
   constexpr double rounding = 1e-9;
-  const std::vector<double> off = distances(circle, trace.points);
+  const std::vector<double> off = compute_distances(circle, trace.points);
   const auto worst =
       static_cast<std::size_t>(std::max_element(off.begin(), off.end()) - off.begin());
   std::vector<Eigen::Vector2d> others = trace.points;
@@ -125,7 +127,7 @@ bool reject_worst(Trace& trace, const Circle& circle, double focal_px,
   // The variance of the circle at the point is 3 / n of that of a point, on average.
   const double variance =
       std::max(fit->rms * fit->rms * count / freedom, rounding * rounding) * (1 + 3 / count);
-  const double distance = distances(fit->circle, {trace.points[worst]}).front();
+  const double distance = compute_distances(fit->circle, {trace.points[worst]}).front();
   if (distance * distance <= student_bound(kOutlierSigmas, freedom) * variance) return false;
   reject(trace, worst, distance * focal_px, outliers);
   return true;
@@ -133,8 +135,8 @@ bool reject_worst(Trace& trace, const Circle& circle, double focal_px,
 
 /// Fits a circle without outliers and moves them from `trace` to `outliers`. Returns std::nullopt
 /// if the points do not determine a circle.
-std::optional<CircleFit> trimmed_circle(Trace& trace, double focal_px,
-                                        std::vector<SpotOutlier>& outliers) {
+std::optional<CircleFit> fit_trimmed_circle(Trace& trace, double focal_px,
+                                            std::vector<RotationOutlier>& outliers) {
   if (trace.points.size() >= kMinPointsToTest) reject_gross_outliers(trace, focal_px, outliers);
   auto fit = fit_circle(trace.points);
   while (fit && trace.points.size() >= kMinPointsToTest &&
@@ -166,7 +168,7 @@ bool is_determined(const Circle& circle, const std::vector<Eigen::Vector2d>& poi
     information += (radial - mean) * (radial - mean).transpose();
     tangents += tangent * tangent.transpose();
   }
-  const auto [values, axes] = symmetric_eigen(information);
+  const auto [values, axes] = decompose_symmetric(information);
   const double variance = noise * noise / (circle.radius * circle.radius);
   for (Eigen::Index i = 0; i < 2; ++i) {
     const double from_noise = variance * axes.col(i).dot(tangents * axes.col(i));
@@ -180,18 +182,18 @@ struct HeightCircles {
   std::vector<LampCircle> circles;
   /// Observations of each circle, without outliers.
   std::vector<Trace> traces;
-  std::vector<SpotOutlier> outliers;
+  std::vector<RotationOutlier> outliers;
   /// Number of lamps with three observations or more and no circle.
   int without_circle = 0;
   /// Sum of the squared distances from the circles, and its degrees of freedom.
   double squares = 0, freedom = 0;
 };
 
-HeightCircles fit_circles(const SpotCaptures& spot, std::size_t height, double focal_px) {
+HeightCircles fit_circles(const RotationCaptures& rotation, std::size_t height, double focal_px) {
   HeightCircles result;
-  for (std::size_t lamp = 0; lamp < spot.lamps.size(); ++lamp) {
-    Trace trace = trace_of(spot, lamp, height);
-    const auto fit = trimmed_circle(trace, focal_px, result.outliers);
+  for (std::size_t lamp = 0; lamp < rotation.lamps.size(); ++lamp) {
+    Trace trace = collect_trace(rotation, lamp, height);
+    const auto fit = fit_trimmed_circle(trace, focal_px, result.outliers);
     if (trace.points.size() < 3) continue;
     if (!fit || !fit->converged) {
       ++result.without_circle;
@@ -210,7 +212,7 @@ HeightCircles fit_circles(const SpotCaptures& spot, std::size_t height, double f
 /// fit if all circles have three points. Returns at least the given noise, and std::nullopt if
 /// neither residuals nor detections determine it.
 std::optional<double> estimate_noise(const std::vector<HeightCircles>& heights,
-                                     const SpotCaptures& spot, const Camera& camera) {
+                                     const RotationCaptures& rotation, const Camera& camera) {
   const double focal_px = camera.focal_px().x();
   double squares = 0, freedom = 0;
   for (const HeightCircles& height : heights) {
@@ -220,41 +222,42 @@ std::optional<double> estimate_noise(const std::vector<HeightCircles>& heights,
   std::optional<double> noise;
   if (freedom > 0) {
     noise = std::sqrt(squares / freedom);
-  } else if (const RotationFit joint = fit_joint_center(spot, camera); joint.converged) {
+  } else if (const RotationFit joint = fit_joint_center(rotation, camera); joint.converged) {
     noise = joint.residual_px / focal_px;
   }
-  if (spot.stated_px) noise = std::max(noise.value_or(0), *spot.stated_px / focal_px);
+  if (rotation.median_sigma_px)
+    noise = std::max(noise.value_or(0), *rotation.median_sigma_px / focal_px);
   return noise;
 }
 
 }  // namespace
 
-CircleCenters fit_circle_centers(const SpotCaptures& spot, const Camera& camera) {
-  assert(spot.status == SpotStatus::ok);
+CircleCenters fit_circle_centers(const RotationCaptures& rotation, const Camera& camera) {
+  assert(rotation.status == RotationStatus::ok);
   CircleCenters result;
   const double focal_px = camera.focal_px().x();
   std::vector<HeightCircles> heights;
-  for (std::size_t height = 0; height < spot.heights.size(); ++height) {
-    heights.push_back(fit_circles(spot, height, focal_px));
+  for (std::size_t height = 0; height < rotation.heights.size(); ++height) {
+    heights.push_back(fit_circles(rotation, height, focal_px));
   }
-  const std::optional<double> noise = estimate_noise(heights, spot, camera);
+  const std::optional<double> noise = estimate_noise(heights, rotation, camera);
   double squares = 0, freedom = 0;
   for (const HeightCircles& height : heights) {
     std::vector<LampCircle> determined;
-    std::vector<std::size_t> sightings;
+    std::vector<std::size_t> observations;
     for (std::size_t i = 0; i < height.circles.size() && noise; ++i) {
       const LampCircle& circle = height.circles[i];
       const Trace& trace = height.traces[i];
       if (!is_determined(circle.fit.circle, trace.points, *noise)) continue;
       determined.push_back(circle);
-      sightings.insert(sightings.end(), trace.sightings.begin(), trace.sightings.end());
+      observations.insert(observations.end(), trace.observations.begin(), trace.observations.end());
     }
     const int undetermined =
         height.without_circle + static_cast<int>(height.circles.size() - determined.size());
     result.undetermined += undetermined;
     if (std::ssize(determined) <= undetermined) continue;
-    result.mean.used_sightings.insert(result.mean.used_sightings.end(), sightings.begin(),
-                                      sightings.end());
+    result.mean.used_observations.insert(result.mean.used_observations.end(), observations.begin(),
+                                         observations.end());
     result.circles.insert(result.circles.end(), determined.begin(), determined.end());
     result.mean.outliers.insert(result.mean.outliers.end(), height.outliers.begin(),
                                 height.outliers.end());
@@ -277,9 +280,9 @@ CircleCenters fit_circle_centers(const SpotCaptures& spot, const Camera& camera)
   }
   result.spread_px = focal_px * std::sqrt(spread / count);
   result.mean.converged = true;
-  result.mean.center = rotation_center_at(mean, RotationModel::shift, camera, measured);
+  result.mean.center = make_rotation_center(mean, RotationModel::shift, camera, measured);
   result.mean.residual_px = freedom > 0 ? focal_px * std::sqrt(squares / freedom) : 0;
-  result.mean.yaws_rad = yaws_of(spot);
+  result.mean.yaws_rad = collect_yaws(rotation);
   return result;
 }
 

@@ -15,9 +15,9 @@ namespace vlp {
 /// Circle that a lamp traces at one height in the plane of normalized points (x/z, y/z). This plane
 /// is the undistorted image in units of the focal length.
 struct LampCircle {
-  /// Index in SpotCaptures::lamps.
+  /// Index in RotationCaptures::lamps.
   std::size_t lamp;
-  /// Index in SpotCaptures::heights.
+  /// Index in RotationCaptures::heights.
   std::size_t height;
   CircleFit fit;
 };
@@ -54,6 +54,6 @@ struct CircleCenters {
 /// most of its circles are determined.
 ///
 /// Source: Chen and Guan, section 3.1, eq. 9.
-CircleCenters fit_circle_centers(const SpotCaptures& spot, const Camera& camera);
+CircleCenters fit_circle_centers(const RotationCaptures& rotation, const Camera& camera);
 
 }  // namespace vlp

@@ -6,8 +6,9 @@
 
 namespace vlp {
 
-RotationCenter rotation_center_at(const Eigen::Vector2d& z, RotationModel model,
-                                  const Camera& camera, const std::optional<Matrix2>& covariance) {
+RotationCenter make_rotation_center(const Eigen::Vector2d& z, RotationModel model,
+                                    const Camera& camera,
+                                    const std::optional<Matrix2>& covariance) {
   const Eigen::Vector2d focal_px = camera.focal_px();
   RotationCenter center;
   center.model = model;
@@ -19,10 +20,10 @@ RotationCenter rotation_center_at(const Eigen::Vector2d& z, RotationModel model,
   return center;
 }
 
-std::vector<double> yaws_of(const SpotCaptures& spot) {
+std::vector<double> collect_yaws(const RotationCaptures& rotation) {
   std::vector<double> yaws_rad;
-  yaws_rad.reserve(spot.captures.size());
-  for (const SpotCapture& capture : spot.captures) yaws_rad.push_back(capture.yaw_rad);
+  yaws_rad.reserve(rotation.captures.size());
+  for (const RotationCapture& capture : rotation.captures) yaws_rad.push_back(capture.yaw_rad);
   return yaws_rad;
 }
 
@@ -33,18 +34,18 @@ std::vector<const double*> pointers_to(const std::vector<double>& values) {
   return pointers;
 }
 
-void describe(RotationFit& result, const RobustFit& fit, const SpotCaptures& spot) {
-  std::vector<bool> out(spot.sightings.size(), false);
+void set_statistics(RotationFit& result, const RobustFit& fit, const RotationCaptures& rotation) {
+  std::vector<bool> out(rotation.observations.size(), false);
   for (const std::size_t i : fit.outliers()) {
     out[i] = true;
-    result.outliers.push_back({i, fit.lengths()[i] * spot.sightings[i].sigma_px});
+    result.outliers.push_back({i, fit.lengths()[i] * rotation.observations[i].sigma_px});
   }
   double squares = 0;
-  result.used_sightings.reserve(out.size());
+  result.used_observations.reserve(out.size());
   for (std::size_t i = 0; i < out.size(); ++i) {
     if (out[i]) continue;
-    result.used_sightings.push_back(i);
-    squares += std::pow(fit.lengths()[i] * spot.sightings[i].sigma_px, 2);
+    result.used_observations.push_back(i);
+    squares += std::pow(fit.lengths()[i] * rotation.observations[i].sigma_px, 2);
   }
   const int freedom = fit.degrees_of_freedom();
   result.residual_px = freedom > 0 ? std::sqrt(squares / freedom) : 0;

@@ -15,7 +15,7 @@ namespace {
 /// Residual of fit_joint_center(). Parameters: the center (2), the position of the lamp about it at
 /// yaw 0 (2), the yaw (1).
 struct JointResidual {
-  SpotResidual in_image;
+  RotationResidual in_image;
 
   template <typename T>
   bool operator()(const T* center, const T* place, const T* yaw_rad, T* residual) const {
@@ -27,44 +27,45 @@ struct JointResidual {
     return true;
   }
 
-  static std::unique_ptr<ceres::CostFunction> create(const SpotObservation& sighting) {
+  static std::unique_ptr<ceres::CostFunction> create(const RotationObservation& observation) {
     return std::make_unique<ceres::AutoDiffCostFunction<JointResidual, 2, 2, 2, 1>>(
-        new JointResidual{SpotResidual(sighting)});
+        new JointResidual{RotationResidual(observation)});
   }
 };
 
 }  // namespace
 
-RotationFit fit_joint_center(const SpotCaptures& spot, const Camera& camera) {
-  assert(spot.status == SpotStatus::ok);
-  Eigen::Vector2d center = spot.zenith_in_camera.hnormalized();
-  std::vector<std::vector<Eigen::Vector2d>> places(spot.heights.size());
+RotationFit fit_joint_center(const RotationCaptures& rotation, const Camera& camera) {
+  assert(rotation.status == RotationStatus::ok);
+  Eigen::Vector2d center = rotation.zenith_in_camera.hnormalized();
+  std::vector<std::vector<Eigen::Vector2d>> places(rotation.heights.size());
   for (std::size_t height = 0; height < places.size(); ++height) {
-    const auto& [z_m, axis_m, arc_rad, captures] = spot.heights[height];
-    for (const Lamp& lamp : spot.lamps) {
+    const auto& [z_m, axis_m, arc_rad, captures] = rotation.heights[height];
+    for (const Lamp& lamp : rotation.lamps) {
       places[height].emplace_back((lamp.position_m.head<2>() - axis_m) /
                                   (lamp.position_m.z() - z_m));
     }
   }
-  std::vector<double> yaws_rad = yaws_of(spot);
+  std::vector<double> yaws_rad = collect_yaws(rotation);
 
-  RobustFit fit(spot.stated_px.has_value());
-  std::vector<std::vector<const double*>> yaws_at(spot.heights.size());
+  RobustFit fit(rotation.median_sigma_px.has_value());
+  std::vector<std::vector<const double*>> yaws_at(rotation.heights.size());
   for (std::size_t i = 0; i < yaws_rad.size(); ++i) {
-    yaws_at[spot.captures[i].height].push_back(&yaws_rad[i]);
+    yaws_at[rotation.captures[i].height].push_back(&yaws_rad[i]);
   }
-  for (const SpotObservation& sighting : spot.sightings) {
-    const std::size_t height = spot.captures[sighting.capture].height;
-    fit.add(JointResidual::create(sighting),
-            {center.data(), places[height][sighting.lamp].data(), &yaws_rad[sighting.capture]});
+  for (const RotationObservation& observation : rotation.observations) {
+    const std::size_t height = rotation.captures[observation.capture].height;
+    fit.add(
+        JointResidual::create(observation),
+        {center.data(), places[height][observation.lamp].data(), &yaws_rad[observation.capture]});
   }
-  for (auto& yaws : yaws_at) fit.hold_one_of(std::move(yaws));
+  for (auto& yaws : yaws_at) fit.fix_one_of(std::move(yaws));
   RotationFit result;
   result.converged = fit.solve();
   if (!result.converged) return result;
   result.center =
-      rotation_center_at(center, RotationModel::shift, camera, fit.covariance(center.data()));
-  describe(result, fit, spot);
+      make_rotation_center(center, RotationModel::shift, camera, fit.covariance(center.data()));
+  set_statistics(result, fit, rotation);
   result.yaws_rad = std::move(yaws_rad);
   return result;
 }

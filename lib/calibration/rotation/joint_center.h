@@ -20,6 +20,6 @@ namespace vlp {
 ///
 /// Exact for a level camera and captures at one height. If the camera is tilted, c is biased
 /// outwards as in fit_circle_centers(). The model of the result is RotationModel::shift.
-RotationFit fit_joint_center(const SpotCaptures& spot, const Camera& camera);
+RotationFit fit_joint_center(const RotationCaptures& rotation, const Camera& camera);
 
 }  // namespace vlp

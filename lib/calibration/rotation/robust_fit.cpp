@@ -33,7 +33,8 @@ void RobustFit::add(std::unique_ptr<ceres::CostFunction> cost, std::vector<doubl
   used_.push_back(true);
 }
 
-std::unique_ptr<ceres::Problem> RobustFit::problem(double loss_width, const Places& places) const {
+std::unique_ptr<ceres::Problem> RobustFit::problem(double loss_width,
+                                                   const ParameterMap& places) const {
   ceres::Problem::Options options;
   options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
   auto problem = std::make_unique<ceres::Problem>(options);
@@ -42,20 +43,21 @@ std::unique_ptr<ceres::Problem> RobustFit::problem(double loss_width, const Plac
   for (std::size_t i = 0; i < blocks_.size(); ++i) {
     if (!used_[i]) continue;
     std::vector<double*> parameters = blocks_[i].parameters;
-    for (double*& parameter : parameters) parameter = places.of(parameter);
+    for (double*& parameter : parameters) parameter = places.address_of(parameter);
     problem->AddResidualBlock(blocks_[i].cost.get(), loss, parameters);
   }
-  for (const auto& candidates : held_) {
-    const auto first = std::find_if(
-        candidates.begin(), candidates.end(),
-        [&](const double* parameter) { return problem->HasParameterBlock(places.of(parameter)); });
-    if (first != candidates.end()) problem->SetParameterBlockConstant(places.of(*first));
+  for (const auto& candidates : fixed_) {
+    const auto first =
+        std::find_if(candidates.begin(), candidates.end(), [&](const double* parameter) {
+          return problem->HasParameterBlock(places.address_of(parameter));
+        });
+    if (first != candidates.end()) problem->SetParameterBlockConstant(places.address_of(*first));
   }
   return problem;
 }
 
-RobustFit::Places RobustFit::places_in_order() const {
-  Places places;
+RobustFit::ParameterMap RobustFit::copy_parameters() const {
+  ParameterMap places;
   for (std::size_t i = 0; i < blocks_.size(); ++i) {
     const auto& sizes = blocks_[i].cost->parameter_block_sizes();
     for (std::size_t j = 0; used_[i] && j < sizes.size(); ++j) {
@@ -78,11 +80,11 @@ bool RobustFit::minimize(double loss_width) {
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
   ceres::Solve(options, problem(loss_width).get(), &summary);
-  measure();
+  update_lengths();
   return summary.IsSolutionUsable();
 }
 
-void RobustFit::measure() {
+void RobustFit::update_lengths() {
   lengths_.clear();
   lengths_.reserve(blocks_.size());
   for (const Block& block : blocks_) {
@@ -92,7 +94,7 @@ void RobustFit::measure() {
   }
 }
 
-double RobustFit::variance() const {
+double RobustFit::estimate_variance() const {
   std::vector<double> squares;
   for (std::size_t i = 0; i < lengths_.size(); ++i) {
     if (used_[i]) squares.push_back(lengths_[i] * lengths_[i]);
@@ -103,36 +105,36 @@ double RobustFit::variance() const {
 
 bool RobustFit::solve() {
   used_.assign(blocks_.size(), true);
-  measure();
-  constexpr int loss_rounds = 4;
-  for (int round = 0; round < loss_rounds; ++round) {
-    if (!minimize(2 * std::sqrt(variance()))) return false;
+  update_lengths();
+  constexpr int num_loss_iterations = 4;
+  for (int iteration = 0; iteration < num_loss_iterations; ++iteration) {
+    if (!minimize(2 * std::sqrt(estimate_variance()))) return false;
   }
   return refine();
 }
 
 bool RobustFit::refine() {
-  measure();
-  constexpr int rounds = 6;
-  for (int round = 0; round < rounds; ++round) {
+  update_lengths();
+  constexpr int max_iterations = 6;
+  for (int iteration = 0; iteration < max_iterations; ++iteration) {
     constexpr double sigmas = 4.5;
-    const double limit =
-        std::max(std::sqrt(planar_outlier_bound(sigmas, degrees_of_freedom()) * variance()),
-                 noise_is_stated_ ? sigmas : 0);
+    const double limit = std::max(
+        std::sqrt(planar_outlier_bound(sigmas, degrees_of_freedom()) * estimate_variance()),
+        noise_is_stated_ ? sigmas : 0);
     const std::vector<bool> before = used_;
     for (std::size_t i = 0; i < used_.size(); ++i) used_[i] = lengths_[i] <= limit;
-    if (round > 0 && used_ == before) break;
+    if (iteration > 0 && used_ == before) break;
     if (!minimize(0)) return false;
   }
   return true;
 }
 
 std::vector<std::size_t> RobustFit::outliers() const {
-  std::vector<std::size_t> left_out;
+  std::vector<std::size_t> rejected;
   for (std::size_t i = 0; i < used_.size(); ++i) {
-    if (!used_[i]) left_out.push_back(i);
+    if (!used_[i]) rejected.push_back(i);
   }
-  return left_out;
+  return rejected;
 }
 
 int RobustFit::degrees_of_freedom() const {
@@ -146,9 +148,9 @@ std::vector<RobustFit::Jacobians> RobustFit::jacobians() const {
     if (!used_[i]) continue;
     Jacobians at{i, blocks_[i].parameters, {}};
     for (const int size : blocks_[i].cost->parameter_block_sizes())
-      at.by_parameter.emplace_back(2, size);
+      at.d_residual_d_parameter.emplace_back(2, size);
     std::vector<double*> data;
-    for (auto& by : at.by_parameter) data.push_back(by.data());
+    for (auto& by : at.d_residual_d_parameter) data.push_back(by.data());
     Eigen::Vector2d residual;
     blocks_[i].cost->Evaluate(at.parameters.data(), residual.data(), data.data());
     all.push_back(std::move(at));
@@ -156,30 +158,30 @@ std::vector<RobustFit::Jacobians> RobustFit::jacobians() const {
   return all;
 }
 
-std::vector<const double*> RobustFit::held() const {
+std::vector<const double*> RobustFit::fixed_parameters() const {
   const auto all = problem(0);
   std::vector<double*> parameters;
   all->GetParameterBlocks(&parameters);
-  std::vector<const double*> held;
+  std::vector<const double*> fixed_parameters;
   for (const double* parameter : parameters) {
-    if (all->IsParameterBlockConstant(parameter)) held.push_back(parameter);
+    if (all->IsParameterBlockConstant(parameter)) fixed_parameters.push_back(parameter);
   }
-  return held;
+  return fixed_parameters;
 }
 
 std::optional<Matrix2> RobustFit::covariance(const double* parameter, const double* other) const {
   // Ceres orders the parameters by their addresses, and rounding depends on that order.
-  const Places places = places_in_order();
-  parameter = places.of(parameter);
-  other = places.of(other);
+  const ParameterMap places = copy_parameters();
+  parameter = places.address_of(parameter);
+  other = places.address_of(other);
   const auto all = problem(0, places);
   for (const double* wanted : {parameter, other}) {
     if (!all->HasParameterBlock(wanted) || all->IsParameterBlockConstant(wanted)) {
       return std::nullopt;
     }
   }
-  const int excess = all->NumResiduals() - free_parameters(*all);
-  if (excess <= 0) return std::nullopt;
+  const int redundancy = all->NumResiduals() - free_parameters(*all);
+  if (redundancy <= 0) return std::nullopt;
   double squares = 0;
   for (std::size_t i = 0; i < lengths_.size(); ++i) {
     if (used_[i]) squares += lengths_[i] * lengths_[i];
@@ -196,7 +198,7 @@ std::optional<Matrix2> RobustFit::covariance(const double* parameter, const doub
     return std::nullopt;
   }
   if (parameter == other) block = 0.5 * (block + block.transpose()).eval();
-  return Matrix2(block * (squares / excess));
+  return Matrix2(block * (squares / redundancy));
 }
 
 }  // namespace vlp

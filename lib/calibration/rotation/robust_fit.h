@@ -32,11 +32,11 @@ class RobustFit {
   /// Adds a residual of two rows. The caller owns `parameters`, which must outlive the fit.
   void add(std::unique_ptr<ceres::CostFunction> cost, std::vector<double*> parameters);
   /// Fixes a parameter at its value.
-  void hold(const double* parameter) { held_.push_back({parameter}); }
+  void fix_parameter(const double* parameter) { fixed_.push_back({parameter}); }
   /// Fixes the first of `parameters` on which a used residual depends. Removes a degree of freedom
   /// that these parameters have in common and that no residual determines.
-  void hold_one_of(std::vector<const double*> parameters) {
-    held_.push_back(std::move(parameters));
+  void fix_one_of(std::vector<const double*> parameters) {
+    fixed_.push_back(std::move(parameters));
   }
 
   /// Runs the robust fit, then refine(). Returns false if Ceres finds no usable solution.
@@ -55,12 +55,12 @@ class RobustFit {
   struct Jacobians {
     std::size_t residual;
     std::vector<double*> parameters;
-    std::vector<Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor>> by_parameter;
+    std::vector<Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor>> d_residual_d_parameter;
   };
   /// Returns the derivatives of all used residuals.
   std::vector<Jacobians> jacobians() const;
   /// Returns the parameters of used residuals that the last fit kept fixed.
-  std::vector<const double*> held() const;
+  std::vector<const double*> fixed_parameters() const;
   /// Returns the block of s^2 (J^T J)^-1 of two parameter blocks of size two. Its rows belong to
   /// `parameter`; s^2 is the variance of the residuals found. Returns std::nullopt if there are no
   /// more residual rows than parameters, if a block is fixed or unused, or if the residuals do not
@@ -76,28 +76,28 @@ class RobustFit {
     std::vector<double*> parameters;
   };
   /// Addresses of the parameters for Ceres: copies of those in `begins`, the original otherwise.
-  struct Places {
+  struct ParameterMap {
     mutable std::vector<double> values;
     std::map<const double*, std::size_t> begins;
 
     template <typename Number>
-    Number* of(Number* parameter) const {
+    Number* address_of(Number* parameter) const {
       const auto begin = begins.find(parameter);
       return begin == begins.end() ? parameter : &values[begin->second];
     }
   };
   /// Returns copies of the used parameters, in the order in which residuals refer to them.
-  Places places_in_order() const;
-  std::unique_ptr<ceres::Problem> problem(double loss_width, const Places& places = {}) const;
+  ParameterMap copy_parameters() const;
+  std::unique_ptr<ceres::Problem> problem(double loss_width, const ParameterMap& places = {}) const;
   bool minimize(double loss_width);
-  void measure();
+  void update_lengths();
   /// Estimates the variance of the used residuals per axis from their median. Never returns less
   /// than the numeric noise.
-  double variance() const;
+  double estimate_variance() const;
 
   bool noise_is_stated_;
   std::vector<Block> blocks_;
-  std::vector<std::vector<const double*>> held_;
+  std::vector<std::vector<const double*>> fixed_;
   std::vector<bool> used_;
   std::vector<double> lengths_;
 };

@@ -6,7 +6,7 @@
 
 namespace vlp {
 
-Tilt tilt_of(const RotationCenter& center) {
+Tilt compute_tilt(const RotationCenter& center) {
   const Eigen::Vector3d& up = center.zenith_in_camera;
   return {std::atan2(up.head<2>().norm(), up.z()), std::atan2(up.y(), up.x())};
 }

@@ -12,9 +12,9 @@
 namespace vlp {
 
 /// Observation that contradicts the other observations and is rejected.
-struct SpotOutlier {
-  /// Index in SpotCaptures::sightings.
-  std::size_t sighting;
+struct RotationOutlier {
+  /// Index in RotationCaptures::sightings.
+  std::size_t observation;
   /// Distance from the position that the fit predicts, in px.
   double distance_px;
 };
@@ -27,15 +27,15 @@ struct RotationFit {
   /// the detections only sets relative weights. They include the map's sd_m if the method depends
   /// on the map. There is no covariance if the fit has no redundancy.
   RotationCenter center = {};
-  /// Yaw of each capture, rad, in the order of SpotCaptures::captures.
+  /// Yaw of each capture, rad, in the order of RotationCaptures::captures.
   std::vector<double> yaws_rad = {};
   /// RMS residual of the inliers per image axis, in px: sqrt(sum of squares / (measurements -
   /// unknowns)). It estimates the pixel noise. It is 0 if there are as many measurements as
   /// unknowns.
   double residual_px = 0;
-  std::vector<SpotOutlier> outliers = {};
-  /// Observations that determine the center, as indices in SpotCaptures::sightings.
-  std::vector<std::size_t> used_sightings = {};
+  std::vector<RotationOutlier> outliers = {};
+  /// Observations that determine the center, as indices in RotationCaptures::sightings.
+  std::vector<std::size_t> used_observations = {};
 };
 
 /// Tilt of a camera. The azimuth is the direction of "up" in the image, from x to y.
@@ -44,7 +44,7 @@ struct Tilt {
   double azimuth_rad;
 };
 /// Returns the tilt that the zenith of `center` corresponds to.
-Tilt tilt_of(const RotationCenter& center);
+Tilt compute_tilt(const RotationCenter& center);
 
 /// Returns the standard deviation of the axis direction, rad: the RMS over the two directions
 /// across it. Returns std::nullopt if `center` has no covariance.

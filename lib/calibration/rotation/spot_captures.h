@@ -17,10 +17,10 @@
 namespace vlp {
 
 /// Observation of one lamp in one capture.
-struct SpotObservation {
-  /// Index in SpotCaptures::captures.
+struct RotationObservation {
+  /// Index in RotationCaptures::captures.
   std::size_t capture;
-  /// Index in SpotCaptures::lamps.
+  /// Index in RotationCaptures::lamps.
   std::size_t lamp;
   Eigen::Vector2d pixel;
   double sigma_px;
@@ -31,16 +31,16 @@ struct SpotObservation {
 };
 
 /// Capture of a rotation in place.
-struct SpotCapture {
+struct RotationCapture {
   std::string image;
-  /// Index in SpotCaptures::heights.
+  /// Index in RotationCaptures::heights.
   std::size_t height;
   /// Yaw of the camera's position fix.
   double yaw_rad;
 };
 
 /// Captures at one height.
-struct SpotHeight {
+struct RotationHeight {
   /// Height of the camera in the world.
   double z_m;
   /// Position of the rotation axis in the world.
@@ -52,7 +52,7 @@ struct SpotHeight {
 };
 
 /// Result of the check that captures are a rotation in place.
-enum class SpotStatus {
+enum class RotationStatus {
   ok,
   other_map,         // no lamp of the map is detected, or the detected lamps contradict it
   too_few_lamps,     // fewer than two lamps, or than two in each capture
@@ -63,7 +63,7 @@ enum class SpotStatus {
 };
 
 /// Describes the status and the remedy, human-readable.
-std::string_view explanation_of(SpotStatus status);
+std::string_view describe(RotationStatus status);
 
 /// Captures of a rotation in place about a vertical axis, with approximate values of the unknowns.
 ///
@@ -78,41 +78,41 @@ std::string_view explanation_of(SpotStatus status);
 /// which is linear in A, e and delta, the remaining tilt. The weights are robust against outliers.
 ///
 /// Heights are separate if there is a gap between the distances of the fixes from the lamps. The
-/// gap has to be at least three of their standard deviations, and at least kLeastGap of the
-/// distance.
-struct SpotCaptures {
-  SpotStatus status = SpotStatus::ok;
+/// gap has to be at least three of their standard deviations, and at least kMinHeightGapFraction of
+/// the distance.
+struct RotationCaptures {
+  RotationStatus status = RotationStatus::ok;
   /// Lamps of the map that are detected, in the order of the map.
   std::vector<Lamp> lamps;
-  std::vector<SpotCapture> captures;
+  std::vector<RotationCapture> captures;
   /// Heights of the captures, in ascending order.
-  std::vector<SpotHeight> heights;
-  std::vector<SpotObservation> sightings;
+  std::vector<RotationHeight> heights;
+  std::vector<RotationObservation> observations;
   /// Upper median of the detections' sigma_px; std::nullopt if any detection has none.
-  std::optional<double> stated_px = {};
+  std::optional<double> median_sigma_px = {};
   Eigen::Vector3d zenith_in_camera = Eigen::Vector3d::UnitZ();
   /// Lever arm in the level frame; zero if there is only one height.
   Eigen::Vector2d lever_arm_m = Eigen::Vector2d::Zero();
   /// Rejected capture and the reason, human-readable.
-  struct LeftOut {
+  struct RejectedCapture {
     std::string image;
     std::string reason;
   };
   /// Captures that are not used.
-  std::vector<LeftOut> left_out;
+  std::vector<RejectedCapture> rejected;
 };
 
 /// Smallest gap between two heights, as a fraction of the distance from the lamps. Distances of
 /// captures at one height differ by less than this, because floors are uneven and lamp maps have
 /// errors.
-inline constexpr double kLeastGap = 0.01;
+inline constexpr double kMinHeightGapFraction = 0.01;
 /// Smallest angular range that determines a rotation center.
-inline constexpr double kLeastArc_rad = 1.5707963267948966;
+inline constexpr double kMinArc_rad = 1.5707963267948966;
 
 /// Finds the rotation in place in the captures: yaws, heights, axes, and approximate tilt and lever
 /// arm. Members other than `status` are valid only if the status is `ok`.
 /// @pre the number of intrinsics matches the lens model
-SpotCaptures spot_captures(const std::vector<Frame>& frames, const LampMap& map,
-                           const Camera& camera);
+RotationCaptures find_rotation_captures(const std::vector<Frame>& frames, const LampMap& map,
+                                        const Camera& camera);
 
 }  // namespace vlp

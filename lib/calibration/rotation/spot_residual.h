@@ -14,20 +14,20 @@ namespace vlp {
 /// distance and without evaluating the lens:
 ///   residual = J p / (p . v) / sigma
 /// J is the derivative of the pixel at v, with J v = 0.
-struct SpotResidual {
+struct RotationResidual {
   Eigen::Vector3d ray;
   Eigen::Matrix<double, 2, 3> weighted;
 
-  explicit SpotResidual(const SpotObservation& sighting)
-      : ray(sighting.ray), weighted(sighting.d_pixel_d_ray / sighting.sigma_px) {}
+  explicit RotationResidual(const RotationObservation& observation)
+      : ray(observation.ray), weighted(observation.d_pixel_d_ray / observation.sigma_px) {}
 
   template <typename T>
   void operator()(const Eigen::Matrix<T, 3, 1>& p, T* residual) const {
     // Keeps the residual finite for points to the side or behind the camera.
-    constexpr double least_cosine = 0.1;
-    const T along = p.dot(ray.cast<T>()), least = p.norm() * T(least_cosine);
+    constexpr double min_cosine = 0.1;
+    const T along = p.dot(ray.cast<T>()), min_along = p.norm() * T(min_cosine);
     Eigen::Map<Eigen::Matrix<T, 2, 1>> at(residual);
-    at = weighted.cast<T>() * p / (along > least ? along : least);
+    at = weighted.cast<T>() * p / (along > min_along ? along : min_along);
   }
 };
 

@@ -12,16 +12,16 @@
 namespace vlp {
 
 /// Position fix of a camera that rotates in place.
-struct TurningFix {
+struct RotationFix {
   Pose pose;
   /// Mean height of the lamps of the map above the camera.
   double height_m;
   /// Index of the spot.
-  std::size_t spot;
+  std::size_t pivot;
 };
 
 /// Rotation model fitted to position fixes: fix_k = A_spot + e^{jg_k} (e + H_k delta).
-struct Turning {
+struct RotationModelFit {
   std::vector<Eigen::Vector2d> axes_m;
   Eigen::Vector2d lever_arm_m;
   /// Error of the normalized points: the true zenith is seen at -delta.
@@ -35,10 +35,11 @@ struct Turning {
 /// minimum norm.
 ///
 /// @param lever_arm  if false, the lever arm is zero, and delta contains its effect
-Turning fit_turning(std::span<const TurningFix> fixes, std::size_t spots, bool lever_arm);
+RotationModelFit fit_rotation_model(std::span<const RotationFix> fixes, std::size_t num_pivots,
+                                    bool lever_arm);
 
 /// Returns the angular range of the angles: 2 pi minus the largest gap between neighboring angles,
 /// rad. Returns 0 for fewer than two angles.
-double arc_of(std::vector<double> angles_rad);
+double compute_angular_range(std::vector<double> angles_rad);
 
 }  // namespace vlp

@@ -9,14 +9,14 @@ namespace vlp {
 
 /// Largest standard deviation of a lever arm that lamps at several heights determine, as a fraction
 /// of the lamps' height above the camera. It corresponds to 0.3 degrees of tilt.
-inline constexpr double kLooseLeverArm = 0.005;
+inline constexpr double kMaxLeverArmSdFraction = 0.005;
 
 /// Fits the direction in the camera about which all lamp rays rotate (lib/THEORY.md, "Rotation
 /// centre", method `axis`). The model is exact in lens and tilt.
 ///
 /// @return  the rotation center with model RotationModel::tilt; `center_px` is the zenith in the
 ///     undistorted image. Not converged if the RMS residual exceeds 0.007 focal lengths and four
-///     times SpotCaptures::stated_px: the captures are then no rotation about one axis.
+///     times RotationCaptures::median_sigma_px: the captures are then no rotation about one axis.
 ///
 /// Minimizes the squared distances of the lamps, in the image, from
 ///   project(camera_from_level(zenith) (Rz(-g_k) (p_i - A_h) - e, Z_i - z_h))
@@ -32,12 +32,12 @@ inline constexpr double kLooseLeverArm = 0.005;
 ///
 /// A lever arm and a tilt both displace the image, by zeta - e/H, where H is the height of a lamp
 /// above the camera. Captures at several heights separate them. Lamps whose heights differ by
-/// kLeastGap of H or more also separate them, with less precision. With a single H only
+/// kMinHeightGapFraction of H or more also separate them, with less precision. With a single H only
 /// second-order effects of the tilt do, which a small lens error resembles.
 ///
 /// The lever arm is set to zero if there is a single H, or if its standard deviation would exceed
-/// kLooseLeverArm. The result is then the image of the ceiling point above the axis. At this
-/// height, a fix that is corrected with it is the position of the axis instead of the camera.
-RotationFit fit_turning_axis(const SpotCaptures& spot, const Camera& camera);
+/// kMaxLeverArmSdFraction. The result is then the image of the ceiling point above the axis. At
+/// this height, a fix that is corrected with it is the position of the axis instead of the camera.
+RotationFit fit_rotation_axis(const RotationCaptures& rotation, const Camera& camera);
 
 }  // namespace vlp

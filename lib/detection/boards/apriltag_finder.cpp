@@ -24,9 +24,9 @@ using DetectorPointer = std::unique_ptr<apriltag_detector_t, void (*)(apriltag_d
 
 /// libapriltag's decoding table of a tag family, which corrects bit errors. It is expensive to
 /// create, read-only, and independent of the border width.
-class Corrections {
+class DecodingTable {
  public:
-  explicit Corrections(const std::string& name) : family_(tag_family(name)) {
+  explicit DecodingTable(const std::string& name) : family_(make_tag_family(name)) {
     constexpr uint32_t large = 3000;  // gigabytes with two bits
     apriltag_detector_add_family_bits(maker_.get(), family_.get(), family_->ncodes > large ? 1 : 2);
     if (family_->impl == nullptr) throw std::bad_alloc();
@@ -40,17 +40,17 @@ class Corrections {
 
 /// Returns the decoding table of a family. A process creates it once and shares it with the
 /// children that it forks afterwards.
-void* corrections_of(const std::string& family) {
-  static std::mutex making;
-  static std::map<std::string, Corrections> made;
-  const std::lock_guard lock(making);
-  return made.try_emplace(family, family).first->second.table();
+void* get_decoding_table(const std::string& family) {
+  static std::mutex mutex;
+  static std::map<std::string, DecodingTable> tables;
+  const std::lock_guard lock(mutex);
+  return tables.try_emplace(family, family).first->second.table();
 }
 
 struct Detector {
-  explicit Detector(const Board& board) : family(tag_family(board.family)) {
+  explicit Detector(const Board& board) : family(make_tag_family(board.family)) {
     for (int extra = 1; extra < board.border_bits; ++extra) widen_border();
-    family->impl = corrections_of(board.family);
+    family->impl = get_decoding_table(board.family);
     apriltag_detector_add_family(detector.get(), family.get());
     detector->nthreads = 1;
     detector->refine_edges = true;
@@ -74,16 +74,16 @@ struct Detector {
 
 class ApriltagFinder : public TagFinder {
  public:
-  explicit ApriltagFinder(Board board) : board_(std::move(board)) { give(take()); }
+  explicit ApriltagFinder(Board board) : board_(std::move(board)) { release(acquire()); }
 
-  std::vector<SeenTag> find(const cv::Mat1b& image) const override {
-    std::unique_ptr<Detector> mine = take();
-    mine->detector->quad_decimate = image.cols * image.rows >= kLargePixels ? 2 : 1;
+  std::vector<TagDetection> find(const cv::Mat1b& image) const override {
+    std::unique_ptr<Detector> detector = acquire();
+    detector->detector->quad_decimate = image.cols * image.rows >= kLargePixels ? 2 : 1;
     // The detector does not write to the image, but its interface lacks const.
     image_u8_t view{image.cols, image.rows, static_cast<int>(image.step), image.data};
     const std::unique_ptr<zarray_t, void (*)(zarray_t*)> found(
-        apriltag_detector_detect(mine->detector.get(), &view), apriltag_detections_destroy);
-    std::vector<SeenTag> tags(static_cast<std::size_t>(zarray_size(found.get())));
+        apriltag_detector_detect(detector->detector.get(), &view), apriltag_detections_destroy);
+    std::vector<TagDetection> tags(static_cast<std::size_t>(zarray_size(found.get())));
     for (std::size_t i = 0; i < tags.size(); ++i) {
       apriltag_detection_t* detection = nullptr;
       zarray_get(found.get(), static_cast<int>(i), static_cast<void*>(&detection));
@@ -93,16 +93,16 @@ class ApriltagFinder : public TagFinder {
                                  detection->p[k][1] - kPixelCenter};
       }
     }
-    give(std::move(mine));
+    release(std::move(detector));
     return tags;
   }
 
  private:
   /// Returns an idle detector, or a new one. A detector serves one thread at a time and is
   /// expensive to create.
-  std::unique_ptr<Detector> take() const {
+  std::unique_ptr<Detector> acquire() const {
     {
-      const std::lock_guard lock(taking_);
+      const std::lock_guard lock(mutex_);
       if (!idle_.empty()) {
         std::unique_ptr<Detector> taken = std::move(idle_.back());
         idle_.pop_back();
@@ -111,21 +111,21 @@ class ApriltagFinder : public TagFinder {
     }
     return std::make_unique<Detector>(board_);
   }
-  void give(std::unique_ptr<Detector> detector) const {
-    const std::lock_guard lock(taking_);
+  void release(std::unique_ptr<Detector> detector) const {
+    const std::lock_guard lock(mutex_);
     idle_.push_back(std::move(detector));
   }
 
   Board board_;
-  mutable std::mutex taking_;
+  mutable std::mutex mutex_;
   mutable std::vector<std::unique_ptr<Detector>> idle_;
 };
 
 }  // namespace
 
-void prepare_tag_family(const std::string& name) { corrections_of(name); }
+void prepare_tag_family(const std::string& name) { get_decoding_table(name); }
 
-std::unique_ptr<TagFinder> apriltag_finder(const Board& board) {
+std::unique_ptr<TagFinder> make_apriltag_finder(const Board& board) {
   return std::make_unique<ApriltagFinder>(board);
 }
 

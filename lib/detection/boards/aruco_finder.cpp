@@ -48,7 +48,7 @@ const std::map<std::string, int>& dictionaries() {
   return all;
 }
 
-int dictionary_named(const std::string& name) {
+int find_dictionary(const std::string& name) {
   const auto found = dictionaries().find(name);
   if (found != dictionaries().end()) return found->second;
   std::string names;
@@ -66,7 +66,7 @@ using Dictionary = cv::Ptr<cv::aruco::Dictionary>;
 const cv::aruco::Dictionary& contents(const Dictionary& dictionary) { return *dictionary; }
 #endif
 
-int dictionary_of_tags(const std::string& family) {
+int find_tag_dictionary(const std::string& family) {
   if (family == "tag36h11") return cv::aruco::DICT_APRILTAG_36h11;
   if (family == "tag25h9") return cv::aruco::DICT_APRILTAG_25h9;
   if (family == "tag16h5") return cv::aruco::DICT_APRILTAG_16h5;
@@ -81,10 +81,10 @@ class ArucoFinder : public TagFinder {
   explicit ArucoFinder(const Board& board)
       : charuco_(board.kind == BoardKind::charuco),
         dictionary_(cv::aruco::getPredefinedDictionary(
-            charuco_ ? dictionary_named(board.family) : dictionary_of_tags(board.family))),
+            charuco_ ? find_dictionary(board.family) : find_tag_dictionary(board.family))),
         border_bits_(board.border_bits) {}
 
-  std::vector<SeenTag> find(const cv::Mat1b& image) const override {
+  std::vector<TagDetection> find(const cv::Mat1b& image) const override {
     std::vector<std::vector<cv::Point2f>> corners;
     std::vector<int> ids;
 #ifdef VLP_ARUCO_IS_A_CLASS
@@ -101,7 +101,7 @@ class ArucoFinder : public TagFinder {
     // relative to libapriltag's.
     constexpr std::array<std::size_t, 4> of_markers{3, 2, 1, 0}, of_tags{1, 0, 3, 2};
     const auto& opencv_corner = charuco_ ? of_markers : of_tags;
-    std::vector<SeenTag> tags(ids.size());
+    std::vector<TagDetection> tags(ids.size());
     for (std::size_t i = 0; i < ids.size(); ++i) {
       tags[i].id = ids[i];
       for (std::size_t k = 0; k < 4; ++k) {
@@ -120,8 +120,8 @@ class ArucoFinder : public TagFinder {
 
 }  // namespace
 
-ArucoMarker aruco_marker(const std::string& name, int id) {
-  const Dictionary dictionary = cv::aruco::getPredefinedDictionary(dictionary_named(name));
+ArucoMarker make_aruco_marker(const std::string& name, int id) {
+  const Dictionary dictionary = cv::aruco::getPredefinedDictionary(find_dictionary(name));
   const cv::Mat& codes = contents(dictionary).bytesList;
   const int width = contents(dictionary).markerSize;
   if (id < 0 || id >= codes.rows) {
@@ -135,7 +135,7 @@ ArucoMarker aruco_marker(const std::string& name, int id) {
   return marker;
 }
 
-std::unique_ptr<TagFinder> aruco_finder(const Board& board) {
+std::unique_ptr<TagFinder> make_aruco_finder(const Board& board) {
   return std::make_unique<ArucoFinder>(board);
 }
 

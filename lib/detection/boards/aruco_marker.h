@@ -18,6 +18,6 @@ struct ArucoMarker {
 
 /// Returns the marker `id` of a dictionary, named as in Board::family of a ChArUco board.
 /// @throws std::invalid_argument if there is no such dictionary, or no such id in it
-ArucoMarker aruco_marker(const std::string& dictionary, int id);
+ArucoMarker make_aruco_marker(const std::string& dictionary, int id);
 
 }  // namespace vlp

@@ -30,16 +30,16 @@ struct BlurredStep {
     const ErrorFunction erf(distance_px * blur.per_scale);
     value = erf.value;
     slope = erf.slope * blur.per_scale;
-    by_blur = -distance_px * blur.per_px * slope;
+    d_value_d_blur = -distance_px * blur.per_px * slope;
     const double u = distance_px * blur.per_px;
-    by_kurtosis = (3 - u * u) / 24 * distance_px * slope;
+    d_value_d_kurtosis = (3 - u * u) / 24 * distance_px * slope;
   }
 
   double value;
   /// Derivatives with respect to the distance (`slope`), the blur and the excess kurtosis k of the
   /// line spread, at k = 0 (Gram-Charlier series):
   ///   exp(-u^2 / 2) (1 + k (u^4 - 6 u^2 + 3) / 24) / (sqrt(2 pi) blur),     u = distance / blur.
-  double slope, by_blur, by_kurtosis;
+  double slope, d_value_d_blur, d_value_d_kurtosis;
 };
 
 }  // namespace vlp

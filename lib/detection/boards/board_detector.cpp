@@ -19,7 +19,7 @@ namespace {
 /// truncated.
 constexpr double kMargin = 2;
 
-cv::Mat1f smooth(const cv::Mat1b& levels) {
+cv::Mat1f smooth_image(const cv::Mat1b& levels) {
   constexpr double sigma_px = 1;
   cv::Mat exact;
   levels.convertTo(exact, CV_32F);
@@ -28,7 +28,7 @@ cv::Mat1f smooth(const cv::Mat1b& levels) {
   return smoothed;
 }
 
-bool inside(const SeenTag& tag, const cv::Mat& image) {
+bool is_inside(const TagDetection& tag, const cv::Mat& image) {
   return std::all_of(tag.corners_px.begin(), tag.corners_px.end(), [&](const auto& corner) {
     return corner.x() >= kMargin && corner.y() >= kMargin && corner.x() < image.cols - kMargin &&
            corner.y() < image.rows - kMargin;
@@ -37,22 +37,22 @@ bool inside(const SeenTag& tag, const cv::Mat& image) {
 
 /// Returns true if more than 10 % of the pixels in the bounding box of a tag are white. The box
 /// extends into the white around the tag.
-bool overexposed(const SeenTag& tag, const cv::Mat1b& levels) {
-  constexpr double white = 254, enough = 0.1;
+bool overexposed(const TagDetection& tag, const cv::Mat1b& levels) {
+  constexpr double white = 254, min_white_fraction = 0.1;
   std::vector<cv::Point2f> corners;
   for (const auto& corner : tag.corners_px) {
     corners.emplace_back(static_cast<float>(corner.x()), static_cast<float>(corner.y()));
   }
   const cv::Rect box = cv::boundingRect(corners) & cv::Rect(0, 0, levels.cols, levels.rows);
-  return !box.empty() && cv::countNonZero(levels(box) >= white) > enough * box.area();
+  return !box.empty() && cv::countNonZero(levels(box) >= white) > min_white_fraction * box.area();
 }
 
 }  // namespace
 
-std::vector<SeenPoint> corners_of(const SeenBoard& seen) {
+std::vector<PointDetection> collect_corners(const BoardDetection& seen) {
   if (!seen.points.empty()) return seen.points;
-  std::vector<SeenPoint> corners;
-  for (const SeenTag& tag : seen.tags) {
+  std::vector<PointDetection> corners;
+  for (const TagDetection& tag : seen.tags) {
     for (std::size_t k = 0; k < 4; ++k) {
       corners.push_back({4 * static_cast<std::size_t>(tag.id) + k, tag.corners_px[k]});
     }
@@ -61,35 +61,36 @@ std::vector<SeenPoint> corners_of(const SeenBoard& seen) {
 }
 
 BoardDetector::BoardDetector(const Board& board) {
-  for (const BoardTag& tag : board_layout(board)) ids_.insert(tag.id);
+  for (const BoardTag& tag : compute_board_layout(board)) ids_.insert(tag.id);
   if (board.kind != BoardKind::chessboard) {
     const bool aruco = board.corner_squares || board.has_squares();
-    finder_ = aruco ? aruco_finder(board) : apriltag_finder(board);
+    finder_ = aruco ? make_aruco_finder(board) : make_apriltag_finder(board);
   }
   if (board.has_squares()) {
     squares_ = std::make_unique<SquareCorners>(board);
   } else if (board.corner_squares) {
     touching_ = std::make_unique<TouchingTags>(board);
   } else {
-    print_ = std::make_unique<TagPrint>(board);
+    print_ = std::make_unique<TagGeometry>(board);
   }
 }
 
 BoardDetector::~BoardDetector() = default;
 
-std::optional<SeenTag> BoardDetector::exact(const SeenTag& tag, const GreyLevels& image) const {
+std::optional<TagDetection> BoardDetector::exact(const TagDetection& tag,
+                                                 const GreyLevels& image) const {
   return touching_->exact(tag, image);
 }
 
-SeenBoard BoardDetector::seen_squares(const cv::Mat1b& levels) const {
-  const GreyLevels grey{levels, smooth(levels)};
-  SeenBoard seen;
+BoardDetection BoardDetector::detect_squares(const cv::Mat1b& levels) const {
+  const GreyLevels grey{levels, smooth_image(levels)};
+  BoardDetection seen;
   if (!finder_) {
-    seen.points = squares_->of_chessboard(grey);
+    seen.points = squares_->detect_chessboard(grey);
     return seen;
   }
-  std::map<int, std::vector<SeenTag>> found;
-  for (const SeenTag& marker : finder_->find(levels)) {
+  std::map<int, std::vector<TagDetection>> found;
+  for (const TagDetection& marker : finder_->find(levels)) {
     if (ids_.contains(marker.id)) {
       found[marker.id].push_back(marker);
     } else {
@@ -103,11 +104,11 @@ SeenBoard BoardDetector::seen_squares(const cv::Mat1b& levels) const {
       seen.tags.push_back(same.front());
     }
   }
-  seen.points = squares_->beside(seen.tags, grey);
+  seen.points = squares_->detect_beside(seen.tags, grey);
   return seen;
 }
 
-cv::Mat1b eight_bits(const cv::Mat& image) {
+cv::Mat1b convert_to_8_bits(const cv::Mat& image) {
   if (image.depth() == CV_8U) return image;
   double brightest = 0;
   cv::minMaxLoc(image, nullptr, &brightest);
@@ -116,47 +117,47 @@ cv::Mat1b eight_bits(const cv::Mat& image) {
   return levels;
 }
 
-SeenBoard BoardDetector::detect(const cv::Mat& image) const {
+BoardDetection BoardDetector::detect(const cv::Mat& image) const {
   // Tags are wider, and libapriltag reads out of bounds for images of one or two rows.
-  constexpr int least_px = 10;
-  if (std::min(image.cols, image.rows) < least_px) return {};
-  const cv::Mat1b levels = eight_bits(image);
-  if (squares_) return seen_squares(levels);
-  std::map<int, std::vector<SeenTag>> found;
-  SeenBoard seen;
-  for (SeenTag& tag : finder_->find(levels)) {
+  constexpr int min_px = 10;
+  if (std::min(image.cols, image.rows) < min_px) return {};
+  const cv::Mat1b levels = convert_to_8_bits(image);
+  if (squares_) return detect_squares(levels);
+  std::map<int, std::vector<TagDetection>> found;
+  BoardDetection seen;
+  for (TagDetection& tag : finder_->find(levels)) {
     if (ids_.contains(tag.id)) {
       found[tag.id].push_back(tag);
     } else {
       seen.foreign.push_back(tag);
     }
   }
-  const GreyLevels grey{levels, touching_ ? smooth(levels) : cv::Mat1f()};
-  std::vector<SeenTag> once;
+  const GreyLevels grey{levels, touching_ ? smooth_image(levels) : cv::Mat1f()};
+  std::vector<TagDetection> once;
   for (const auto& [id, same] : found) {
     if (same.size() == 1) once.push_back(same.front());
   }
   if (print_) {
-    seen.curve_costs = find_exact_edges(once, levels, *print_);
+    seen.curve_costs = refine_tag_edges(once, levels, *print_);
     seen.tags = once;
   } else {
-    for (const SeenTag& tag : once) {
+    for (const TagDetection& tag : once) {
       if (const auto found_exact = exact(tag, grey)) seen.tags.push_back(*found_exact);
     }
   }
   if (touching_) {
-    for (const SeenTag& tag : touching_->others(seen.tags, grey)) {
+    for (const TagDetection& tag : touching_->find_missing(seen.tags, grey)) {
       if (found[tag.id].size() <= 1) seen.tags.push_back(tag);
     }
   }
   for (auto* tags : {&seen.tags, &seen.foreign}) {
-    std::erase_if(*tags, [&](const SeenTag& tag) { return !inside(tag, levels); });
+    std::erase_if(*tags, [&](const TagDetection& tag) { return !is_inside(tag, levels); });
   }
   std::sort(seen.tags.begin(), seen.tags.end(),
-            [](const SeenTag& a, const SeenTag& b) { return a.id < b.id; });
+            [](const TagDetection& a, const TagDetection& b) { return a.id < b.id; });
   for (const auto& [id, same] : found) {
     const bool used = std::any_of(seen.tags.begin(), seen.tags.end(),
-                                  [id = id](const SeenTag& tag) { return tag.id == id; });
+                                  [id = id](const TagDetection& tag) { return tag.id == id; });
     if (used) continue;
     ++seen.unusable;
     seen.overexposed += overexposed(same.front(), levels) ? 1 : 0;

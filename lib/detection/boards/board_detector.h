@@ -16,21 +16,21 @@
 namespace vlp {
 
 class TagFinder;
-class TagPrint;
+class TagGeometry;
 class TouchingTags;
 class SquareCorners;
 struct GreyLevels;
 
 /// Curvature of a tag's edge between its corners, measured from the pixels next to it. The outward
 /// distance of the edge from the straight line between the corners is
-///   square_px (w^2 - 1) + cube_px (w^3 - w),     w = -1 at its first corner, 1 at its second.
+///   quadratic_px (w^2 - 1) + cubic_px (w^3 - w),     w = -1 at its first corner, 1 at its second.
 /// The curvature is fitted together with the corners to pixels from w = -reach to reach. It is
 /// unknown if reach is 0.
-struct EdgeBow {
-  double square_px = 0, cube_px = 0, reach = 0;
+struct EdgeCurvature {
+  double quadratic_px = 0, cubic_px = 0, reach = 0;
 
-  double at(double w) const { return (w * w - 1) * (square_px + cube_px * w); }
-  bool operator==(const EdgeBow&) const = default;
+  double at(double w) const { return (w * w - 1) * (quadratic_px + cubic_px * w); }
+  bool operator==(const EdgeCurvature&) const = default;
 };
 
 /// Step of the light across an edge of a tag: blur, and light on the dark and the bright side in
@@ -47,22 +47,22 @@ struct EdgeStep {
 };
 
 /// Detection of a tag in an image.
-struct SeenTag {
+struct TagDetection {
   /// Corners in the order of BoardTag::corners_m: bottom left, bottom right, top right, top left of
   /// the black border.
   using Corners = std::array<Eigen::Vector2d, 4>;
   /// Curvatures of the edges from corner k to k + 1.
-  using Bows = std::array<EdgeBow, 4>;
+  using Curvatures = std::array<EdgeCurvature, 4>;
   /// Standard deviation of each corner in px, averaged over all directions, from the noise of the
   /// pixels that its edges are fitted to. The curvatures of the edges count as known. 0 if unknown.
-  using Deviations = std::array<double, 4>;
+  using CornerSds = std::array<double, 4>;
   /// Steps across the edges from corner k to k + 1, each from a fit of this edge alone.
   using Steps = std::array<EdgeStep, 4>;
   /// Corners and edges of a tag for one tone curve.
   struct Outline {
     Corners corners_px;
-    Bows bows = {};
-    Deviations sds_px = {};
+    Curvatures curvatures = {};
+    CornerSds corner_sds_px = {};
     Steps steps = {};
 
     bool operator==(const Outline&) const = default;
@@ -70,19 +70,19 @@ struct SeenTag {
 
   int id;
   Corners corners_px;
-  Bows bows = {};
-  Deviations sds_px = {};
-  /// Fits for the tone curves of kGammas above 1, one each, until take_curve() applies a curve.
-  /// Empty for an image that certainly has no tone curve.
-  std::vector<Outline> behind_curves = {};
+  Curvatures curvatures = {};
+  CornerSds corner_sds_px = {};
+  /// Fits for the tone curves of kGammas above 1, one each, until apply_tone_curve() applies a
+  /// curve. Empty for an image that certainly has no tone curve.
+  std::vector<Outline> tone_curve_fits = {};
   Steps steps = {};
 };
 
 /// Detection of a point of a board's lattice: a corner where squares touch.
-struct SeenPoint {
+struct PointDetection {
   /// Index of the point on the board. Boards of squares: row by row from the top left, as OpenCV
   /// counts the corners of a ChArUco board. Boards of AprilTags, whose points come from a file: as
-  /// BoardLattice::index_of().
+  /// BoardLattice::point_index().
   std::size_t index;
   Eigen::Vector2d pixel;
   /// Factor of its residual.
@@ -90,12 +90,12 @@ struct SeenPoint {
 };
 
 /// Detection of a board in an image.
-struct SeenBoard {
+struct BoardDetection {
   /// Tags of the board, sorted by id, each once. For a ChArUco board its markers, accurate to 1 px.
-  std::vector<SeenTag> tags;
+  std::vector<TagDetection> tags;
   /// Tags of the family that the board does not have, in the order of detection. Corners are
   /// accurate to 1 to 2 px.
-  std::vector<SeenTag> foreign = {};
+  std::vector<TagDetection> foreign = {};
   /// Number of rejected tags of the board: detected twice, or with a corner that cannot be measured
   /// to a fraction of a pixel (at the image border, occluded, blurred, overexposed).
   int unusable = 0;
@@ -103,10 +103,10 @@ struct SeenBoard {
   /// bounding box.
   int overexposed = 0;
   /// Points sorted by index, of boards of squares and from files of corners without tags.
-  std::vector<SeenPoint> points = {};
+  std::vector<PointDetection> points = {};
   /// Negative log-likelihood of the edges of tags for the tone curves of kGammas, up to a constant.
   /// Only the first two if the image certainly has no tone curve. Empty if no edges are fitted, or
-  /// after take_curve().
+  /// after apply_tone_curve().
   std::vector<double> curve_costs = {};
 
   /// Returns true if there are corners for a calibration.
@@ -115,11 +115,11 @@ struct SeenBoard {
 
 /// Returns the corners that a calibration uses: the points, or else the corners of the tags. Their
 /// indices ascend and are the same in every view.
-std::vector<SeenPoint> corners_of(const SeenBoard& seen);
+std::vector<PointDetection> collect_corners(const BoardDetection& seen);
 
 /// Converts an image to grey levels of 8 bits. 16-bit images are scaled so that their brightest
 /// pixel has level 255.
-cv::Mat1b eight_bits(const cv::Mat& image);
+cv::Mat1b convert_to_8_bits(const cv::Mat& image);
 
 /// Creates the decoding table of a tag family, which every detection of its tags needs (20 ms for
 /// tag36h11). A process that calls it before it forks shares the table with its children.
@@ -130,12 +130,12 @@ void prepare_tag_family(const std::string& name);
 /// between threads.
 ///
 /// AprilTags without corner squares are detected by libapriltag. The gap between tags has to be
-/// white. Corners are the intersections of the tag's edges (find_exact_edges()), or libapriltag's
+/// white. Corners are the intersections of the tag's edges (refine_tag_edges()), or libapriltag's
 /// if their fit fails.
 ///
 /// AprilTags with corner squares, which touch each other, are detected by OpenCV's ArUco module.
 /// Missing tags are then predicted from their neighbors. Corners are the intersections of the
-/// squares' edges (edge_crossing()).
+/// squares' edges (fit_edge_crossing()).
 class BoardDetector {
  public:
   /// @throws std::invalid_argument if the detector for the board does not have its family or
@@ -146,13 +146,13 @@ class BoardDetector {
   BoardDetector& operator=(const BoardDetector&) = delete;
 
   /// Detects the board in an image of 8 or 16 bits. The result depends on the image only.
-  SeenBoard detect(const cv::Mat& image) const;
+  BoardDetection detect(const cv::Mat& image) const;
 
  private:
   /// Returns the tag with refined corners; std::nullopt if they cannot be measured.
-  std::optional<SeenTag> exact(const SeenTag& tag, const GreyLevels& image) const;
+  std::optional<TagDetection> exact(const TagDetection& tag, const GreyLevels& image) const;
 
-  SeenBoard seen_squares(const cv::Mat1b& levels) const;
+  BoardDetection detect_squares(const cv::Mat1b& levels) const;
 
   /// Tag detector; nullptr for chessboards.
   std::unique_ptr<TagFinder> finder_;
@@ -160,7 +160,7 @@ class BoardDetector {
   /// Boards of squares only.
   std::unique_ptr<SquareCorners> squares_;
   /// Boards of AprilTags without corner squares only.
-  std::unique_ptr<TagPrint> print_;
+  std::unique_ptr<TagGeometry> print_;
   /// Boards of AprilTags with corner squares only.
   std::unique_ptr<TouchingTags> touching_;
 };

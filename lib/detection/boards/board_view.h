@@ -14,7 +14,7 @@ struct BoardView {
   /// File name of the image, without its folder.
   std::string image;
   std::array<int, 2> imager_px;
-  SeenBoard seen;
+  BoardDetection seen;
 };
 
 }  // namespace vlp

@@ -25,28 +25,28 @@ namespace {
 struct ImageCorners {
   struct Corner {
     Eigen::Vector2d pixel;
-    EdgeBow bow;
+    EdgeCurvature bow;
     double sd_px;
   };
 
   std::string image;
   std::vector<int> tags;
-  std::map<int, std::array<std::optional<Corner>, 4>> of_tag;
-  std::vector<SeenPoint> points;
+  std::map<int, std::array<std::optional<Corner>, 4>> corners_by_tag;
+  std::vector<PointDetection> points;
 };
 
-SeenBoard seen_board(ImageCorners corners, const std::set<int>& ids) {
-  SeenBoard seen;
+BoardDetection make_board_detection(ImageCorners corners, const std::set<int>& ids) {
+  BoardDetection seen;
   for (const int id : corners.tags) {
-    SeenTag tag{id, {}};
+    TagDetection tag{id, {}};
     bool whole = true;
     for (std::size_t k = 0; k < 4; ++k) {
-      const auto& corner = corners.of_tag[id][k];
+      const auto& corner = corners.corners_by_tag[id][k];
       whole = whole && corner;
       if (!corner) continue;
       tag.corners_px[k] = corner->pixel;
-      tag.bows[k] = corner->bow;
-      tag.sds_px[k] = corner->sd_px;
+      tag.curvatures[k] = corner->bow;
+      tag.corner_sds_px[k] = corner->sd_px;
     }
     if (!whole) {
       seen.unusable += ids.contains(id) ? 1 : 0;
@@ -55,23 +55,23 @@ SeenBoard seen_board(ImageCorners corners, const std::set<int>& ids) {
     (ids.contains(id) ? seen.tags : seen.foreign).push_back(tag);
   }
   std::sort(seen.tags.begin(), seen.tags.end(),
-            [](const SeenTag& a, const SeenTag& b) { return a.id < b.id; });
+            [](const TagDetection& a, const TagDetection& b) { return a.id < b.id; });
   seen.points = std::move(corners.points);
   std::sort(seen.points.begin(), seen.points.end(),
-            [](const SeenPoint& a, const SeenPoint& b) { return a.index < b.index; });
+            [](const PointDetection& a, const PointDetection& b) { return a.index < b.index; });
   return seen;
 }
 
 constexpr std::array kBowColumns{"bow_square_px", "bow_cube_px", "bow_reach"};
 
 /// Reads the curvature of an edge; unknown if the table does not have the columns.
-EdgeBow bow_of(const CsvTable& csv, std::size_t row) {
-  constexpr double least_reach = 0.01, most_reach = 2;
+EdgeCurvature read_curvature(const CsvTable& csv, std::size_t row) {
+  constexpr double min_reach = 0.01, max_reach = 2;
   if (std::ranges::none_of(kBowColumns, [&](auto name) { return csv.optional(name).has_value(); }))
     return {};
   const auto reach_at = csv.required(kBowColumns[2]);
   const double reach = csv.number(row, reach_at);
-  if (reach != 0 && !(reach >= least_reach && reach <= most_reach)) {
+  if (reach != 0 && !(reach >= min_reach && reach <= max_reach)) {
     throw csv.error(row, reach_at,
                     "should be how far an edge's pixels reach, 0.01 to 2, or 0 of none");
   }
@@ -81,7 +81,7 @@ EdgeBow bow_of(const CsvTable& csv, std::size_t row) {
 
 constexpr const char* kDeviationColumn = "sd_px";
 
-double sd_px_of(const CsvTable& csv, std::size_t row) {
+double read_sd_px(const CsvTable& csv, std::size_t row) {
   const auto column = csv.optional(kDeviationColumn);
   if (!column) return 0;
   const double sd_px = csv.number(row, *column);
@@ -92,25 +92,25 @@ double sd_px_of(const CsvTable& csv, std::size_t row) {
 }
 
 /// Describes a row length that contradicts board.yaml; empty if the points lie in rows as expected.
-std::string wrong_rows(const Board& board, std::span<const ImageCorners> images) {
+std::string describe_wrong_rows(const Board& board, std::span<const ImageCorners> images) {
   const auto cols = static_cast<std::size_t>(board.cols - 1),
              rows = static_cast<std::size_t>(board.rows - 1);
   std::vector<LatticePixels> pixels;
   for (const ImageCorners& corners : images) {
     pixels.emplace_back(cols * rows);
-    for (const SeenPoint& point : corners.points) pixels.back()[point.index] = point.pixel;
+    for (const PointDetection& point : corners.points) pixels.back()[point.index] = point.pixel;
   }
-  const std::size_t shown = row_shown(pixels, cols);
-  if (shown == cols) return "";
+  const std::size_t row_length = estimate_row_length(pixels, cols);
+  if (row_length == cols) return "";
   return fmt::format(
       "the corners lie in rows of {}, but a board of {} x {} squares has {} x {} corners; {}",
-      shown, board.cols, board.rows, cols, rows,
-      shown == rows ? "swap cols and rows of board.yaml" : "is board.yaml that of the board?");
+      row_length, board.cols, board.rows, cols, rows,
+      row_length == rows ? "swap cols and rows of board.yaml" : "is board.yaml that of the board?");
 }
 
 }  // namespace
 
-std::string outside_words(const Eigen::Vector2d& pixel, const std::array<int, 2>& imager_px) {
+std::string describe_outside(const Eigen::Vector2d& pixel, const std::array<int, 2>& imager_px) {
   constexpr double edge = 0.5;  // half a pixel
   const auto [width, height] = imager_px;
   if (pixel.x() >= -edge && pixel.y() >= -edge && pixel.x() <= width - edge &&
@@ -166,7 +166,7 @@ class CornerTableReader {
     }
     const Eigen::Vector2d pixel(csv_.number(row, u_px_), csv_.number(row, v_px_));
     ++corners_;
-    if (const auto words = outside_words(pixel, imager_px_); !words.empty()) {
+    if (const auto words = describe_outside(pixel, imager_px_); !words.empty()) {
       if (outside_++ == 0) first_outside_ = csv_.error(row, u_px_, words);
     }
     const int corner = read_number(row);
@@ -193,16 +193,16 @@ class CornerTableReader {
     if (board_.has_squares()) {
       const auto index = static_cast<std::size_t>(corner);
       const bool is_known = std::ranges::any_of(
-          corners.points, [&](const SeenPoint& point) { return point.index == index; });
+          corners.points, [&](const PointDetection& point) { return point.index == index; });
       if (!is_known) corners.points.push_back({index, pixel});
       return !is_known;
     }
     const int id = csv_.integer(row, tag_id_);
-    const auto [tag, first] = corners.of_tag.try_emplace(id);
+    const auto [tag, first] = corners.corners_by_tag.try_emplace(id);
     if (first) corners.tags.push_back(id);
     auto& place = tag->second[static_cast<std::size_t>(corner)];
     if (place) return false;
-    place = {pixel, bow_of(csv_, row), sd_px_of(csv_, row)};
+    place = {pixel, read_curvature(csv_, row), read_sd_px(csv_, row)};
     return true;
   }
 
@@ -225,14 +225,15 @@ std::vector<BoardView> read_corner_table(const std::filesystem::path& file, cons
   if (images.empty()) throw InputError(file, "holds no corner");
   reader.check_outside();
   if (board.has_squares()) {
-    if (const auto words = wrong_rows(board, images); !words.empty()) throw InputError(file, words);
+    if (const auto words = describe_wrong_rows(board, images); !words.empty())
+      throw InputError(file, words);
   }
   std::set<int> ids;
-  for (const BoardTag& tag : board_layout(board)) ids.insert(tag.id);
+  for (const BoardTag& tag : compute_board_layout(board)) ids.insert(tag.id);
   std::vector<BoardView> views;
   for (ImageCorners& corners : images) {
     const std::string name = corners.image;
-    views.push_back({name, imager_px, seen_board(std::move(corners), ids)});
+    views.push_back({name, imager_px, make_board_detection(std::move(corners), ids)});
     if (!board.has_squares()) continue;
     order_lattice(views.back().seen.points, board.cols - 1, board.rows - 1,
                   board.kind == BoardKind::chessboard);
@@ -252,26 +253,26 @@ void write_corner_table(const std::filesystem::path& file, std::span<const Board
   }
   CsvWriter csv(file, header);
   for (const BoardView& view : views) {
-    const SeenBoard& seen = view.seen;
+    const BoardDetection& seen = view.seen;
     if (squares ? seen.points.empty() : seen.tags.empty() && seen.foreign.empty()) {
       std::vector<std::string> empty(header.size());
       empty.front() = view.image;
       csv.row(empty);
     }
     if (squares) {
-      for (const SeenPoint& point : seen.points) {
+      for (const PointDetection& point : seen.points) {
         csv.row({view.image, std::to_string(point.index), shortest(point.pixel.x()),
                  shortest(point.pixel.y())});
       }
       continue;
     }
     for (const auto* each : {&seen.tags, &seen.foreign}) {
-      for (const SeenTag& tag : *each) {
+      for (const TagDetection& tag : *each) {
         for (std::size_t k = 0; k < 4; ++k) {
           csv.row({view.image, std::to_string(tag.id), std::to_string(k),
                    shortest(tag.corners_px[k].x()), shortest(tag.corners_px[k].y()),
-                   shortest(tag.bows[k].square_px), shortest(tag.bows[k].cube_px),
-                   shortest(tag.bows[k].reach), shortest(tag.sds_px[k])});
+                   shortest(tag.curvatures[k].quadratic_px), shortest(tag.curvatures[k].cubic_px),
+                   shortest(tag.curvatures[k].reach), shortest(tag.corner_sds_px[k])});
         }
       }
     }

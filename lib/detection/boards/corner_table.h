@@ -16,13 +16,14 @@ namespace vlp {
 ///
 /// Columns for boards of tags:
 ///   image, tag, corner, u_px, v_px         corner 0 to 3 as in BoardTag::corners_m
-///   bow_square_px, bow_cube_px, bow_reach  optional: EdgeBow from this corner to the next
-///   sd_px                                  optional: SeenTag::Deviations
+///   bow_square_px, bow_cube_px, bow_reach  optional: EdgeCurvature from this corner to the next
+///   sd_px                                  optional: TagDetection::Deviations
 /// Columns for boards of squares:
-///   image, corner, u_px, v_px              corner as in SeenPoint::index; rows may also be counted
+///   image, corner, u_px, v_px              corner as in PointDetection::index; rows may also be
+///   counted
 ///                                          upwards (order_lattice())
 /// An image without corners has one row with its name only. Tags without all four corners are
-/// rejected. Tags that the board does not have are SeenBoard::foreign.
+/// rejected. Tags that the board does not have are BoardDetection::foreign.
 ///
 /// @throws InputError with file and line, also for a repeated corner, and if too_many_outside()
 ///         the image
@@ -35,7 +36,7 @@ void write_corner_table(const std::filesystem::path& file, std::span<const Board
                         const Board& board);
 
 /// Describes that a corner is outside the image; empty if it is inside.
-std::string outside_words(const Eigen::Vector2d& pixel, const std::array<int, 2>& imager_px);
+std::string describe_outside(const Eigen::Vector2d& pixel, const std::array<int, 2>& imager_px);
 
 /// Returns true if more than 2 % of the corners are outside the image. Fewer may be outliers; more
 /// indicate an image of another size.

@@ -14,7 +14,7 @@ namespace vlp {
 namespace {
 
 struct CrossingPixel {
-  Eigen::Vector2d from_guess;
+  Eigen::Vector2d offset;
   double grey;
 };
 
@@ -37,17 +37,17 @@ struct Crossing {
     const Blur blur(p[4]);
     const auto rows = static_cast<Eigen::Index>(pixels.size());
     for (Eigen::Index i = 0; i < rows; ++i) {
-      const auto& [from_guess, grey] = pixels[static_cast<std::size_t>(i)];
-      const Eigen::Vector2d at = from_guess - corner;
+      const auto& [offset, grey] = pixels[static_cast<std::size_t>(i)];
+      const Eigen::Vector2d at = offset - corner;
       const double u1 = along1.dot(at), u2 = along2.dot(at);
       const double v1 = normal1.dot(at), v2 = normal2.dot(at);
-      const BlurredStep one(v1 - p[9] * u1 * u1, blur), two(v2 - p[10] * u2 * u2, blur);
-      const double lit = 1 + light.dot(at), pattern = one.value * two.value;
+      const BlurredStep step1(v1 - p[9] * u1 * u1, blur), step2(v2 - p[10] * u2 * u2, blur);
+      const double lit = 1 + light.dot(at), pattern = step1.value * step2.value;
       const double unlit = p[5] + p[6] * pattern;
       residuals[i] = unlit * lit - grey;
       if (jacobian == nullptr) continue;
-      const double by_one = lit * p[6] * one.slope * two.value;
-      const double by_two = lit * p[6] * one.value * two.slope;
+      const double by_one = lit * p[6] * step1.slope * step2.value;
+      const double by_two = lit * p[6] * step1.value * step2.slope;
       const Eigen::Vector2d by_corner = by_one * (2 * p[9] * u1 * along1 - normal1) +
                                         by_two * (2 * p[10] * u2 * along2 - normal2) -
                                         unlit * light;
@@ -55,33 +55,33 @@ struct Crossing {
                                                                             NUM_PARAMETERS);
       all.row(i) << by_corner.transpose(), -by_one * u1 * (1 + 2 * p[9] * v1),
           -by_two * u2 * (1 + 2 * p[10] * v2),
-          lit * p[6] * (one.by_blur * two.value + one.value * two.by_blur), lit, lit * pattern,
-          unlit * at.transpose(), -by_one * u1 * u1, -by_two * u2 * u2;
+          lit * p[6] * (step1.d_value_d_blur * step2.value + step1.value * step2.d_value_d_blur),
+          lit, lit * pattern, unlit * at.transpose(), -by_one * u1 * u1, -by_two * u2 * u2;
     }
     return true;
   }
 };
 
-std::vector<CrossingPixel> pixels_around(const cv::Mat1b& image, const Eigen::Vector2d& guess_px,
-                                         double radius_px) {
-  const Eigen::Vector2i low = (guess_px.array() - radius_px).ceil().cast<int>().max(0);
-  const Eigen::Vector2i high = (guess_px.array() + radius_px)
-                                   .floor()
-                                   .cast<int>()
-                                   .min(Eigen::Array2i(image.cols - 1, image.rows - 1));
+std::vector<CrossingPixel> collect_pixels(const cv::Mat1b& image, const Eigen::Vector2d& guess_px,
+                                          double radius_px) {
+  const Eigen::Vector2i roi_min = (guess_px.array() - radius_px).ceil().cast<int>().max(0);
+  const Eigen::Vector2i roi_max = (guess_px.array() + radius_px)
+                                      .floor()
+                                      .cast<int>()
+                                      .min(Eigen::Array2i(image.cols - 1, image.rows - 1));
   std::vector<CrossingPixel> pixels;
-  for (int row = low.y(); row <= high.y(); ++row) {
-    for (int column = low.x(); column <= high.x(); ++column) {
-      const Eigen::Vector2d from_guess = Eigen::Vector2d(column, row) - guess_px;
-      if (from_guess.norm() > radius_px) continue;
-      pixels.push_back({from_guess, static_cast<double>(image(row, column))});
+  for (int row = roi_min.y(); row <= roi_max.y(); ++row) {
+    for (int column = roi_min.x(); column <= roi_max.x(); ++column) {
+      const Eigen::Vector2d offset = Eigen::Vector2d(column, row) - guess_px;
+      if (offset.norm() > radius_px) continue;
+      pixels.push_back({offset, static_cast<double>(image(row, column))});
     }
   }
   return pixels;
 }
 
 /// Computes the initial middle and contrast for the other parameters by linear regression.
-void start_levels(const std::vector<CrossingPixel>& pixels, Crossing::Parameters& p) {
+void initialize_levels(const std::vector<CrossingPixel>& pixels, Crossing::Parameters& p) {
   p[5] = 0;
   p[6] = 1;
   const Crossing crossing{pixels};
@@ -96,33 +96,33 @@ void start_levels(const std::vector<CrossingPixel>& pixels, Crossing::Parameters
 
 }  // namespace
 
-std::optional<Eigen::Vector2d> edge_crossing(const cv::Mat1b& image,
-                                             const Eigen::Vector2d& guess_px,
-                                             const std::array<Eigen::Vector2d, 2>& along,
-                                             double radius_px) {
-  constexpr std::size_t least_pixels = 16;
-  constexpr int most_steps = 15;
-  constexpr double usual_blur_px = 0.8, least_blur_px = 0.05, most_moved_px = 1.5;
-  constexpr double enough = 1e-3;  // grey levels squared
-  constexpr double least_contrast = 3, unlike = 0.35;
-  const auto pixels = pixels_around(image, guess_px, radius_px);
-  if (pixels.size() < least_pixels) return {};
+std::optional<Eigen::Vector2d> fit_edge_crossing(const cv::Mat1b& image,
+                                                 const Eigen::Vector2d& guess_px,
+                                                 const std::array<Eigen::Vector2d, 2>& along,
+                                                 double radius_px) {
+  constexpr std::size_t min_pixels = 16;
+  constexpr int max_iterations = 15;
+  constexpr double initial_blur_px = 0.8, min_blur_px = 0.05, max_displacement_px = 1.5;
+  constexpr double function_tolerance = 1e-3;  // grey levels squared
+  constexpr double min_contrast = 3, max_relative_rms = 0.35;
+  const auto pixels = collect_pixels(image, guess_px, radius_px);
+  if (pixels.size() < min_pixels) return {};
   Crossing::Parameters p = Crossing::Parameters::Zero();
   p[2] = std::atan2(along[0].y(), along[0].x());
   p[3] = std::atan2(along[1].y(), along[1].x());
-  p[4] = usual_blur_px;
-  start_levels(pixels, p);
+  p[4] = initial_blur_px;
+  initialize_levels(pixels, p);
 
   const Crossing crossing{pixels};
   ceres::TinySolver<Crossing> solver;
-  solver.options.max_num_iterations = most_steps;
-  solver.options.function_tolerance = enough;
+  solver.options.max_num_iterations = max_iterations;
+  solver.options.function_tolerance = function_tolerance;
   solver.Solve(crossing, &p);
   const double rms = std::sqrt(2 * solver.summary.final_cost / static_cast<double>(pixels.size()));
-  const bool good = p.allFinite() && p.head<2>().norm() < most_moved_px && p[4] > least_blur_px &&
-                    p[4] < radius_px && std::abs(p[6]) > least_contrast &&
-                    rms < unlike * std::abs(p[6]);
-  if (!good) return {};
+  const bool is_accepted = p.allFinite() && p.head<2>().norm() < max_displacement_px &&
+                           p[4] > min_blur_px && p[4] < radius_px &&
+                           std::abs(p[6]) > min_contrast && rms < max_relative_rms * std::abs(p[6]);
+  if (!is_accepted) return {};
   return guess_px + p.head<2>();
 }
 

@@ -23,10 +23,11 @@ namespace vlp {
 ///   d1, d2  distances from two parabolas through the corner, because the lens bends the edges
 ///   step    blurred step, with the same blur for both edges
 ///   light   gradient of the illumination (vignetting), which would bias a fit without it
-/// On rendered boards the corner is accurate to 0.01 px, a sixth of the error of saddle_point().
-std::optional<Eigen::Vector2d> edge_crossing(const cv::Mat1b& image,
-                                             const Eigen::Vector2d& guess_px,
-                                             const std::array<Eigen::Vector2d, 2>& along,
-                                             double radius_px);
+/// On rendered boards the corner is accurate to 0.01 px, a sixth of the error of
+/// find_saddle_point().
+std::optional<Eigen::Vector2d> fit_edge_crossing(const cv::Mat1b& image,
+                                                 const Eigen::Vector2d& guess_px,
+                                                 const std::array<Eigen::Vector2d, 2>& along,
+                                                 double radius_px);
 
 }  // namespace vlp

@@ -12,40 +12,42 @@
 
 namespace vlp {
 
-EdgeField::EdgeField(std::span<const EdgeFigure> figures, Terms terms) {
-  constexpr std::size_t enough = 32;  // four edges of eight tags
-  constexpr int rounds = 6;
-  constexpr double median_of_normal = 0.6745, far = 3, least_apart = 0.01;
-  terms_ = figures.size() < enough ? 1 : terms == Terms::place ? 6 : kMostTerms;
-  const auto count = static_cast<double>(figures.size());
-  for (const EdgeFigure& figure : figures) middle_px_ += figure.at_px / count;
-  for (const EdgeFigure& figure : figures) {
-    reach_px_ = std::max(reach_px_, (figure.at_px - middle_px_).lpNorm<Eigen::Infinity>());
+EdgeField::EdgeField(std::span<const EdgeSample> samples, Terms terms) {
+  constexpr std::size_t min_samples = 32;  // four edges of eight tags
+  constexpr int max_iterations = 6;
+  constexpr double median_of_normal = 0.6745, huber_threshold = 3, min_excess_sd = 0.01;
+  terms_ = samples.size() < min_samples ? 1 : terms == Terms::place ? 6 : kMaxTerms;
+  const auto count = static_cast<double>(samples.size());
+  for (const EdgeSample& sample : samples) middle_px_ += sample.at_px / count;
+  for (const EdgeSample& sample : samples) {
+    reach_px_ = std::max(reach_px_, (sample.at_px - middle_px_).lpNorm<Eigen::Infinity>());
   }
   std::vector<double> logs;
-  for (const EdgeFigure& figure : figures) logs.push_back(std::log(figure.value));
+  for (const EdgeSample& sample : samples) logs.push_back(std::log(sample.value));
   coefficients_[0] = upper_median(logs);
-  for (int round = 0; round < rounds; ++round) {
-    std::vector<double> off, sizes, variances;
-    for (std::size_t i = 0; i < figures.size(); ++i) {
-      off.push_back(logs[i] - row(figures[i].at_px, figures[i].along).dot(coefficients_));
-      sizes.push_back(std::abs(off.back()));
-      variances.push_back(figures[i].sd * figures[i].sd);
+  for (int iteration = 0; iteration < max_iterations; ++iteration) {
+    std::vector<double> residuals, magnitudes, variances;
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      residuals.push_back(logs[i] - row(samples[i].at_px, samples[i].along).dot(coefficients_));
+      magnitudes.push_back(std::abs(residuals.back()));
+      variances.push_back(samples[i].sd * samples[i].sd);
     }
-    const double spread = upper_median(std::move(sizes)) / median_of_normal;
-    const double own = upper_median(variances);
-    apart_ = std::sqrt(std::max(spread * spread - own, least_apart * least_apart));
-    if (round + 1 == rounds) break;
+    const double residual_sd = upper_median(std::move(magnitudes)) / median_of_normal;
+    const double median_variance = upper_median(variances);
+    excess_sd_ = std::sqrt(
+        std::max(residual_sd * residual_sd - median_variance, min_excess_sd * min_excess_sd));
+    if (iteration + 1 == max_iterations) break;
     Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(terms_, terms_);
     Eigen::VectorXd right = Eigen::VectorXd::Zero(terms_);
-    for (std::size_t i = 0; i < figures.size(); ++i) {
-      const double variance = variances[i] + apart_ * apart_;
-      const double sigmas = std::abs(off[i]) / std::sqrt(variance);
-      const double weight = std::min(1.0, far / std::max(sigmas, far)) / variance;
-      const Eigen::VectorXd terms_of =
-          row(figures[i].at_px, figures[i].along).head(terms_).transpose();
-      normal.noalias() += weight * terms_of * terms_of.transpose();
-      right += weight * off[i] * terms_of;
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      const double variance = variances[i] + excess_sd_ * excess_sd_;
+      const double sigmas = std::abs(residuals[i]) / std::sqrt(variance);
+      const double weight =
+          std::min(1.0, huber_threshold / std::max(sigmas, huber_threshold)) / variance;
+      const Eigen::VectorXd terms_row =
+          row(samples[i].at_px, samples[i].along).head(terms_).transpose();
+      normal.noalias() += weight * terms_row * terms_row.transpose();
+      right += weight * residuals[i] * terms_row;
     }
     normal.diagonal().array() *= 1 + 1e-9;
     const Eigen::VectorXd step = solve_symmetric(normal, right);
@@ -60,7 +62,7 @@ EdgeField::Row EdgeField::row(const Eigen::Vector2d& at_px, const Eigen::Vector2
   Row row;
   row << 1, x.x(), x.y(), x.x() * x.x(), x.x() * x.y(), x.y() * x.y(), square,
       2 * along.x() * along.y();
-  row.tail(kMostTerms - terms_).setZero();
+  row.tail(kMaxTerms - terms_).setZero();
   return row;
 }
 

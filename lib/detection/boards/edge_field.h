@@ -8,7 +8,7 @@
 namespace vlp {
 
 /// Positive property of an edge in an image (blur or light), from a fit of this edge alone.
-struct EdgeFigure {
+struct EdgeSample {
   Eigen::Vector2d at_px;
   /// Direction of the edge, of unit length.
   Eigen::Vector2d along;
@@ -28,23 +28,23 @@ class EdgeField {
 
   /// Fits the model; only a constant for fewer than 32 samples.
   /// @pre There is at least one sample.
-  EdgeField(std::span<const EdgeFigure> figures, Terms terms);
+  EdgeField(std::span<const EdgeSample> samples, Terms terms);
 
   double value(const Eigen::Vector2d& at_px, const Eigen::Vector2d& along) const;
   /// Relative standard deviation of the edges from the model that exceeds their own standard
   /// deviations.
-  double apart() const { return apart_; }
+  double excess_sd() const { return excess_sd_; }
 
  private:
-  static constexpr Eigen::Index kMostTerms = 8;
-  using Row = Eigen::Matrix<double, 1, kMostTerms>;
+  static constexpr Eigen::Index kMaxTerms = 8;
+  using Row = Eigen::Matrix<double, 1, kMaxTerms>;
   Row row(const Eigen::Vector2d& at_px, const Eigen::Vector2d& along) const;
 
   Eigen::Vector2d middle_px_{0, 0};
   double reach_px_ = 1;
   Eigen::Index terms_;
-  Eigen::Matrix<double, kMostTerms, 1> coefficients_ = Eigen::Matrix<double, kMostTerms, 1>::Zero();
-  double apart_ = 0;
+  Eigen::Matrix<double, kMaxTerms, 1> coefficients_ = Eigen::Matrix<double, kMaxTerms, 1>::Zero();
+  double excess_sd_ = 0;
 };
 
 }  // namespace vlp

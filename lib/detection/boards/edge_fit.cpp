@@ -19,19 +19,19 @@ namespace {
 constexpr double kWhite = 255;
 
 /// Grey level of a light after a tone curve, and its derivative with respect to the light.
-struct Coded {
-  Coded(double light, double gamma) : level(light), slope(1) {
+struct EncodedLevel {
+  EncodedLevel(double light, double gamma) : level(light), slope(1) {
     if (gamma == 1) return;
-    constexpr double least = 1e-3;  // the curve is vertical at 0
-    const double some = std::max(light, least);
-    level = kWhite * std::pow(some / kWhite, 1 / gamma);
-    slope = level / (gamma * some);
+    constexpr double min_light = 1e-3;  // the curve is vertical at 0
+    const double clamped_light = std::max(light, min_light);
+    level = kWhite * std::pow(clamped_light / kWhite, 1 / gamma);
+    slope = level / (gamma * clamped_light);
   }
 
   double level, slope;
 };
 
-double light_behind(double level, double gamma) {
+double linearize(double level, double gamma) {
   return gamma == 1 ? level : kWhite * std::pow(level / kWhite, gamma);
 }
 
@@ -46,13 +46,13 @@ class Edge {
   using Parameters = Eigen::Matrix<double, NUM_PARAMETERS, 1>;
   using Jacobian = Eigen::Matrix<double, Eigen::Dynamic, NUM_PARAMETERS>;
 
-  /// Levels above most_told are censored.
-  Edge(const std::vector<EdgePixel>& pixels, const EdgePrior& prior, double most_told)
+  /// Levels above max_level are censored.
+  Edge(const std::vector<EdgePixel>& pixels, const EdgePrior& prior, double max_level)
       : pixels_(pixels),
         prior_(prior),
-        most_told_(most_told),
+        max_level_(max_level),
         residuals_(rows()),
-        by_kurtosis_(Eigen::VectorXd::Zero(rows())),
+        d_residuals_d_kurtosis_(Eigen::VectorXd::Zero(rows())),
         jacobian_(rows(), +NUM_PARAMETERS) {}
 
   int NumResiduals() const { return static_cast<int>(rows()); }
@@ -91,22 +91,23 @@ class Edge {
     Square normal = Square::Zero();
     Vector right = Vector::Zero();
     normal.template topLeftCorner<count - 1, count - 1>() = jacobian_.transpose() * jacobian_;
-    normal.template topRightCorner<count - 1, 1>() = jacobian_.transpose() * by_kurtosis_;
+    normal.template topRightCorner<count - 1, 1>() =
+        jacobian_.transpose() * d_residuals_d_kurtosis_;
     normal.template bottomLeftCorner<1, count - 1>() =
         normal.template topRightCorner<count - 1, 1>().transpose();
     const double variance =
         std::max(residuals_.squaredNorm() / static_cast<double>(rows()), min_noise * min_noise);
     normal(count - 1, count - 1) =
-        by_kurtosis_.squaredNorm() + variance / (kurtosis_sd * kurtosis_sd);
+        d_residuals_d_kurtosis_.squaredNorm() + variance / (kurtosis_sd * kurtosis_sd);
     right.template head<count - 1>() = -jacobian_.transpose() * residuals_;
-    right[count - 1] = -by_kurtosis_.dot(residuals_);
+    right[count - 1] = -d_residuals_d_kurtosis_.dot(residuals_);
     Vector change = normal.ldlt().solve(right);
     const double kurtosis = std::clamp(change[count - 1], min_kurtosis, max_kurtosis);
     if (kurtosis != change[count - 1]) {
       const auto head = normal.template topLeftCorner<count - 1, count - 1>();
-      const auto by_kurtosis = normal.template topRightCorner<count - 1, 1>();
+      const auto d_value_d_kurtosis = normal.template topRightCorner<count - 1, 1>();
       change.template head<count - 1>() =
-          head.ldlt().solve(right.template head<count - 1>() - kurtosis * by_kurtosis);
+          head.ldlt().solve(right.template head<count - 1>() - kurtosis * d_value_d_kurtosis);
     }
     const double blur = p[0] + change[0];
     if (!(std::abs(change[0]) <= max_change * p[0])) return p[0];
@@ -139,26 +140,26 @@ class Edge {
     const Blur blur(p[0]);
     for (Eigen::Index i = 0; i + kPriors < rows(); ++i) {
       const auto& [w, v, level, stripe_px, white] = pixels_[static_cast<std::size_t>(i)];
-      double off = p[4 + terms];
-      for (int k = terms - 2; k >= 0; --k) off = p[5 + k] + w * off;
-      const double from_edge_px = v - off;
+      double offset_px = p[4 + terms];
+      for (int k = terms - 2; k >= 0; --k) offset_px = p[5 + k] + w * offset_px;
+      const double from_edge_px = v - offset_px;
       BlurredStep step(from_edge_px, blur);
       if (white > 0) {
         const BlurredStep behind(-from_edge_px - stripe_px, blur);
         step.value += white * (1 + behind.value);
         step.slope -= white * behind.slope;
-        step.by_blur += white * behind.by_blur;
-        step.by_kurtosis += white * behind.by_kurtosis;
+        step.d_value_d_blur += white * behind.d_value_d_blur;
+        step.d_value_d_kurtosis += white * behind.d_value_d_kurtosis;
       }
       const double lit = 1 + p[3] * w + p[4] * v, unlit = p[1] + p[2] * step.value;
-      const Coded coded(unlit * lit, prior_.gamma);
-      residuals_[i] = std::min(coded.level, most_told_) - std::min(level, most_told_);
-      const double told = coded.level < most_told_ ? coded.slope : 0;
-      const double bright = lit * told, plain = unlit * told;
+      const EncodedLevel encoded(unlit * lit, prior_.gamma);
+      residuals_[i] = std::min(encoded.level, max_level_) - std::min(level, max_level_);
+      const double effective_slope = encoded.level < max_level_ ? encoded.slope : 0;
+      const double bright = lit * effective_slope, plain = unlit * effective_slope;
       auto row = jacobian_.row(i);
-      row.template head<5>() << bright * p[2] * step.by_blur, bright, bright * step.value,
+      row.template head<5>() << bright * p[2] * step.d_value_d_blur, bright, bright * step.value,
           plain * w, plain * v;
-      by_kurtosis_[i] = bright * p[2] * step.by_kurtosis;
+      d_residuals_d_kurtosis_[i] = bright * p[2] * step.d_value_d_kurtosis;
       double by_term = -bright * p[2] * step.slope;
       for (int k = 0; k < terms; ++k, by_term *= w) row[5 + k] = by_term;
     }
@@ -174,67 +175,68 @@ class Edge {
 
   const std::vector<EdgePixel>& pixels_;
   EdgePrior prior_;
-  double most_told_;
+  double max_level_;
   mutable Parameters at_ = Parameters::Constant(std::numeric_limits<double>::quiet_NaN());
-  mutable Eigen::VectorXd residuals_, by_kurtosis_;
+  mutable Eigen::VectorXd residuals_, d_residuals_d_kurtosis_;
   mutable Jacobian jacobian_;
 };
 
 /// Mean light of the pixels on both sides of an edge, and fraction of white pixels on the brighter
 /// side.
-struct Sides {
-  Sides(const std::vector<EdgePixel>& pixels, const EdgeCurve& edge, double gamma) {
+struct EdgeSides {
+  EdgeSides(const std::vector<EdgePixel>& pixels, const EdgeCurve& edge, double gamma) {
     constexpr double white = 254;
     double ins = 0, outs = 0, whites_in = 0, whites_out = 0;
     for (const EdgePixel& pixel : pixels) {
       const bool inside = pixel.across_px < edge.value_at(pixel.along);
-      (inside ? in : out) += light_behind(pixel.level, gamma);
+      (inside ? in : out) += linearize(pixel.level, gamma);
       (inside ? ins : outs) += 1;
       if (pixel.level >= white) (inside ? whites_in : whites_out) += 1;
     }
     in /= std::max(ins, 1.0);
     out /= std::max(outs, 1.0);
-    white_share = out > in ? whites_out / std::max(outs, 1.0) : whites_in / std::max(ins, 1.0);
+    white_fraction = out > in ? whites_out / std::max(outs, 1.0) : whites_in / std::max(ins, 1.0);
   }
 
   double in = 0, out = 0;
-  double white_share;
+  double white_fraction;
 };
 
 template <int terms>
 std::optional<EdgeFit> fit(EdgeCurve& edge, const std::vector<EdgePixel>& pixels,
                            const EdgePrior& prior) {
-  constexpr double least_blur_px = 0.05, most_blur_px = 6;
-  constexpr double least_contrast = 3, unlike = 0.35;  // in levels
-  constexpr double enough_white = 0.25, told_then = 250;
+  constexpr double min_blur_px = 0.05, max_blur_px = 6;
+  constexpr double min_contrast = 3, max_relative_rms = 0.35;  // in levels
+  constexpr double min_white_fraction = 0.25, censoring_level = 250;
   using Step = Edge<terms>;
-  const Sides sides(pixels, edge, prior.gamma);
+  const EdgeSides sides(pixels, edge, prior.gamma);
   typename Step::Parameters p = Step::Parameters::Zero();
   p.template head<3>() << edge.blur_px, (sides.in + sides.out) / 2, (sides.out - sides.in) / 2;
   p.template tail<terms>() = edge.coefficients.head<terms>();
-  const bool runs_over = sides.white_share >= enough_white;
-  const double most_told = runs_over ? told_then : std::numeric_limits<double>::infinity();
-  const Step step(pixels, prior, most_told);
+  const bool is_saturated = sides.white_fraction >= min_white_fraction;
+  const double max_level = is_saturated ? censoring_level : std::numeric_limits<double>::infinity();
+  const Step step(pixels, prior, max_level);
   ceres::TinySolver<Step> solver;
   // Blur, contrast and position of a saturated step are strongly correlated: slow convergence.
-  solver.options.max_num_iterations = runs_over ? 60 : 15;
-  solver.options.function_tolerance = runs_over ? 1e-6 : 1e-3;  // levels squared
+  solver.options.max_num_iterations = is_saturated ? 60 : 15;
+  solver.options.function_tolerance = is_saturated ? 1e-6 : 1e-3;  // levels squared
   solver.Solve(step, &p);
   edge.coefficients.setZero();
   edge.coefficients.head<terms>() = p.template tail<terms>();
   edge.blur_px = p[0];
   const double outside = p[2] < 0 ? -1 : 1;
   const double squares = 2 * solver.summary.final_cost - step.squares_of_priors(p);
-  EdgeFit result{squares, pixels.size(), runs_over, p[1] + outside * p[2], p[1] - outside * p[2]};
+  EdgeFit result{squares, pixels.size(), is_saturated, p[1] + outside * p[2],
+                 p[1] - outside * p[2]};
   const double rms = std::sqrt(result.squares / static_cast<double>(pixels.size()));
-  const double bright = Coded(p[1] + p[2], prior.gamma).level;
-  const double contrast = std::abs(bright - Coded(p[1] - p[2], prior.gamma).level) / 2;
-  const bool good = p.allFinite() && p[0] > least_blur_px && p[0] < most_blur_px &&
-                    contrast > least_contrast && rms < unlike * contrast;
-  if (!good) return {};
+  const double bright = EncodedLevel(p[1] + p[2], prior.gamma).level;
+  const double contrast = std::abs(bright - EncodedLevel(p[1] - p[2], prior.gamma).level) / 2;
+  const bool is_accepted = p.allFinite() && p[0] > min_blur_px && p[0] < max_blur_px &&
+                           contrast > min_contrast && rms < max_relative_rms * contrast;
+  if (!is_accepted) return {};
   result.end_variance = step.end_variance(p);
   result.equivalent_blur_px = step.equivalent_blur(p);
-  if (runs_over || prior.gamma != 1) {
+  if (is_saturated || prior.gamma != 1) {
     typename Step::Parameters brighter = Step::Parameters::Zero();
     brighter.template segment<2>(1) << 1, outside;
     result.blur_variance = step.variance(p, Step::Parameters::Unit(0));
@@ -252,21 +254,21 @@ Eigen::Vector2d EdgeCurve::gradient(const Eigen::Vector2d& x) const {
   return across - slope / half_px * along;
 }
 
-Eigen::Vector2d crossing(const EdgeCurve& a, const EdgeCurve& b, Eigen::Vector2d point) {
+Eigen::Vector2d find_intersection(const EdgeCurve& a, const EdgeCurve& b, Eigen::Vector2d point) {
   constexpr int steps = 4;
   for (int i = 0; i < steps; ++i) {
     Eigen::Matrix2d gradients;
     gradients << a.gradient(point).transpose(), b.gradient(point).transpose();
-    point -= gradients.inverse() * Eigen::Vector2d(a.off(point), b.off(point));
+    point -= gradients.inverse() * Eigen::Vector2d(a.offset_px(point), b.offset_px(point));
   }
   return point;
 }
 
 std::optional<EdgeFit> fit_edge(EdgeCurve& edge, const std::vector<EdgePixel>& pixels,
                                 const EdgePrior& prior) {
-  constexpr std::size_t least_pixels = 24;
-  if (pixels.size() < least_pixels) return {};
-  return edge.cubic ? fit<EdgeCurve::kMostTerms>(edge, pixels, prior)
+  constexpr std::size_t min_pixels = 24;
+  if (pixels.size() < min_pixels) return {};
+  return edge.cubic ? fit<EdgeCurve::kMaxTerms>(edge, pixels, prior)
                     : fit<EdgeCurve::kTerms>(edge, pixels, prior);
 }
 

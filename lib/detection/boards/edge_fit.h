@@ -21,8 +21,8 @@ struct EdgePixel {
 /// Curve v = a + b w + c w^2 + d w^3 relative to a straight line. The coordinates of a pixel x are
 ///   w = along.(x - middle) / half_px,  v = across.(x - middle).
 struct EdgeCurve {
-  static constexpr int kTerms = 3, kMostTerms = 4;
-  using Coefficients = Eigen::Matrix<double, kMostTerms, 1>;
+  static constexpr int kTerms = 3, kMaxTerms = 4;
+  using Coefficients = Eigen::Matrix<double, kMaxTerms, 1>;
 
   Eigen::Vector2d middle, along, across;
   double half_px;
@@ -36,7 +36,7 @@ struct EdgeCurve {
     return c[0] + w * (c[1] + w * (c[2] + w * c[3]));
   }
   /// Returns the distance of a point from the curve in px along v, positive outwards.
-  double off(const Eigen::Vector2d& x) const {
+  double offset_px(const Eigen::Vector2d& x) const {
     return across.dot(x - middle) - value_at(along.dot(x - middle) / half_px);
   }
   /// Returns the gradient of the distance from the curve.
@@ -44,7 +44,7 @@ struct EdgeCurve {
 };
 
 /// Computes the intersection of two curves by Newton's method from a nearby point.
-Eigen::Vector2d crossing(const EdgeCurve& a, const EdgeCurve& b, Eigen::Vector2d point);
+Eigen::Vector2d find_intersection(const EdgeCurve& a, const EdgeCurve& b, Eigen::Vector2d point);
 
 /// Prior of the edges of an image.
 struct EdgePrior {
@@ -62,7 +62,7 @@ struct EdgeFit {
   double squares;
   std::size_t pixels;
   /// True if the brighter side is saturated.
-  bool runs_over;
+  bool is_saturated;
   /// Light on the brighter and on the darker side in the middle of the edge, in grey levels without
   /// tone curve.
   double bright_light, dark_light;

@@ -13,7 +13,8 @@ struct Node {
 };
 
 /// Returns the mean displacement in the image to the next point along a row and along a column.
-std::array<Eigen::Vector2d, 2> ways(const std::vector<SeenPoint>& points, std::size_t cols) {
+std::array<Eigen::Vector2d, 2> axis_directions(const std::vector<PointDetection>& points,
+                                               std::size_t cols) {
   std::array<Eigen::Vector2d, 2> sums{Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero()};
   std::array<double, 2> counts{1e-9, 1e-9};
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -31,33 +32,36 @@ std::array<Eigen::Vector2d, 2> ways(const std::vector<SeenPoint>& points, std::s
 }
 
 template <typename Change>
-void renumber(std::vector<SeenPoint>& points, int cols, const Change& change) {
-  for (SeenPoint& point : points) {
+void renumber(std::vector<PointDetection>& points, int cols, const Change& change) {
+  for (PointDetection& point : points) {
     const int index = static_cast<int>(point.index);
     const Node to = change(Node{index % cols, index / cols});
     point.index = static_cast<std::size_t>(to.row * cols + to.col);
   }
   std::sort(points.begin(), points.end(),
-            [](const SeenPoint& a, const SeenPoint& b) { return a.index < b.index; });
+            [](const PointDetection& a, const PointDetection& b) { return a.index < b.index; });
 }
 
 }  // namespace
 
-void order_lattice(std::vector<SeenPoint>& points, int cols, int rows, bool looks_same_turned) {
+void order_lattice(std::vector<PointDetection>& points, int cols, int rows,
+                   bool has_180_degree_symmetry) {
   const auto width = static_cast<std::size_t>(cols);
-  const auto [right, down] = ways(points, width);
+  const auto [right, down] = axis_directions(points, width);
   if (right.x() * down.y() - right.y() * down.x() < 0) {
-    renumber(points, cols, [&](Node at) { return Node{at.col, rows - 1 - at.row}; });
+    renumber(points, cols, [&](Node node) { return Node{node.col, rows - 1 - node.row}; });
   }
-  if (!looks_same_turned) return;
+  if (!has_180_degree_symmetry) return;
   if (cols == rows) {
-    const auto [x, y] = ways(points, width);
+    const auto [x, y] = axis_directions(points, width);
     if (std::abs(y.x()) > std::abs(x.x())) {
-      renumber(points, cols, [&](Node at) { return Node{at.row, rows - 1 - at.col}; });
+      renumber(points, cols, [&](Node node) { return Node{node.row, rows - 1 - node.col}; });
     }
   }
-  if (ways(points, width)[0].x() < 0) {
-    renumber(points, cols, [&](Node at) { return Node{cols - 1 - at.col, rows - 1 - at.row}; });
+  if (axis_directions(points, width)[0].x() < 0) {
+    renumber(points, cols, [&](Node node) {
+      return Node{cols - 1 - node.col, rows - 1 - node.row};
+    });
   }
 }
 

@@ -11,16 +11,19 @@ namespace vlp {
 /// Renumbers the points of a board's lattice so that x points right and y down on the front of the
 /// board. Corner files may count the rows upwards.
 ///
-/// @param points             points of one lattice; SeenPoint::index counts row by row. Sorted by
+/// @param points             points of one lattice; PointDetection::index counts row by row. Sorted
+/// by
 ///                           the new index
 /// @param cols, rows         number of points per row and per column
-/// @param looks_same_turned  true if a rotation of the board by 180 degrees cannot be detected, as
+/// @param has_180_degree_symmetry  true if a rotation of the board by 180 degrees cannot be
+/// detected, as
 ///                           for a chessboard
 ///
-/// With `looks_same_turned` the lattice is also rotated until its rows point to the right in the
-/// image: by 180 degrees, or by multiples of 90 degrees if it is square. This may exchange the two
-/// ends of the board. Lens and warp do not change, because the warp is the same from both ends. The
-/// warp of a square board cannot be determined.
-void order_lattice(std::vector<SeenPoint>& points, int cols, int rows, bool looks_same_turned);
+/// With `has_180_degree_symmetry` the lattice is also rotated until its rows point to the right in
+/// the image: by 180 degrees, or by multiples of 90 degrees if it is square. This may exchange the
+/// two ends of the board. Lens and warp do not change, because the warp is the same from both ends.
+/// The warp of a square board cannot be determined.
+void order_lattice(std::vector<PointDetection>& points, int cols, int rows,
+                   bool has_180_degree_symmetry);
 
 }  // namespace vlp

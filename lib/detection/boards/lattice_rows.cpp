@@ -9,7 +9,7 @@ namespace {
 
 /// Returns the mean length of the second differences along rows of `row` points, in px; NaN if
 /// there are none.
-double unevenness(std::span<const LatticePixels> images, std::size_t row) {
+double compute_unevenness_px(std::span<const LatticePixels> images, std::size_t row) {
   double sum_px = 0, count = 0;
   for (const LatticePixels& points : images) {
     for (std::size_t i = 2; i < points.size(); ++i) {
@@ -23,21 +23,21 @@ double unevenness(std::span<const LatticePixels> images, std::size_t row) {
 
 }  // namespace
 
-std::size_t row_shown(std::span<const LatticePixels> images, std::size_t stated) {
-  constexpr double better = 0.5;
+std::size_t estimate_row_length(std::span<const LatticePixels> images, std::size_t stated) {
+  constexpr double max_ratio = 0.5;
   if (images.empty()) return stated;
   const std::size_t points = images.front().size();
   std::size_t best = stated;
-  double least = std::numeric_limits<double>::infinity();
+  double min_px = std::numeric_limits<double>::infinity();
   // Longer rows are tried first, because a part of a row is as even as the row.
   for (std::size_t row = points / 3; row >= 3; --row) {
     if (points % row != 0) continue;
-    const double px = unevenness(images, row);
-    if (!(px < better * least)) continue;
-    least = px;
+    const double px = compute_unevenness_px(images, row);
+    if (!(px < max_ratio * min_px)) continue;
+    min_px = px;
     best = row;
   }
-  return least < better * unevenness(images, stated) ? best : stated;
+  return min_px < max_ratio * compute_unevenness_px(images, stated) ? best : stated;
 }
 
 }  // namespace vlp

@@ -16,6 +16,6 @@ using LatticePixels = std::vector<std::optional<Eigen::Vector2d>>;
 /// Estimates the number of points in a row of the lattice. Returns `stated`, unless another number
 /// makes the points of all images lie along their rows twice as evenly.
 /// @pre All images show the same lattice.
-std::size_t row_shown(std::span<const LatticePixels> images, std::size_t stated);
+std::size_t estimate_row_length(std::span<const LatticePixels> images, std::size_t stated);
 
 }  // namespace vlp

@@ -16,7 +16,7 @@ bool has_room(const cv::Mat1f& image, const Eigen::Vector2i& at, int radius) {
 }
 
 /// Returns the negative determinant of the Hessian, from differences over two pixels.
-float saddleness(const cv::Mat1f& image, int column, int row) {
+float compute_saddle_strength(const cv::Mat1f& image, int column, int row) {
   constexpr int step = 2;
   const auto at = [&](int x, int y) { return image(row + step * y, column + step * x); };
   const float xx = at(-1, 0) - 2 * at(0, 0) + at(1, 0);
@@ -25,19 +25,19 @@ float saddleness(const cv::Mat1f& image, int column, int row) {
   return xy * xy - xx * yy;
 }
 
-std::optional<Eigen::Vector2i> strongest_saddle(const cv::Mat1f& image,
-                                                const Eigen::Vector2d& guess_px, int reach) {
+std::optional<Eigen::Vector2i> find_strongest_saddle(const cv::Mat1f& image,
+                                                     const Eigen::Vector2d& guess_px, int reach) {
   constexpr int room = 2;
   const Eigen::Vector2i middle = guess_px.array().round().cast<int>();
   std::optional<Eigen::Vector2i> best;
-  float most = 0;
+  float max_strength = 0;
   for (int y = -reach; y <= reach; ++y) {
     for (int x = -reach; x <= reach; ++x) {
       const Eigen::Vector2i at = middle + Eigen::Vector2i(x, y);
       if (x * x + y * y > reach * reach || !has_room(image, at, room)) continue;
-      const float value = saddleness(image, at.x(), at.y());
-      if (value <= most) continue;
-      most = value;
+      const float value = compute_saddle_strength(image, at.x(), at.y());
+      if (value <= max_strength) continue;
+      max_strength = value;
       best = at;
     }
   }
@@ -46,8 +46,8 @@ std::optional<Eigen::Vector2i> strongest_saddle(const cv::Mat1f& image,
 
 /// Fits a quadratic surface in a window and returns its saddle point relative to the center of the
 /// window; std::nullopt if it has no saddle.
-std::optional<Eigen::Vector2d> offset_of_saddle(const cv::Mat1f& image,
-                                                const Eigen::Vector2i& middle, int radius) {
+std::optional<Eigen::Vector2d> fit_saddle_offset(const cv::Mat1f& image,
+                                                 const Eigen::Vector2i& middle, int radius) {
   Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
   Vector6 right = Vector6::Zero();
   for (int y = -radius; y <= radius; ++y) {
@@ -67,22 +67,22 @@ std::optional<Eigen::Vector2d> offset_of_saddle(const cv::Mat1f& image,
 
 }  // namespace
 
-std::optional<Eigen::Vector2d> saddle_point(const cv::Mat1f& smoothed,
-                                            const Eigen::Vector2d& guess_px, int reach_px,
-                                            int radius_px) {
-  constexpr int most_steps = 5;
-  constexpr double most_moved_px = 2;
-  const auto start = strongest_saddle(smoothed, guess_px, reach_px);
-  if (!start) return {};
-  Eigen::Vector2i middle = *start;
-  for (int step = 0; step < most_steps; ++step) {
+std::optional<Eigen::Vector2d> find_saddle_point(const cv::Mat1f& smoothed,
+                                                 const Eigen::Vector2d& guess_px, int reach_px,
+                                                 int radius_px) {
+  constexpr int max_iterations = 5;
+  constexpr double max_displacement_px = 2;
+  const auto initial_pixel = find_strongest_saddle(smoothed, guess_px, reach_px);
+  if (!initial_pixel) return {};
+  Eigen::Vector2i middle = *initial_pixel;
+  for (int step = 0; step < max_iterations; ++step) {
     if (!has_room(smoothed, middle, radius_px)) return {};
-    const auto offset = offset_of_saddle(smoothed, middle, radius_px);
+    const auto offset = fit_saddle_offset(smoothed, middle, radius_px);
     if (!offset) return {};
     const Eigen::Vector2d point = middle.cast<double>() + *offset;
-    if (!((point - start->cast<double>()).norm() <= most_moved_px)) return {};
+    if (!((point - initial_pixel->cast<double>()).norm() <= max_displacement_px)) return {};
     const Eigen::Vector2i nearest = point.array().round().cast<int>();
-    if (nearest == middle || step + 1 == most_steps) return point;
+    if (nearest == middle || step + 1 == max_iterations) return point;
     middle = nearest;
   }
   return {};

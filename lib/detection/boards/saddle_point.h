@@ -8,7 +8,7 @@
 
 namespace vlp {
 
-/// Image and its smoothed copy, which saddle_point() uses.
+/// Image and its smoothed copy, which find_saddle_point() uses.
 struct GreyLevels {
   cv::Mat1b sharp;
   cv::Mat1f smoothed;
@@ -29,8 +29,8 @@ struct GreyLevels {
 ///   a x^2 + b x y + c y^2 + d x + e y + f
 /// is fitted in a window around the nearest pixel. The window is moved to the fitted point until
 /// its center does not change (five iterations at most).
-std::optional<Eigen::Vector2d> saddle_point(const cv::Mat1f& smoothed,
-                                            const Eigen::Vector2d& guess_px, int reach_px,
-                                            int radius_px);
+std::optional<Eigen::Vector2d> find_saddle_point(const cv::Mat1f& smoothed,
+                                                 const Eigen::Vector2d& guess_px, int reach_px,
+                                                 int radius_px);
 
 }  // namespace vlp

@@ -26,12 +26,12 @@ bool in_image(const Eigen::Vector2d& pixel, const cv::Mat& image) {
 
 /// Returns the factor by which a large image is reduced for OpenCV's search, which then needs a
 /// fraction of the memory. Corners are refined in the full image.
-int reduction_of(const cv::Mat& image) {
+int choose_reduction(const cv::Mat& image) {
   constexpr double large_px = 8e6;
   return static_cast<int>(std::ceil(std::sqrt(static_cast<double>(image.total()) / large_px)));
 }
 
-cv::Mat reduced(const cv::Mat& image, int times) {
+cv::Mat reduce_image(const cv::Mat& image, int times) {
   if (times <= 1) return image;
   cv::Mat small;
   cv::resize(image, small, {image.cols / times, image.rows / times}, 0, 0, cv::INTER_AREA);
@@ -39,12 +39,12 @@ cv::Mat reduced(const cv::Mat& image, int times) {
 }
 
 /// Converts a coordinate in the reduced image to the full image. Their sizes need not be multiples.
-double enlarged(float at, int large, int small) {
+double enlarge_coordinate(float at, int large, int small) {
   return (static_cast<double>(at) + 0.5) * large / small - 0.5;
 }
 
 /// Seeds OpenCV's random number generator equally for each image, so that results are reproducible.
-void start_chance() { cv::theRNG().state = 1; }
+void seed_random_generator() { cv::theRNG().state = 1; }
 
 }  // namespace
 
@@ -53,23 +53,23 @@ SquareCorners::SquareCorners(const Board& board)
       rows_(board.rows - 1),
       square_size_m_(board.square_size_m),
       margin_m_((board.square_size_m - board.tag_size_m) / 2),
-      layout_(board_layout(board)) {}
+      layout_(compute_board_layout(board)) {}
 
-std::vector<SeenPoint> SquareCorners::exact(const std::vector<Guess>& guesses,
-                                            const GreyLevels& image) const {
-  constexpr int least_px = 2, most_px = 5;
-  constexpr double least_fit_px = 2.5, most_fit_px = 8, fit_share = 0.75;
+std::vector<PointDetection> SquareCorners::refine(const std::vector<Guess>& guesses,
+                                                  const GreyLevels& image) const {
+  constexpr int min_px = 2, max_px = 5;
+  constexpr double min_fit_px = 2.5, max_fit_px = 8, fit_fraction = 0.75;
   constexpr double edge_px = 2;  // a corner nearer to the image's edge is cut short
-  std::vector<SeenPoint> points;
+  std::vector<PointDetection> points;
   for (const auto& [index, pixel, next, free_px] : guesses) {
     if (!in_image(pixel, image.sharp)) continue;
-    const int radius_px = std::clamp(static_cast<int>(free_px / 2), least_px, most_px);
-    const int reach_px = std::clamp(static_cast<int>(free_px * 0.8), least_px, 2 * most_px);
-    const auto saddle = saddle_point(image.smoothed, pixel, reach_px, radius_px);
+    const int radius_px = std::clamp(static_cast<int>(free_px / 2), min_px, max_px);
+    const int reach_px = std::clamp(static_cast<int>(free_px * 0.8), min_px, 2 * max_px);
+    const auto saddle = find_saddle_point(image.smoothed, pixel, reach_px, radius_px);
     if (!saddle) continue;
-    const double fit_px = std::clamp(free_px * fit_share, least_fit_px, most_fit_px);
+    const double fit_px = std::clamp(free_px * fit_fraction, min_fit_px, max_fit_px);
     const Eigen::Vector2d at =
-        edge_crossing(image.sharp, *saddle, {next[0] - pixel, next[1] - pixel}, fit_px)
+        fit_edge_crossing(image.sharp, *saddle, {next[0] - pixel, next[1] - pixel}, fit_px)
             .value_or(*saddle);
     if (at.x() < edge_px || at.y() < edge_px || at.x() >= image.sharp.cols - edge_px ||
         at.y() >= image.sharp.rows - edge_px) {
@@ -80,19 +80,19 @@ std::vector<SeenPoint> SquareCorners::exact(const std::vector<Guess>& guesses,
   return points;
 }
 
-std::vector<SeenPoint> SquareCorners::of_chessboard(const GreyLevels& image) const {
+std::vector<PointDetection> SquareCorners::detect_chessboard(const GreyLevels& image) const {
   std::vector<cv::Point2f> found;
-  const cv::Mat searched = reduced(image.sharp, reduction_of(image.sharp));
-  start_chance();
+  const cv::Mat searched = reduce_image(image.sharp, choose_reduction(image.sharp));
+  seed_random_generator();
   if (!cv::findChessboardCornersSB(searched, {cols_, rows_}, found, kFlags)) return {};
-  std::vector<SeenPoint> points;
+  std::vector<PointDetection> points;
   const bool whole = searched.size() == image.sharp.size();
   for (std::size_t i = 0; i < found.size(); ++i) {
     const auto [x, y] = found[i];
     points.push_back({i, {x, y}});
     if (whole) continue;
-    points.back().pixel = {enlarged(x, image.sharp.cols, searched.cols),
-                           enlarged(y, image.sharp.rows, searched.rows)};
+    points.back().pixel = {enlarge_coordinate(x, image.sharp.cols, searched.cols),
+                           enlarge_coordinate(y, image.sharp.rows, searched.rows)};
   }
   order_lattice(points, cols_, rows_, true);
   const auto at = [&](int col, int row) {
@@ -111,50 +111,51 @@ std::vector<SeenPoint> SquareCorners::of_chessboard(const GreyLevels& image) con
                          std::min((right - here).norm(), (down - here).norm())});
     }
   }
-  auto corners = exact(guesses, image);
+  auto corners = refine(guesses, image);
   // A single missing corner makes all others doubtful, because OpenCV extrapolates the lattice.
-  return corners.size() == guesses.size() ? corners : std::vector<SeenPoint>();
+  return corners.size() == guesses.size() ? corners : std::vector<PointDetection>();
 }
 
-std::vector<SeenPoint> SquareCorners::beside(const std::vector<SeenTag>& markers,
-                                             const GreyLevels& image) const {
-  constexpr std::size_t enough = 4;
+std::vector<PointDetection> SquareCorners::detect_beside(const std::vector<TagDetection>& markers,
+                                                         const GreyLevels& image) const {
+  constexpr std::size_t max_markers = 4;
   constexpr double adjacent = 0.8, near = 2.2;  // in squares
-  constexpr double misread = 0.25;  // of a square: one of the markers is clutter, read as another
+  constexpr double max_marker_error =
+      0.25;  // of a square: one of the markers is clutter, read as another
   std::vector<Guess> guesses;
   for (int row = 0; row < rows_; ++row) {
     for (int col = 0; col < cols_; ++col) {
       const Eigen::Vector2d here_m = square_size_m_ * Eigen::Vector2d(col, row);
-      std::vector<std::pair<double, const SeenTag*>> around;
-      for (const SeenTag& marker : markers) {
+      std::vector<std::pair<double, const TagDetection*>> around;
+      for (const TagDetection& marker : markers) {
         const auto place = std::find_if(layout_.begin(), layout_.end(),
                                         [&](const auto& tag) { return tag.id == marker.id; });
-        const double away = ((place->corners_m[0] + place->corners_m[2]) / 2 - here_m).norm();
-        if (away < near * square_size_m_) around.emplace_back(away, &marker);
+        const double distance_m = ((place->corners_m[0] + place->corners_m[2]) / 2 - here_m).norm();
+        if (distance_m < near * square_size_m_) around.emplace_back(distance_m, &marker);
       }
       std::sort(around.begin(), around.end(), [](const auto& a, const auto& b) {
         return std::pair(a.first, a.second->id) < std::pair(b.first, b.second->id);
       });
       if (around.empty() || around.front().first > adjacent * square_size_m_) continue;
       std::vector<PlanePair> pairs;
-      for (std::size_t i = 0; i < std::min(enough, around.size()); ++i) {
-        const SeenTag& marker = *around[i].second;
+      for (std::size_t i = 0; i < std::min(max_markers, around.size()); ++i) {
+        const TagDetection& marker = *around[i].second;
         const auto place = std::find_if(layout_.begin(), layout_.end(),
                                         [&](const auto& tag) { return tag.id == marker.id; });
         for (std::size_t k = 0; k < 4; ++k) {
           pairs.push_back({place->corners_m[k], marker.corners_px[k]});
         }
       }
-      const Eigen::Matrix3d px_from_board = homography(pairs);
-      const auto seen = [&](const Eigen::Vector2d& at_m) -> Eigen::Vector2d {
+      const Eigen::Matrix3d px_from_board = estimate_homography(pairs);
+      const auto project = [&](const Eigen::Vector2d& at_m) -> Eigen::Vector2d {
         return (px_from_board * at_m.homogeneous()).hnormalized();
       };
-      const Eigen::Vector2d here = seen(here_m);
-      const Eigen::Vector2d right = seen(here_m + Eigen::Vector2d(square_size_m_, 0));
-      const Eigen::Vector2d down = seen(here_m + Eigen::Vector2d(0, square_size_m_));
+      const Eigen::Vector2d here = project(here_m);
+      const Eigen::Vector2d right = project(here_m + Eigen::Vector2d(square_size_m_, 0));
+      const Eigen::Vector2d down = project(here_m + Eigen::Vector2d(0, square_size_m_));
       const double square_px = std::min((right - here).norm(), (down - here).norm());
       const bool one_plane = std::all_of(pairs.begin(), pairs.end(), [&](const PlanePair& pair) {
-        return (seen(pair.from) - pair.to).norm() < misread * square_px;
+        return (project(pair.from) - pair.to).norm() < max_marker_error * square_px;
       });
       if (!one_plane) continue;
       guesses.push_back({static_cast<std::size_t>(row * cols_ + col),
@@ -163,16 +164,16 @@ std::vector<SeenPoint> SquareCorners::beside(const std::vector<SeenTag>& markers
                          std::sqrt(2) * square_px * margin_m_ / square_size_m_});
     }
   }
-  return exact(guesses, image);
+  return refine(guesses, image);
 }
 
-std::array<int, 2> chessboard_shown(const cv::Mat& image) {
-  constexpr int least_px = 10;
-  if (std::min(image.cols, image.rows) < least_px) return {0, 0};
-  const cv::Mat1b levels = reduced(eight_bits(image), reduction_of(image));
+std::array<int, 2> count_chessboard_squares(const cv::Mat& image) {
+  constexpr int min_px = 10;
+  if (std::min(image.cols, image.rows) < min_px) return {0, 0};
+  const cv::Mat1b levels = reduce_image(convert_to_8_bits(image), choose_reduction(image));
   std::vector<cv::Point2f> corners;
   cv::Mat squares;
-  start_chance();
+  seed_random_generator();
   if (!cv::findChessboardCornersSB(levels, {3, 3}, corners, kFlags | cv::CALIB_CB_LARGER,
                                    squares)) {
     return {0, 0};

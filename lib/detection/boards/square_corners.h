@@ -14,8 +14,8 @@
 namespace vlp {
 
 /// Detector of the corners where the squares of a chessboard or of a ChArUco board touch. Corners
-/// are the intersections of the edges (edge_crossing()), or the saddle points if their fit fails.
-/// Safe to share between threads.
+/// are the intersections of the edges (fit_edge_crossing()), or the saddle points if their fit
+/// fails. Safe to share between threads.
 class SquareCorners {
  public:
   explicit SquareCorners(const Board& board);
@@ -23,10 +23,11 @@ class SquareCorners {
   /// Detects the corners of a chessboard by OpenCV's findChessboardCornersSB(). Returns all
   /// corners, or none if the board is not completely in view. The two ends of the board cannot be
   /// distinguished (order_lattice()).
-  std::vector<SeenPoint> of_chessboard(const GreyLevels& image) const;
+  std::vector<PointDetection> detect_chessboard(const GreyLevels& image) const;
 
   /// Detects the corners next to markers whose own corners are accurate to 1 to 2 px.
-  std::vector<SeenPoint> beside(const std::vector<SeenTag>& markers, const GreyLevels& image) const;
+  std::vector<PointDetection> detect_beside(const std::vector<TagDetection>& markers,
+                                            const GreyLevels& image) const;
 
  private:
   /// Prediction of a corner: its pixel, the next corners along the row and the column, and a
@@ -37,7 +38,8 @@ class SquareCorners {
     std::array<Eigen::Vector2d, 2> next;
     double free_px;
   };
-  std::vector<SeenPoint> exact(const std::vector<Guess>& guesses, const GreyLevels& image) const;
+  std::vector<PointDetection> refine(const std::vector<Guess>& guesses,
+                                     const GreyLevels& image) const;
 
   int cols_, rows_;
   double square_size_m_, margin_m_;
@@ -46,6 +48,6 @@ class SquareCorners {
 
 /// Counts the squares of a chessboard that an image of 8 or 16 bits shows, along both edges of the
 /// board. Returns {0, 0} if it shows no chessboard.
-std::array<int, 2> chessboard_shown(const cv::Mat& image);
+std::array<int, 2> count_chessboard_squares(const cv::Mat& image);
 
 }  // namespace vlp

@@ -10,14 +10,14 @@
 
 namespace vlp {
 
-bool shows_its_bits(const SeenTag& tag, const cv::Mat1f& levels, const apriltag_family_t& family,
-                    int border_bits) {
-  constexpr int most_wrong = 2;
+bool matches_tag_bits(const TagDetection& tag, const cv::Mat1f& levels,
+                      const apriltag_family_t& family, int border_bits) {
+  constexpr int max_wrong = 2;
   const double width = width_in_bits(family, border_bits);
   const std::array<Eigen::Vector2d, 4> square{{{0, width}, {width, width}, {width, 0}, {0, 0}}};
   std::array<PlanePair, 4> pairs;
   for (std::size_t k = 0; k < 4; ++k) pairs[k] = {square[k], tag.corners_px[k]};
-  const Eigen::Matrix3d px_from_bits = homography(pairs);
+  const Eigen::Matrix3d px_from_bits = estimate_homography(pairs);
   std::vector<float> seen(family.nbits);
   for (uint32_t bit = 0; bit < family.nbits; ++bit) {
     const double middle = border_bits - 0.5;
@@ -35,7 +35,7 @@ bool shows_its_bits(const SeenTag& tag, const cv::Mat1f& levels, const apriltag_
   for (uint32_t bit = 0; bit < family.nbits; ++bit) {
     wrong += is_white(family, tag.id, bit) != (seen[bit] > threshold);
   }
-  return wrong <= most_wrong;
+  return wrong <= max_wrong;
 }
 
 }  // namespace vlp

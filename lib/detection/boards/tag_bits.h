@@ -16,7 +16,7 @@ namespace vlp {
 ///
 /// @param levels       grey levels of the image
 /// @param border_bits  width of the printed border, in bits
-bool shows_its_bits(const SeenTag& tag, const cv::Mat1f& levels, const apriltag_family_t& family,
-                    int border_bits);
+bool matches_tag_bits(const TagDetection& tag, const cv::Mat1f& levels,
+                      const apriltag_family_t& family, int border_bits);
 
 }  // namespace vlp

@@ -15,7 +15,7 @@ namespace vlp {
 /// each tag. Sets their curvature, standard deviation and steps.
 ///
 /// @param tags   tags with the corners of libapriltag; corrected in place
-/// @return       SeenBoard::curve_costs, from the eight widest tags
+/// @return       BoardDetection::curve_costs, from the eight widest tags
 ///
 /// Edges. Each edge is fitted to the pixels next to it, from corner to corner, as a parabola,
 /// because the lens bends it (fit_edge()). The pixels are first those next to libapriltag's
@@ -30,7 +30,7 @@ namespace vlp {
 ///
 /// Tone curve. A tone curve makes an edge steeper on its dark side, which biases the fit towards
 /// that side. The bias grows as the stripes get narrower. Edges are therefore fitted for each of
-/// kGammas (SeenTag::behind_curves), unless the image shows that it has no tone curve.
+/// kGammas (TagDetection::tone_curve_fits), unless the image shows that it has no tone curve.
 ///
 /// Blur and saturation. With a tone curve, and even more if white is saturated, the blur, contrast
 /// and position of an edge are strongly correlated. At an exposure of 1.5 times white, a known blur
@@ -39,7 +39,7 @@ namespace vlp {
 /// are therefore fitted again with the blur of the neighboring edges as a prior, and saturated
 /// edges once more with their light. The prior allows for the differences between edges that exceed
 /// their noise.
-std::vector<double> find_exact_edges(std::span<SeenTag> tags, const cv::Mat1b& image,
-                                     const TagPrint& print);
+std::vector<double> refine_tag_edges(std::span<TagDetection> tags, const cv::Mat1b& image,
+                                     const TagGeometry& print);
 
 }  // namespace vlp

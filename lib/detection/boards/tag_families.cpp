@@ -15,7 +15,7 @@
 
 namespace vlp {
 
-TagFamily tag_family(const std::string& name) {
+TagFamily make_tag_family(const std::string& name) {
   if (name == "tag36h11") return {tag36h11_create(), tag36h11_destroy};
   if (name == "tag25h9") return {tag25h9_create(), tag25h9_destroy};
   if (name == "tag16h5") return {tag16h5_create(), tag16h5_destroy};

@@ -13,7 +13,7 @@ using TagFamily = std::unique_ptr<apriltag_family_t, void (*)(apriltag_family_t*
 
 /// Creates libapriltag's family with a name of Board::family. Detectors must not share it.
 /// @throws std::invalid_argument if there is no such family
-TagFamily tag_family(const std::string& name);
+TagFamily make_tag_family(const std::string& name);
 
 /// Returns the width of a tag in bits if its border is `border_bits` wide, instead of one bit as in
 /// the family.

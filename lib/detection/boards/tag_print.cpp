@@ -4,13 +4,13 @@
 
 namespace vlp {
 
-TagPrint::TagPrint(const Board& board)
-    : family_(tag_family(board.family)),
+TagGeometry::TagGeometry(const Board& board)
+    : family_(make_tag_family(board.family)),
       width_(width_in_bits(*family_, board.border_bits)),
       inside_(board.border_bits),
       outside_(family_->reversed_border ? 1 : board.tag_spacing * width_) {}
 
-TagPrint::Sides TagPrint::white_behind(int id) const {
+TagGeometry::Sides TagGeometry::find_white_segments(int id) const {
   Sides sides;
   if (family_->reversed_border) return sides;
   const int last = static_cast<int>(width_) - 1, border = static_cast<int>(inside_);

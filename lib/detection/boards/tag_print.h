@@ -12,17 +12,17 @@
 namespace vlp {
 
 /// Printed pattern next to the edges of a board's tags, in bits.
-class TagPrint {
+class TagGeometry {
  public:
   /// Segment along a side; distances from the first corner of the side.
-  struct Run {
+  struct Segment {
     double from, to;
   };
-  /// Segments of each side, from corner k to k + 1 in the order of SeenTag.
-  using Sides = std::array<std::vector<Run>, 4>;
+  /// Segments of each side, from corner k to k + 1 in the order of TagDetection.
+  using Sides = std::array<std::vector<Segment>, 4>;
 
   /// @throws std::invalid_argument if libapriltag does not have the family
-  explicit TagPrint(const Board& board);
+  explicit TagGeometry(const Board& board);
 
   /// Width of a tag, with its border.
   double width() const { return width_; }
@@ -31,7 +31,7 @@ class TagPrint {
   double outside() const { return outside_; }
   /// Returns the segments in which white bits adjoin the black stripe inside the edge. Empty for
   /// families with a white border.
-  Sides white_behind(int id) const;
+  Sides find_white_segments(int id) const;
 
  private:
   TagFamily family_;

@@ -17,20 +17,21 @@ inline constexpr std::array kGammas{1.0, 1.3, 1.6, 2.0, 2.4};
 /// One cost per entry of kGammas.
 using PerCurve = std::array<double, kGammas.size()>;
 
-/// Sums the costs of the tone curves (SeenBoard::curve_costs) over all images. The costs of an
+/// Sums the costs of the tone curves (BoardDetection::curve_costs) over all images. The costs of an
 /// image are relative to its smallest one and limited to 1000.
-PerCurve costs_of_levels(const std::vector<BoardView>& views);
+PerCurve sum_tone_curve_costs(const std::vector<BoardView>& views);
 
 /// Estimates the gamma with the smallest cost, by a parabola over log(gamma) through the smallest
 /// of `costs` and its neighbors.
-double gamma_of(const PerCurve& costs);
+double estimate_gamma(const PerCurve& costs);
 
-/// Corrects the tags of all views for the tone curve with gamma_of(costs) and returns this gamma.
-/// Returns 1 and changes no corner if gamma is below 1.2: sharpening has a similar effect.
+/// Corrects the tags of all views for the tone curve with estimate_gamma(costs) and returns this
+/// gamma. Returns 1 and changes no corner if gamma is below 1.2: sharpening has a similar effect.
 ///
 /// Interpolates corners and edge curvatures by a parabola through the fits for the same three of
 /// kGammas, and standard deviations and steps linearly. An image that certainly has no tone curve
-/// keeps its corners. Clears SeenTag::behind_curves and SeenBoard::curve_costs in all views.
-double take_curve(std::vector<BoardView>& views, const PerCurve& costs);
+/// keeps its corners. Clears TagDetection::tone_curve_fits and BoardDetection::curve_costs in all
+/// views.
+double apply_tone_curve(std::vector<BoardView>& views, const PerCurve& costs);
 
 }  // namespace vlp

@@ -15,7 +15,7 @@
 namespace vlp {
 namespace {
 
-double shortest_edge_px(const SeenTag& tag) {
+double shortest_edge_px(const TagDetection& tag) {
   double shortest = INFINITY;
   for (std::size_t k = 0; k < 4; ++k) {
     shortest = std::min(shortest, (tag.corners_px[k] - tag.corners_px[(k + 1) % 4]).norm());
@@ -26,79 +26,79 @@ double shortest_edge_px(const SeenTag& tag) {
 }  // namespace
 
 TouchingTags::TouchingTags(const Board& board)
-    : layout_(board_layout(board)),
-      family_(tag_family(board.family)),
+    : layout_(compute_board_layout(board)),
+      family_(make_tag_family(board.family)),
       border_bits_(board.border_bits),
       tag_size_m_(board.tag_size_m) {
   const double width = family_->width_at_border + 2 * (border_bits_ - 1);
-  free_share_ = std::min(board.tag_spacing, border_bits_ / width);
+  free_fraction_ = std::min(board.tag_spacing, border_bits_ / width);
 }
 
-std::optional<SeenTag> TouchingTags::exact(SeenTag tag, const GreyLevels& image) const {
-  constexpr int least_px = 2, most_px = 5;
-  constexpr double least_fit_px = 2.5, most_fit_px = 8, fit_share = 0.75;
-  const double free_px = shortest_edge_px(tag) * free_share_;
-  const int radius_px = std::clamp(static_cast<int>(free_px / 2), least_px, most_px);
-  const int reach_px = std::max(least_px, static_cast<int>(free_px * 0.8));
+std::optional<TagDetection> TouchingTags::exact(TagDetection tag, const GreyLevels& image) const {
+  constexpr int min_px = 2, max_px = 5;
+  constexpr double min_fit_px = 2.5, max_fit_px = 8, fit_fraction = 0.75;
+  const double free_px = shortest_edge_px(tag) * free_fraction_;
+  const int radius_px = std::clamp(static_cast<int>(free_px / 2), min_px, max_px);
+  const int reach_px = std::max(min_px, static_cast<int>(free_px * 0.8));
   for (auto& corner : tag.corners_px) {
-    const auto found = saddle_point(image.smoothed, corner, reach_px, radius_px);
+    const auto found = find_saddle_point(image.smoothed, corner, reach_px, radius_px);
     if (!found) return {};
     corner = *found;
   }
-  const double fit_px = std::clamp(free_px * fit_share, least_fit_px, most_fit_px);
+  const double fit_px = std::clamp(free_px * fit_fraction, min_fit_px, max_fit_px);
   const auto saddles = tag.corners_px;
   for (std::size_t k = 0; k < 4; ++k) {
-    const auto found = edge_crossing(
+    const auto found = fit_edge_crossing(
         image.sharp, saddles[k],
         {saddles[(k + 1) % 4] - saddles[k], saddles[(k + 3) % 4] - saddles[k]}, fit_px);
     if (found) tag.corners_px[k] = *found;
   }
-  if (!shows_its_bits(tag, image.smoothed, *family_, border_bits_)) return {};
+  if (!matches_tag_bits(tag, image.smoothed, *family_, border_bits_)) return {};
   return tag;
 }
 
-std::optional<SeenTag> TouchingTags::expected(const BoardTag& missing,
-                                              const std::vector<SeenTag>& tags) const {
-  constexpr std::size_t enough = 4;
-  constexpr double reach = 2.2;  // in tags: neighbors, including diagonal ones
-  std::vector<std::pair<double, const SeenTag*>> near;
-  for (const SeenTag& tag : tags) {
+std::optional<TagDetection> TouchingTags::predict(const BoardTag& missing,
+                                                  const std::vector<TagDetection>& tags) const {
+  constexpr std::size_t max_neighbors = 4;
+  constexpr double max_distance = 2.2;  // in tags: neighbors, including diagonal ones
+  std::vector<std::pair<double, const TagDetection*>> neighbors;
+  for (const TagDetection& tag : tags) {
     const auto at = std::find_if(layout_.begin(), layout_.end(),
                                  [&](const BoardTag& known) { return known.id == tag.id; });
-    const double away_m = (at->corners_m[0] - missing.corners_m[0]).norm();
-    if (away_m < reach * tag_size_m_) near.emplace_back(away_m, &tag);
+    const double distance_m = (at->corners_m[0] - missing.corners_m[0]).norm();
+    if (distance_m < max_distance * tag_size_m_) neighbors.emplace_back(distance_m, &tag);
   }
-  if (near.empty()) return {};
-  std::sort(near.begin(), near.end(), [](const auto& a, const auto& b) {
+  if (neighbors.empty()) return {};
+  std::sort(neighbors.begin(), neighbors.end(), [](const auto& a, const auto& b) {
     return std::pair(a.first, a.second->id) < std::pair(b.first, b.second->id);
   });
   std::vector<PlanePair> pairs;
-  for (std::size_t i = 0; i < std::min(enough, near.size()); ++i) {
+  for (std::size_t i = 0; i < std::min(max_neighbors, neighbors.size()); ++i) {
     const auto at = std::find_if(layout_.begin(), layout_.end(), [&](const BoardTag& known) {
-      return known.id == near[i].second->id;
+      return known.id == neighbors[i].second->id;
     });
     for (std::size_t k = 0; k < 4; ++k) {
-      pairs.push_back({at->corners_m[k], near[i].second->corners_px[k]});
+      pairs.push_back({at->corners_m[k], neighbors[i].second->corners_px[k]});
     }
   }
-  const Eigen::Matrix3d px_from_board = homography(pairs);
-  SeenTag tag{missing.id, {}};
+  const Eigen::Matrix3d px_from_board = estimate_homography(pairs);
+  TagDetection tag{missing.id, {}};
   for (std::size_t k = 0; k < 4; ++k) {
     tag.corners_px[k] = (px_from_board * missing.corners_m[k].homogeneous()).hnormalized();
   }
   return tag;
 }
 
-std::vector<SeenTag> TouchingTags::others(const std::vector<SeenTag>& tags,
-                                          const GreyLevels& image) const {
-  std::vector<SeenTag> all = tags;
+std::vector<TagDetection> TouchingTags::find_missing(const std::vector<TagDetection>& tags,
+                                                     const GreyLevels& image) const {
+  std::vector<TagDetection> all = tags;
   for (bool more = true; more;) {
     more = false;
     for (const BoardTag& place : layout_) {
       const bool known = std::any_of(all.begin(), all.end(),
-                                     [&](const SeenTag& tag) { return tag.id == place.id; });
+                                     [&](const TagDetection& tag) { return tag.id == place.id; });
       if (known) continue;
-      const auto guess = expected(place, all);
+      const auto guess = predict(place, all);
       const auto tag = guess ? exact(*guess, image) : std::nullopt;
       if (!tag) continue;
       all.push_back(*tag);

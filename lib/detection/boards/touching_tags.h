@@ -22,14 +22,16 @@ class TouchingTags {
   /// Returns the tag with refined corners: the intersections of the edges next to the saddle points
   /// at its corners, or the saddle points. Returns std::nullopt if a saddle point is not found, or
   /// if the bits between the corners are not those of the tag.
-  std::optional<SeenTag> exact(SeenTag tag, const GreyLevels& image) const;
+  std::optional<TagDetection> exact(TagDetection tag, const GreyLevels& image) const;
 
   /// Finds tags of the board that are missing in `tags`, which are refined. Predicts their position
   /// by a homography of the nearest tags. Returns those that exact() accepts.
-  std::vector<SeenTag> others(const std::vector<SeenTag>& tags, const GreyLevels& image) const;
+  std::vector<TagDetection> find_missing(const std::vector<TagDetection>& tags,
+                                         const GreyLevels& image) const;
 
  private:
-  std::optional<SeenTag> expected(const BoardTag& missing, const std::vector<SeenTag>& tags) const;
+  std::optional<TagDetection> predict(const BoardTag& missing,
+                                      const std::vector<TagDetection>& tags) const;
 
   std::vector<BoardTag> layout_;
   TagFamily family_;
@@ -37,7 +39,7 @@ class TouchingTags {
   double tag_size_m_;
   /// Width of a corner square or of the black border, whichever is smaller, as a fraction of a
   /// tag's edge.
-  double free_share_;
+  double free_fraction_;
 };
 
 }  // namespace vlp

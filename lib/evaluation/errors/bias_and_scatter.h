@@ -37,7 +37,7 @@ struct BiasAndScatter {
 
 /// Computes bias and scatter from the errors of errors_against_truth(). Returns std::nullopt if no
 /// reference point has two fixes.
-std::optional<BiasAndScatter> bias_and_scatter(const std::vector<FixError>& errors,
-                                               const std::vector<TruthRow>& truth);
+std::optional<BiasAndScatter> compute_bias_and_scatter(const std::vector<FixError>& errors,
+                                                       const std::vector<TruthRow>& truth);
 
 }  // namespace vlp

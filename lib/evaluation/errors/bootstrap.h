@@ -16,25 +16,26 @@ struct Interval {
 /// Confidence intervals of error statistics.
 struct ErrorIntervals {
   Interval mean, median;
-  /// std::nullopt for fewer than kFewestUnitsOfP90 clusters.
+  /// std::nullopt for fewer than kMinClustersForP90 clusters.
   std::optional<Interval> p90;
   Interval rms;
   /// Number of clusters that were resampled.
-  std::size_t units;
+  std::size_t clusters;
 };
 
 /// Minimum number of clusters for intervals.
-inline constexpr std::size_t kFewestUnits = 5;
-/// Minimum number of clusters for an interval of the 90th percentile, see error_intervals().
-inline constexpr std::size_t kFewestUnitsOfP90 = 20;
+inline constexpr std::size_t kMinClusters = 5;
+/// Minimum number of clusters for an interval of the 90th percentile, see
+/// compute_error_intervals().
+inline constexpr std::size_t kMinClustersForP90 = 20;
 
-/// Computes confidence intervals of error statistics (see ErrorFigures) by the percentile bootstrap
-/// with 2,000 resamples (Efron and Tibshirani, "An Introduction to the Bootstrap", 1993, chapter
-/// 13).
+/// Computes confidence intervals of error statistics (see ErrorStatistics) by the percentile
+/// bootstrap with 2,000 resamples (Efron and Tibshirani, "An Introduction to the Bootstrap", 1993,
+/// chapter 13).
 ///
 /// Clusters are resampled with replacement, each with all of its errors. Errors within a cluster
 /// are correlated: captures at one reference point share its bias. Resampling single errors would
-/// make the intervals too narrow. Returns std::nullopt for fewer than kFewestUnits clusters.
+/// make the intervals too narrow. Returns std::nullopt for fewer than kMinClusters clusters.
 ///
 /// @param errors  errors without sign, or differences
 /// @param clusters  number of the cluster of each error, from 0, without large gaps
@@ -49,9 +50,10 @@ inline constexpr std::size_t kFewestUnitsOfP90 = 20;
 ///
 /// Percentile intervals from few clusters are too narrow. Measured coverage in 2,000 cases with 5 /
 /// 10 / 20 / 50 / 100 clusters and one horizontal error each: mean 85 / 90 / 93 / 94 / 95 %, p90 40
-/// / 64 / 87 / 88 / 94 %. Hence kFewestUnits and kFewestUnitsOfP90. The seeds are fixed: the same
+/// / 64 / 87 / 88 / 94 %. Hence kMinClusters and kMinClustersForP90. The seeds are fixed: the same
 /// errors yield the same intervals for any number of threads.
-std::optional<ErrorIntervals> error_intervals(std::span<const double> errors,
-                                              std::span<const std::size_t> units, int threads);
+std::optional<ErrorIntervals> compute_error_intervals(std::span<const double> errors,
+                                                      std::span<const std::size_t> clusters,
+                                                      int threads);
 
 }  // namespace vlp

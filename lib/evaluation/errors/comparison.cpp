@@ -17,42 +17,42 @@ namespace {
 void check_images_in(const FromFile<FixRow>& fixes, const FromFile<FixRow>& others) {
   NameIndex images(others.rows.size());
   for (const FixRow& row : others.rows) images.insert(row.image);
-  std::size_t strangers = 0;
+  std::size_t num_unmatched = 0;
   const FixRow* first = nullptr;
   for (const FixRow& row : fixes.rows) {
     if (images.find(row.image)) continue;
-    ++strangers;
+    ++num_unmatched;
     if (first == nullptr) first = &row;
   }
   if (first == nullptr) return;
   throw InputError(fixes.file, first->line, "image",
                    "'" + first->image + "' is not in " + others.file.string() + "; " +
-                       std::to_string(strangers) + " of " + std::to_string(fixes.rows.size()) +
+                       std::to_string(num_unmatched) + " of " + std::to_string(fixes.rows.size()) +
                        " images are not: are both of the same captures?");
 }
 
-std::size_t count_different(std::vector<std::size_t> units) {
-  std::sort(units.begin(), units.end());
-  return static_cast<std::size_t>(std::unique(units.begin(), units.end()) - units.begin());
+std::size_t count_distinct(std::vector<std::size_t> clusters) {
+  std::sort(clusters.begin(), clusters.end());
+  return static_cast<std::size_t>(std::unique(clusters.begin(), clusters.end()) - clusters.begin());
 }
 
 }  // namespace
 
 std::string_view Comparison::verdict() const {
   if (too_few() || !interval_m) return "no evidence";
-  if (interval_m->high < -least_m) return "better";
-  if (interval_m->low > least_m) return "worse";
-  const bool within = interval_m->low >= -least_m && interval_m->high <= least_m;
+  if (interval_m->high < -min_relevant_m) return "better";
+  if (interval_m->low > min_relevant_m) return "worse";
+  const bool within = interval_m->low >= -min_relevant_m && interval_m->high <= min_relevant_m;
   return within ? "the same" : "no evidence";
 }
 
 std::string Comparison::words() const {
   constexpr int digits = 2;
-  const std::string least = significant(1e3 * least_m, digits) + " mm";
+  const std::string threshold = significant(1e3 * min_relevant_m, digits) + " mm";
   std::string words(verdict());
-  if (words == "the same") return words.append(" within ").append(least);
+  if (words == "the same") return words.append(" within ").append(threshold);
   if (words == "no evidence") return words.append(too_few() ? ", too few" : "");
-  return words.append(" by more than ").append(least);
+  return words.append(" by more than ").append(threshold);
 }
 
 Comparison compare(const std::vector<FixRow>& fixes, const std::vector<FixError>& errors,
@@ -62,7 +62,7 @@ Comparison compare(const std::vector<FixRow>& fixes, const std::vector<FixError>
   for (const FixError& other : other_errors) images.insert(other_fixes[other.fix].image);
   Comparison comparison;
   std::vector<double> differences_m;
-  std::vector<std::size_t> units;
+  std::vector<std::size_t> clusters;
   double others_m = 0;
   for (const FixError& error : errors) {
     const auto other = images.find(fixes[error.fix].image);
@@ -74,7 +74,7 @@ Comparison compare(const std::vector<FixRow>& fixes, const std::vector<FixError>
     const double difference_m = error.horizontal_m.norm() - other_m;
     others_m += other_m;
     differences_m.push_back(difference_m);
-    units.push_back(error.unit);
+    clusters.push_back(error.cluster);
     comparison.mean_difference_m += difference_m;
     comparison.smaller += difference_m < 0 ? 1 : 0;
     comparison.larger += difference_m > 0 ? 1 : 0;
@@ -84,10 +84,11 @@ Comparison compare(const std::vector<FixRow>& fixes, const std::vector<FixError>
   if (comparison.pairs > 0) {
     const auto pairs = static_cast<double>(comparison.pairs);
     comparison.mean_difference_m /= pairs;
-    comparison.least_m = std::max(kLeastDifference_m, kLeastDifferenceShare * others_m / pairs);
-    const auto intervals = error_intervals(differences_m, units, threads);
+    comparison.min_relevant_m =
+        std::max(kMinDifference_m, kMinDifferenceFraction * others_m / pairs);
+    const auto intervals = compute_error_intervals(differences_m, clusters, threads);
     if (intervals) comparison.interval_m = intervals->mean;
-    comparison.units = count_different(std::move(units));
+    comparison.clusters = count_distinct(std::move(clusters));
   }
   return comparison;
 }

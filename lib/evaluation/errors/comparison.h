@@ -17,12 +17,12 @@ namespace vlp {
 /// from few clusters are too narrow. Without any difference, "better" or "worse" would result in 17
 /// / 11 / 9 / 8 / 6 % of 2,000 cases. The cases had 5 / 8 / 10 / 20 / 50 clusters with one
 /// horizontal error each; 5 % would be nominal.
-inline constexpr std::size_t kFewestUnitsCompared = 20;
+inline constexpr std::size_t kMinClustersCompared = 20;
 
 /// Smallest change of a mean error that matters, being neither measurable nor useful below: this
 /// length, or this fraction of the others' mean error, whichever is larger.
-inline constexpr double kLeastDifference_m = 1e-6;
-inline constexpr double kLeastDifferenceShare = 0.01;
+inline constexpr double kMinDifference_m = 1e-6;
+inline constexpr double kMinDifferenceFraction = 0.01;
 
 /// Comparison of fixes with others of the same captures, by horizontal errors.
 struct Comparison {
@@ -31,23 +31,23 @@ struct Comparison {
   /// Number of pairs in which the first error is smaller, or larger.
   std::size_t smaller = 0, larger = 0;
   /// Number of clusters (FixError::cluster) of the pairs.
-  std::size_t units = 0;
-  /// Mean of (first error - second error) and its confidence interval (error_intervals() of the
-  /// differences, resampled by the clusters of the first).
+  std::size_t clusters = 0;
+  /// Mean of (first error - second error) and its confidence interval (compute_error_intervals() of
+  /// the differences, resampled by the clusters of the first).
   double mean_difference_m = 0;
   std::optional<Interval> interval_m;
   /// Smallest difference that matters in this comparison.
-  double least_m = kLeastDifference_m;
+  double min_relevant_m = kMinDifference_m;
 
-  bool too_few() const { return units < kFewestUnitsCompared; }
+  bool too_few() const { return clusters < kMinClustersCompared; }
   /// Returns the verdict on the pairs, which ignores missing fixes:
-  ///   "better"       the whole interval is below -least_m
-  ///   "worse"        the whole interval is above least_m
+  ///   "better"       the whole interval is below -min_relevant_m
+  ///   "worse"        the whole interval is above min_relevant_m
   ///   "the same"     the whole interval is in between
   ///   "no evidence"  otherwise, and always if there are too few clusters
   std::string_view verdict() const;
-  /// Returns, for example, "worse by more than 0.004 mm", with least_m if the verdict depends on
-  /// it.
+  /// Returns, for example, "worse by more than 0.004 mm", with min_relevant_m if the verdict
+  /// depends on it.
   std::string words() const;
 };
 

@@ -9,9 +9,9 @@ namespace vlp {
 namespace {
 
 /// Returns the index of a quantile in `count` sorted values.
-std::size_t rank_of(double share, std::size_t count) {
-  constexpr double rounding = 1e-9;  // 0.07 x 100 is more than 7
-  const double below = std::ceil(share * static_cast<double>(count) - rounding);
+std::size_t quantile_index(double fraction, std::size_t count) {
+  constexpr double numeric_tolerance = 1e-9;  // 0.07 x 100 is more than 7
+  const double below = std::ceil(fraction * static_cast<double>(count) - numeric_tolerance);
   return static_cast<std::size_t>(std::max(below, 1.0)) - 1;
 }
 
@@ -23,37 +23,37 @@ double nth(std::vector<double>& values, std::size_t rank) {
 
 }  // namespace
 
-double quantile(std::span<const double> sorted, double share) {
-  return sorted[rank_of(share, sorted.size())];
+double quantile(std::span<const double> sorted, double fraction) {
+  return sorted[quantile_index(fraction, sorted.size())];
 }
 
-ErrorFigures figures_of(std::vector<double> errors) {
-  ErrorFigures figures{errors.size(), 0, 0, 0, 0, 0};
+ErrorStatistics compute_error_statistics(std::vector<double> errors) {
+  ErrorStatistics statistics{errors.size(), 0, 0, 0, 0, 0};
   double squares = 0;
   for (const double error : errors) {
-    figures.mean += error;
+    statistics.mean += error;
     squares += error * error;
-    figures.max = std::max(figures.max, error);
+    statistics.max = std::max(statistics.max, error);
   }
   const auto count = static_cast<double>(errors.size());
-  figures.mean /= count;
-  figures.rms = std::sqrt(squares / count);
-  figures.median = nth(errors, rank_of(0.5, errors.size()));
-  figures.p90 = nth(errors, rank_of(0.9, errors.size()));
-  return figures;
+  statistics.mean /= count;
+  statistics.rms = std::sqrt(squares / count);
+  statistics.median = nth(errors, quantile_index(0.5, errors.size()));
+  statistics.p90 = nth(errors, quantile_index(0.9, errors.size()));
+  return statistics;
 }
 
-SignedFigures signed_figures_of(std::vector<double> errors) {
+SignedErrorStatistics compute_signed_error_statistics(std::vector<double> errors) {
   double sum = 0;
   for (double& error : errors) {
     sum += error;
     error = std::abs(error);
   }
   const double bias = sum / static_cast<double>(errors.size());
-  return {bias, figures_of(std::move(errors))};
+  return {bias, compute_error_statistics(std::move(errors))};
 }
 
-std::vector<std::pair<double, double>> distribution_of(std::vector<double> errors) {
+std::vector<std::pair<double, double>> compute_distribution(std::vector<double> errors) {
   std::sort(errors.begin(), errors.end());
   std::vector<std::pair<double, double>> points;
   points.reserve(100);

@@ -36,41 +36,41 @@ class Ratios {
 
 }  // namespace
 
-std::optional<StatedRatio> stated_ratio(const std::vector<FixRow>& fixes,
-                                        const std::vector<FixError>& errors) {
+std::optional<NormalizedErrors> compute_normalized_errors(const std::vector<FixRow>& fixes,
+                                                          const std::vector<FixError>& errors) {
   Ratios horizontal, height, yaw;
-  std::size_t stated = 0;
+  std::size_t fixes_with_sd = 0;
   for (const FixError& error : errors) {
     const auto& sd = fixes[error.fix].fix->sd;
     if (!sd || !(sd->minCoeff() > 0)) continue;
-    ++stated;
+    ++fixes_with_sd;
     horizontal.add(error.horizontal_m.x() / (*sd)[0]);
     horizontal.add(error.horizontal_m.y() / (*sd)[1]);
     if (error.height_m) height.add(*error.height_m / (*sd)[2]);
     if (error.yaw_rad) yaw.add(*error.yaw_rad / (*sd)[3]);
   }
-  if (stated == 0) return std::nullopt;
-  return StatedRatio{
-      *horizontal.value(), stated,         height.value(), yaw.value(), *horizontal.within_95(),
-      height.within_95(),  yaw.within_95()};
+  if (fixes_with_sd == 0) return std::nullopt;
+  return NormalizedErrors{*horizontal.value(),     fixes_with_sd,      height.value(), yaw.value(),
+                          *horizontal.within_95(), height.within_95(), yaw.within_95()};
 }
 
-bool LimitRatio::beaten() const {
-  constexpr double sure = 3;
-  return horizontal < 1 - sure * sd;
+bool CrlbRatio::is_below_limit() const {
+  constexpr double num_sds = 3;
+  return horizontal < 1 - num_sds * sd;
 }
 
-std::optional<LimitRatio> limit_ratio(const std::vector<FixError>& errors,
-                                      const std::vector<TruthRow>& truth, const LampMap& lamps,
-                                      const Camera& camera, double noise_px, int threads) {
+std::optional<CrlbRatio> compute_crlb_ratio(const std::vector<FixError>& errors,
+                                            const std::vector<TruthRow>& truth,
+                                            const LampMap& lamps, const Camera& camera,
+                                            double noise_px, int threads) {
   const Lens lens(camera.lens_model, camera.intrinsics);
   std::vector<Eigen::Matrix2d> limits_m2(errors.size(), Eigen::Matrix2d::Zero());  // 0: no limit
-  in_parallel(errors.size(), threads, [&](std::size_t i) {
+  parallel_for(errors.size(), threads, [&](std::size_t i) {
     const TruthRow& place = truth[errors[i].truth];
     if (!place.z_m || !place.yaw_rad) return;
     const Pose pose{{place.xy_m.x(), place.xy_m.y(), *place.z_m}, *place.yaw_rad};
-    const auto budget =
-        error_budget(visible_lamps(lamps, camera, pose), lens, pose, {noise_px, 0, 0, 0});
+    const auto budget = compute_error_budget(find_visible_lamps(lamps, camera, pose), lens, pose,
+                                             {noise_px, 0, 0, 0});
     if (budget) limits_m2[i] = budget->noise.topLeftCorner<2, 2>();
   });
   double errors_m2 = 0, limit_m2 = 0, variance_m4 = 0;
@@ -83,9 +83,9 @@ std::optional<LimitRatio> limit_ratio(const std::vector<FixError>& errors,
     ++fixes;
   }
   if (fixes == 0) return std::nullopt;
-  return LimitRatio{std::sqrt(errors_m2 / limit_m2),
-                    std::sqrt(limit_m2 / static_cast<double>(fixes)), fixes,
-                    std::sqrt(variance_m4) / (2 * limit_m2)};
+  return CrlbRatio{std::sqrt(errors_m2 / limit_m2),
+                   std::sqrt(limit_m2 / static_cast<double>(fixes)), fixes,
+                   std::sqrt(variance_m4) / (2 * limit_m2)};
 }
 
 }  // namespace vlp

@@ -13,7 +13,7 @@ namespace vlp {
 
 /// Normalized errors: root mean square of error / reported standard deviation. 1 if the reported
 /// values are correct, whatever their correlations; above 1 if errors are larger than reported.
-struct StatedRatio {
+struct NormalizedErrors {
   /// Horizontal ratio and number of fixes, over the fixes whose standard deviations are all
   /// positive.
   double horizontal;  // of x and y
@@ -30,11 +30,11 @@ struct StatedRatio {
 inline constexpr double kWithin95 = 1.959964;
 /// Computes the normalized errors. Returns std::nullopt if no fix reports standard deviations. Not
 /// for errors against a path, which lack the component along it.
-std::optional<StatedRatio> stated_ratio(const std::vector<FixRow>& fixes,
-                                        const std::vector<FixError>& errors);
+std::optional<NormalizedErrors> compute_normalized_errors(const std::vector<FixRow>& fixes,
+                                                          const std::vector<FixError>& errors);
 
 /// Errors in units of the theoretical limit (Cramer-Rao lower bound).
-struct LimitRatio {
+struct CrlbRatio {
   /// Horizontal ratio sqrt(mean |error|^2 / mean limit^2). 1 is the best that an unbiased method
   /// can reach with this noise from one image of a level camera. Other frames, a known height, or
   /// partly visible lamps are additional information and not included.
@@ -50,7 +50,7 @@ struct LimitRatio {
 
   /// Returns true if the errors are below the limit by more than three sd, by chance in 1 of 700
   /// cases. Systematic errors only increase the ratio.
-  bool beaten() const;
+  bool is_below_limit() const;
 };
 /// Computes the ratio to the limit at the true pose of each fix: ErrorBudget::noise, for a level
 /// camera and all lamps of the map that are wholly in its image.
@@ -58,8 +58,9 @@ struct LimitRatio {
 /// Returns std::nullopt if the ground truth has no height and yaw, or if two lamps are visible from
 /// no position.
 /// @pre noise_px > 0, intrinsics match the lens model, threads > 0
-std::optional<LimitRatio> limit_ratio(const std::vector<FixError>& errors,
-                                      const std::vector<TruthRow>& truth, const LampMap& lamps,
-                                      const Camera& camera, double noise_px, int threads);
+std::optional<CrlbRatio> compute_crlb_ratio(const std::vector<FixError>& errors,
+                                            const std::vector<TruthRow>& truth,
+                                            const LampMap& lamps, const Camera& camera,
+                                            double noise_px, int threads);
 
 }  // namespace vlp

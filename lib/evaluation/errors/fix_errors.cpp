@@ -13,9 +13,9 @@ namespace vlp {
 namespace {
 
 /// Finds rows of the ground truth by image; fastest for images in the order of the rows.
-class RowOfImage {
+class TruthRowFinder {
  public:
-  explicit RowOfImage(const std::vector<TruthRow>& truth) : truth_(truth) {}
+  explicit TruthRowFinder(const std::vector<TruthRow>& truth) : truth_(truth) {}
 
   std::optional<std::size_t> operator()(const std::string& image) {
     if (next_ < truth_.size() && truth_[next_].image == image) return next_++;
@@ -35,44 +35,46 @@ class RowOfImage {
 };
 
 /// Returns the row of the ground truth for each fix.
-std::vector<std::size_t> matched(const FromFile<FixRow>& fixes, const FromFile<TruthRow>& truth) {
-  RowOfImage row_of_image(truth.rows);
+std::vector<std::size_t> match_rows(const FromFile<FixRow>& fixes,
+                                    const FromFile<TruthRow>& truth) {
+  TruthRowFinder find_row(truth.rows);
   std::vector<std::size_t> rows;
   rows.reserve(fixes.rows.size());
-  std::size_t strangers = 0;
+  std::size_t num_unmatched = 0;
   const FixRow* first = nullptr;
   for (const FixRow& fix : fixes.rows) {
-    const auto row = row_of_image(fix.image);
+    const auto row = find_row(fix.image);
     rows.push_back(row.value_or(0));
     if (row) continue;
-    ++strangers;
+    ++num_unmatched;
     if (first == nullptr) first = &fix;
   }
   if (first != nullptr) {
     throw InputError(fixes.file, first->line, "image",
                      "'" + first->image + "' is not in " + truth.file.string() +
                          ", whose first is '" + truth.rows.front().image + "'; " +
-                         std::to_string(strangers) + " of " + std::to_string(fixes.rows.size()) +
+                         std::to_string(num_unmatched) + " of " +
+                         std::to_string(fixes.rows.size()) +
                          " images are not: is it the truth of these captures?");
   }
   return rows;
 }
 
-std::vector<std::size_t> stations_in(const std::vector<TruthRow>& truth, double station_m) {
+std::vector<std::size_t> group_captures(const std::vector<TruthRow>& truth, double station_m) {
   std::vector<Eigen::Vector3d> places_m;
   places_m.reserve(truth.size());
   for (const TruthRow& row : truth) {
     places_m.emplace_back(row.xy_m.x(), row.xy_m.y(), row.z_m.value_or(0));
   }
-  return stations_of(places_m, station_m);
+  return assign_reference_points(places_m, station_m);
 }
 
 }  // namespace
 
 FixErrors errors_against_truth(const FromFile<FixRow>& fixes, const FromFile<TruthRow>& truth,
                                double station_m) {
-  const std::vector<std::size_t> row_of_fix = matched(fixes, truth);
-  const std::vector<std::size_t> stations = stations_in(truth.rows, station_m);
+  const std::vector<std::size_t> truth_rows = match_rows(fixes, truth);
+  const std::vector<std::size_t> stations = group_captures(truth.rows, station_m);
   FixErrors result;
   result.captures = truth.rows.size();
   result.errors.reserve(fixes.rows.size());
@@ -82,16 +84,16 @@ FixErrors errors_against_truth(const FromFile<FixRow>& fixes, const FromFile<Tru
       ++result.missing[row.status];
       continue;
     }
-    const TruthRow& true_row = truth.rows[row_of_fix[i]];
+    const TruthRow& true_row = truth.rows[truth_rows[i]];
     const Pose& pose = row.fix->pose;
     FixError error{i,
                    pose.position_m.head<2>() - true_row.xy_m,
                    {},
                    {},
-                   stations[row_of_fix[i]],
-                   row_of_fix[i]};
+                   stations[truth_rows[i]],
+                   truth_rows[i]};
     if (true_row.z_m) error.height_m = pose.position_m.z() - *true_row.z_m;
-    if (true_row.yaw_rad) error.yaw_rad = wrapped_rad(pose.yaw_rad - *true_row.yaw_rad);
+    if (true_row.yaw_rad) error.yaw_rad = wrap_rad(pose.yaw_rad - *true_row.yaw_rad);
     result.errors.push_back(error);
   }
   if (truth.rows.size() > fixes.rows.size()) {
@@ -109,13 +111,13 @@ FixErrors errors_against_path(const std::vector<FixRow>& fixes, const Path& path
       continue;
     }
     const Eigen::Vector3d& place_m = fixes[i].fix->pose.position_m;
-    const NearestOnPath nearest = nearest_on(path, place_m.head<2>());
+    const NearestOnPath nearest = find_nearest_on_path(path, place_m.head<2>());
     FixError error{i, place_m.head<2>() - nearest.xy_m, {}, {}, 0};
     if (nearest.z_m) error.height_m = place_m.z() - *nearest.z_m;
     result.errors.push_back(error);
   }
   const std::size_t count = result.errors.size(), runs = std::min(count, kPathRuns);
-  for (std::size_t i = 0; i < count; ++i) result.errors[i].unit = i * runs / count;
+  for (std::size_t i = 0; i < count; ++i) result.errors[i].cluster = i * runs / count;
   return result;
 }
 

@@ -24,7 +24,7 @@ struct FixError {
   std::optional<double> height_m, yaw_rad;
   /// Cluster of correlated errors; errors of different clusters are assumed independent. It is a
   /// reference point, or a run of fixes along a path.
-  std::size_t unit;
+  std::size_t cluster;
   /// Index into the rows of the ground truth; 0 without one.
   std::size_t truth = 0;
 };

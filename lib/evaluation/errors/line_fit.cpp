@@ -18,7 +18,7 @@ struct Scatter {
   Eigen::Matrix2d matrix_m2 = Eigen::Matrix2d::Zero();
 };
 
-Scatter scatter_of(const std::vector<FixRow>& fixes) {
+Scatter compute_scatter(const std::vector<FixRow>& fixes) {
   Scatter scatter;
   for (const FixRow& row : fixes) {
     if (!row.fix) continue;
@@ -42,7 +42,7 @@ double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
 
 std::optional<LineFit> fit_line(const std::vector<FixRow>& fixes,
                                 const CommandedLine& commanded_m) {
-  const Scatter scatter = scatter_of(fixes);
+  const Scatter scatter = compute_scatter(fixes);
   if (scatter.count < 2) return std::nullopt;
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes;
   axes.computeDirect(scatter.matrix_m2);
@@ -67,11 +67,11 @@ std::optional<LineFit> fit_line(const std::vector<FixRow>& fixes,
   for (int i = 0; i < kLineSamples; ++i) {
     const Eigen::Vector2d point_m =
         line_m[0] + i / double{kLineSamples - 1} * (line_m[1] - line_m[0]);
-    distances_m.push_back((point_m - nearest_on(path, point_m).xy_m).norm());
+    distances_m.push_back((point_m - find_nearest_on_path(path, point_m).xy_m).norm());
   }
   return LineFit{line_m, std::atan2(cross(commanded, direction), commanded.dot(direction)),
-                 std::sqrt(across_m2 / static_cast<double>(scatter.count)), figures_of(distances_m),
-                 distribution_of(distances_m)};
+                 std::sqrt(across_m2 / static_cast<double>(scatter.count)),
+                 compute_error_statistics(distances_m), compute_distribution(distances_m)};
 }
 
 }  // namespace vlp

@@ -26,7 +26,7 @@ struct LineFit {
   /// RMS distance of the fixes from the fitted line: the jitter that the fit averages out.
   double jitter_m;
   /// Distances from the commanded line, for kLineSamples points along the fitted line.
-  ErrorFigures distances_m;
+  ErrorStatistics distances_m;
   std::vector<std::pair<double, double>> distribution_m;
 };
 

@@ -48,11 +48,11 @@ class Histogram {
 };
 
 template <typename Level>
-Histogram sample_of(const ImageView& image) {
-  constexpr double enough = 8000;
+Histogram sample_histogram(const ImageView& image) {
+  constexpr double sufficient_count = 8000;
   const double pixels = static_cast<double>(image.height) * image.width;
   // An odd step that shifts from row to row samples all rows and columns of a periodic pattern.
-  const int step = static_cast<int>(std::sqrt(pixels / enough)) | 1;
+  const int step = static_cast<int>(std::sqrt(pixels / sufficient_count)) | 1;
   Histogram sample(std::numeric_limits<Level>::max() + 1);
   for (int row = std::min(step / 2, image.height / 2); row < image.height; row += step) {
     const auto* line = image.row<Level>(row);
@@ -66,14 +66,14 @@ Histogram sample_of(const ImageView& image) {
 
 /// Returns the smallest difference between two levels: above 1 for images of 12 bits in 16, or of 8
 /// in 16. Returns 1 if few levels occur, which do not determine it.
-double step_of(const Histogram& sample) {
-  constexpr int enough = 16;
+double find_level_step(const Histogram& sample) {
+  constexpr int sufficient_count = 16;
   int step = std::numeric_limits<int>::max(), levels = 0, before = 0;
   sample.for_each([&](int level, int) {
     if (levels++ > 0) step = std::min(step, level - before);
     before = level;
   });
-  return levels >= enough ? step : 1;
+  return levels >= sufficient_count ? step : 1;
 }
 
 /// Returns true if noise below the median is clipped at the smallest level. The median is then the
@@ -83,9 +83,9 @@ double step_of(const Histogram& sample) {
 bool clipped(const Histogram& sample, int median, double step) {
   const int tenth = sample.level_at(static_cast<int>(std::int64_t{sample.count()} * 9 / 10));
   const double next = median + std::max(step, (tenth - median) / 2.0);
-  const double most = std::numeric_limits<int>::max();
+  const double max_level = std::numeric_limits<int>::max();
   const int below = sample.count_within(0, median - 1);
-  const int above = sample.count_within(median + 1, most);
+  const int above = sample.count_within(median + 1, max_level);
   const int near = sample.count_within(median + 1, next);
   return 4 * below < above && 10 * near >= above;
 }
@@ -102,7 +102,7 @@ double noise_above(const Histogram& sample, int median) {
 }
 
 Background background(const Histogram& sample) {
-  const double step = step_of(sample);
+  const double step = find_level_step(sample);
   const int half = sample.count() / 2, median = sample.level_at(half);
   // Lit pixels are above the median; the pixels below contain only noise.
   double squares = 0;
@@ -126,15 +126,15 @@ Background background(const Histogram& sample) {
   const double level = median + sum / near;
   if (!no_noise_below) noise = std::sqrt(sum_of_squares / near - std::pow(sum / near, 2));
   noise = std::max(noise, min_noise);
-  constexpr double clear = 4.5, least = 1.6;
-  return {level, noise, level + std::max(clear * noise, least * step)};
+  constexpr double clear = 4.5, min_steps = 1.6;
+  return {level, noise, level + std::max(clear * noise, min_steps * step)};
 }
 
 }  // namespace
 
-Background background_of(const ImageView& image) {
+Background estimate_background(const ImageView& image) {
   return background(
-      visit_levels(image, [&](auto level) { return sample_of<decltype(level)>(image); }));
+      visit_levels(image, [&](auto level) { return sample_histogram<decltype(level)>(image); }));
 }
 
 }  // namespace vlp

@@ -19,6 +19,6 @@ struct Background {
 };
 
 /// Estimates dark level, noise and threshold of an image. @pre The image is not empty.
-Background background_of(const ImageView& image);
+Background estimate_background(const ImageView& image);
 
 }  // namespace vlp

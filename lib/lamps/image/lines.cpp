@@ -44,10 +44,10 @@ PixelBox grown(const PixelBox& tiles, int by) {
 /// of the group.
 template <typename Level>
 void fill_around(const TileMask& lit, Level level, const Pixels<Level>& pixels) {
-  for (const PixelBox& tiles : group_boxes(lit)) {
+  for (const PixelBox& tiles : find_group_boxes(lit)) {
     const int size = std::max(tiles.width, tiles.height);
     if (size == 1) continue;  // the tiles around it are transposed
-    const PixelBox box = pixels_of_tiles(grown(tiles, size), {pixels.width, pixels.height});
+    const PixelBox box = to_pixel_box(grown(tiles, size), {pixels.width, pixels.height});
     for (int y = box.y; y < box.bottom(); ++y) std::fill_n(pixels.row(y) + box.x, box.width, level);
   }
 }
@@ -66,28 +66,29 @@ void transpose(const ImageView& image, const PixelBox& box, const Pixels<Level>&
 }
 
 template <typename Level>
-void fill_lines(const ImageView& image, const TileMask& lit, double dark, Lines& lines) {
+void fill_lines(const ImageView& image, const TileMask& lit, double dark, ScanlineImage& lines) {
   const Pixels<Level> pixels{static_cast<Level*>(lines.memory.get()), image.height, image.width};
   fill_around(lines.lit, static_cast<Level>(std::lround(dark)), pixels);
-  const TileMask turned = dilated(lit);
+  const TileMask turned = dilate(lit);
   for (int row = 0; row < turned.rows; ++row) {
     for (int column = 0; column < turned.columns; ++column) {
       if (turned.row(row)[column] == 0) continue;
-      transpose(image, pixels_of_tiles({column, row, 1, 1}, image.size()), pixels);
+      transpose(image, to_pixel_box({column, row, 1, 1}, image.size()), pixels);
     }
   }
 }
 
 }  // namespace
 
-Lines lines_of(const ImageView& image, Readout readout, const Background& background) {
-  TileMask lit = lit_tiles(image, background.threshold);
+ScanlineImage make_scanline_image(const ImageView& image, Readout readout,
+                                  const Background& background) {
+  TileMask lit = find_lit_tiles(image, background.threshold);
   if (readout == Readout::rows) return {image, std::move(lit), {}};
-  Lines lines;
+  ScanlineImage lines;
   lines.memory = black_pixels({image.height, image.width}, image.bits);
   lines.pixels = {lines.memory.get(), image.height, image.width,
                   std::ptrdiff_t(image.height) * (image.bits / 8), image.bits};
-  lines.lit = transposed(lit);
+  lines.lit = transpose_mask(lit);
   visit_levels(
       image, [&](auto level) { fill_lines<decltype(level)>(image, lit, background.level, lines); });
   return lines;

@@ -12,9 +12,9 @@
 namespace vlp {
 
 /// Image whose rows are the scanlines, that is the rows or columns that the shutter reads.
-struct Lines {
+struct ScanlineImage {
   ImageView pixels;
-  /// Tiles that may contain runs, see lit_tiles().
+  /// Tiles that may contain runs, see find_lit_tiles().
   TileMask lit;
   /// Memory of `pixels` if it is not that of the input image.
   std::shared_ptr<void> memory;
@@ -25,6 +25,7 @@ struct Lines {
 /// in their neighbors. Transposing a large image completely takes longer than detecting its lamps.
 /// The tiles next to the transposed ones are filled with the background level. All other tiles are
 /// black; their memory is not touched.
-Lines lines_of(const ImageView& image, Readout readout, const Background& background);
+ScanlineImage make_scanline_image(const ImageView& image, Readout readout,
+                                  const Background& background);
 
 }  // namespace vlp

@@ -50,8 +50,8 @@ void search(const ImageView& image, Level threshold, TileMask& found) {
     for (int tile = 0; tile < whole; ++tile) {
       if (brightest_in(rows, tile * kTile_px, kTile_px) > threshold) marks[tile] = 1;
     }
-    const int begin = whole * kTile_px, rest = image.width - begin;
-    if (rest > 0 && brightest_in(rows, begin, rest) > threshold) marks[whole] = 1;
+    const int begin = whole * kTile_px, remaining_px = image.width - begin;
+    if (remaining_px > 0 && brightest_in(rows, begin, remaining_px) > threshold) marks[whole] = 1;
   }
 }
 
@@ -94,21 +94,21 @@ int tiles_in(int pixels) { return (pixels + kTile_px - 1) / kTile_px; }
 
 }  // namespace
 
-PixelBox pixels_of_tiles(const PixelBox& tiles, const ImageSize& size) {
+PixelBox to_pixel_box(const PixelBox& tiles, const ImageSize& size) {
   return intersection(
       {tiles.x * kTile_px, tiles.y * kTile_px, tiles.width * kTile_px, tiles.height * kTile_px},
       {0, 0, size.width, size.height});
 }
 
-TileMask lit_tiles(const ImageView& image, double threshold) {
+TileMask find_lit_tiles(const ImageView& image, double threshold) {
   TileMask found(tiles_in(image.width), tiles_in(image.height));
   if (threshold >= image.max_level()) return found;
   TileMask counts = found, lit = found;
   visit_levels(image, [&](auto type) {
     const auto level = static_cast<decltype(type)>(threshold);
     search(image, level, found);
-    for_each_set(dilated(found), [&](int column, int row) {
-      const PixelBox box = pixels_of_tiles({column, row, 1, 1}, image.size());
+    for_each_set(dilate(found), [&](int column, int row) {
+      const PixelBox box = to_pixel_box({column, row, 1, 1}, image.size());
       counts.row(row)[column] = count_above(image, box, level);
     });
   });
@@ -120,7 +120,7 @@ TileMask lit_tiles(const ImageView& image, double threshold) {
   return lit;
 }
 
-TileMask dilated(const TileMask& mask) {
+TileMask dilate(const TileMask& mask) {
   TileMask result(mask.columns, mask.rows);
   for_each_set(mask, [&](int column, int row) {
     for_each_around(mask, column, row, [&](int x, int y) { result.row(y)[x] = 1; });
@@ -128,16 +128,16 @@ TileMask dilated(const TileMask& mask) {
   return result;
 }
 
-TileMask transposed(const TileMask& mask) {
+TileMask transpose_mask(const TileMask& mask) {
   TileMask result(mask.rows, mask.columns);
   for_each_set(mask, [&](int column, int row) { result.row(column)[row] = mask.row(row)[column]; });
   return result;
 }
 
-std::vector<PixelBox> group_boxes(TileMask mask) {
+std::vector<PixelBox> find_group_boxes(TileMask mask) {
   std::vector<PixelBox> boxes;
   std::vector<std::pair<int, int>> open;
-  const auto take = [&](int x, int y) {
+  const auto visit_tile = [&](int x, int y) {
     if (mask.row(y)[x] == 0) return;
     open.emplace_back(x, y);
     mask.row(y)[x] = 0;
@@ -146,12 +146,12 @@ std::vector<PixelBox> group_boxes(TileMask mask) {
     for (int column = 0; column < mask.columns; ++column) {
       if (mask.row(row)[column] == 0) continue;
       PixelBox box{column, row, 1, 1};
-      take(column, row);
+      visit_tile(column, row);
       while (!open.empty()) {
         const auto [x, y] = open.back();
         open.pop_back();
         box = around(box, {x, y, 1, 1});
-        for_each_around(mask, x, y, take);
+        for_each_around(mask, x, y, visit_tile);
       }
       boxes.push_back(box);
     }

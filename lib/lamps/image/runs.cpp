@@ -23,9 +23,9 @@ bool any_above(const Level* pixels, int count, Level threshold) {
 
 template <typename Level>
 void add_runs_of_row(const Level* pixels, int columns, int row, Level threshold,
-                     const std::vector<int>& tiles, std::vector<Run>& runs) {
+                     const std::vector<int>& tiles, std::vector<PixelRun>& runs) {
   constexpr int max_gap = 2, min_width = 3;
-  Run run{row, 0, -1};  // empty
+  PixelRun run{row, 0, -1};  // empty
   const auto finish = [&] {
     if (run.width() >= min_width) runs.push_back(run);
     run.end = -1;
@@ -44,8 +44,9 @@ void add_runs_of_row(const Level* pixels, int columns, int row, Level threshold,
 }
 
 template <typename Level>
-std::vector<Run> runs_of(const ImageView& image, Level threshold, const TileMask& lit) {
-  std::vector<Run> runs;
+std::vector<PixelRun> find_pixel_runs_in(const ImageView& image, Level threshold,
+                                         const TileMask& lit) {
+  std::vector<PixelRun> runs;
   std::vector<int> tiles;
   for (int top = 0; top < image.height; top += kTile_px) {
     tiles.clear();
@@ -62,13 +63,13 @@ std::vector<Run> runs_of(const ImageView& image, Level threshold, const TileMask
 
 /// Blob under construction, with the columns of its last two lit rows.
 struct Growing {
-  Growing(const Run& run) : blob{{run}}, last_row(run.row), last(run), before(run) {}
+  Growing(const PixelRun& run) : blob{{run}}, last_row(run.row), last(run), before(run) {}
 
-  bool meets(const Run& run) const {
+  bool meets(const PixelRun& run) const {
     return run.begin < std::max(last.end, before.end) &&
            run.end > std::min(last.begin, before.begin);
   }
-  void add(const Run& run) {
+  void add(const PixelRun& run) {
     blob.runs.push_back(run);
     if (run.row != last_row) before = last, last = run;
     last = {run.row, std::min(last.begin, run.begin), std::max(last.end, run.end)};
@@ -83,7 +84,7 @@ struct Growing {
 
   Blob blob;
   int last_row;
-  Run last, before;
+  PixelRun last, before;
   bool alive = true;
 };
 
@@ -91,21 +92,22 @@ struct Growing {
 
 PixelBox Blob::box() const {
   int begin = runs[0].begin, end = runs[0].end;
-  for (const Run& run : runs) {
+  for (const PixelRun& run : runs) {
     begin = std::min(begin, run.begin);
     end = std::max(end, run.end);
   }
   return {begin, top(), end - begin, bottom() + 1 - top()};
 }
 
-std::vector<Run> find_runs(const ImageView& image, double threshold, const TileMask& lit) {
+std::vector<PixelRun> find_pixel_runs(const ImageView& image, double threshold,
+                                      const TileMask& lit) {
   if (threshold >= image.max_level()) return {};
   return visit_levels(image, [&](auto level) {
-    return runs_of(image, static_cast<decltype(level)>(threshold), lit);
+    return find_pixel_runs_in(image, static_cast<decltype(level)>(threshold), lit);
   });
 }
 
-std::vector<Blob> group_runs(const std::vector<Run>& runs, int max_dark_rows) {
+std::vector<Blob> group_pixel_runs(const std::vector<PixelRun>& runs, int max_dark_rows) {
   std::vector<Growing> growing;
   std::vector<Blob> done;
   const auto retire = [&](int row) {
@@ -119,7 +121,7 @@ std::vector<Blob> group_runs(const std::vector<Run>& runs, int max_dark_rows) {
       growing.pop_back();
     }
   };
-  for (const Run& run : runs) {
+  for (const PixelRun& run : runs) {
     retire(run.row);
     Growing* home = nullptr;
     for (Growing& each : growing) {
@@ -139,7 +141,7 @@ std::vector<Blob> group_runs(const std::vector<Run>& runs, int max_dark_rows) {
   for (Growing& each : growing) {
     if (each.alive) done.push_back(std::move(each.blob));
   }
-  const auto by_place = [](const Run& a, const Run& b) {
+  const auto by_place = [](const PixelRun& a, const PixelRun& b) {
     return a.row != b.row ? a.row < b.row : a.begin < b.begin;
   };
   for (Blob& blob : done) std::sort(blob.runs.begin(), blob.runs.end(), by_place);

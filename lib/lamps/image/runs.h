@@ -11,7 +11,7 @@
 namespace vlp {
 
 /// Consecutive lit pixels of a row: columns begin to end - 1.
-struct Run {
+struct PixelRun {
   int row, begin, end;
 
   int width() const { return end - begin; }
@@ -20,18 +20,19 @@ struct Run {
 /// Finds the runs of pixels above `threshold`, row by row. Gaps of up to two pixels do not end a
 /// run; runs of less than three pixels are discarded as noise. Searches the nonzero tiles of `lit`,
 /// or all tiles if `lit` is empty.
-std::vector<Run> find_runs(const ImageView& image, double threshold, const TileMask& lit = {});
+std::vector<PixelRun> find_pixel_runs(const ImageView& image, double threshold,
+                                      const TileMask& lit = {});
 
 /// Runs of one light: they overlap from row to row, across up to `max_dark_rows` dark rows. Lights
 /// that touch form one blob.
 struct Blob {
-  std::vector<Run> runs;  // ordered by row
+  std::vector<PixelRun> runs;  // ordered by row
 
   int top() const { return runs.front().row; }
   int bottom() const { return runs.back().row; }
   PixelBox box() const;
 };
 
-std::vector<Blob> group_runs(const std::vector<Run>& runs, int max_dark_rows);
+std::vector<Blob> group_pixel_runs(const std::vector<PixelRun>& runs, int max_dark_rows);
 
 }  // namespace vlp

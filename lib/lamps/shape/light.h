@@ -27,7 +27,7 @@ enum class LightReason {
   identified,       ///< a lamp, possibly cut by the image border
   overexposed,      ///< steady: contrast below kMinContrast, most pixels at full scale
   steady,           ///< steady: contrast below kMinContrast
-  too_few_periods,  ///< below kMinPeriods, or no lamp of the image has kEnoughPeriods
+  too_few_periods,  ///< below kMinPeriods, or no lamp of the image has kMinReliablePeriods
   no_clear_period,  ///< no period fits, its parts differ, or its stripes are irregular
   unknown_period,   ///< no lamp has its period, or several have
   reflection,       ///< blurrier, dimmer or smaller than another light, or its mirror image
@@ -44,7 +44,8 @@ struct Light {
   std::optional<int> lamp;
   /// Image of the center of the outline, (u, v).
   Eigen::Vector2d pixel;
-  /// Standard deviation of `pixel` per axis. Includes unknown_lens_sd_px() if the lens is unknown.
+  /// Standard deviation of `pixel` per axis. Includes compute_unknown_lens_sd_px() if the lens is
+  /// unknown.
   double sigma_px;
   /// Shape of the outline; a disc if the light has no outline.
   ShapeKind shape;
@@ -56,7 +57,7 @@ struct Light {
   /// Top left and bottom right corner of the bounding box of the outline, (u, v).
   Eigen::Vector2d low, high;
   Stripes stripes;
-  /// Result of coherence_of(), or ModulatedLight::phase_coherence if `by_modulation`. 0 if the
+  /// Result of compute_coherence(), or ModulatedLight::phase_coherence if `by_modulation`. 0 if the
   /// stripes have no period.
   double coherence;
   /// Steady lights only: fraction of the pixels in the middle that have the level of the light's
@@ -67,13 +68,13 @@ struct Light {
   /// True if the light was found by its modulation, which then also determined its stripes.
   bool by_modulation;
   /// True if the light has no outline; its center is then the centroid of the lit area.
-  bool glows;
+  bool is_glow;
   /// True if the outline may differ from the outline of the lamp: blurred, partly visible, or that
   /// of a source in a reflector, much brighter inside than next to its outline.
   bool is_doubtful;
-  /// True if the light is lit unevenly and its outline is a rim, see rim_of(). Its roundness is
+  /// True if the light is lit unevenly and its outline is a rim, see fit_rim(). Its roundness is
   /// then the fraction of the ends of its lit scanlines that show the rim.
-  bool uneven;
+  bool is_uneven;
   /// Width of the edge from 25 % to 75 % of the level, in pixels.
   double rise_px;
   /// Polygon inside the edges, (u, v); empty for discs.
@@ -99,7 +100,7 @@ inline constexpr double kMinRoundness = 0.45;
 inline bool is_disc(const Light& light) { return light.shape == ShapeKind::disc; }
 
 /// Returns true if a light is modulated: it may be a lamp of this map or of another one.
-inline bool flickers(const Light& light) {
+inline bool is_modulated(const Light& light) {
   return light.kind != LightKind::steady && light.kind != LightKind::formless;
 }
 

@@ -10,13 +10,13 @@
 namespace vlp {
 namespace {
 
-bool covers(const Light& light, const Eigen::Vector2d& pixel) {
+bool contains_point(const Light& light, const Eigen::Vector2d& pixel) {
   if (!is_disc(light)) return polygon_contains(light.face, pixel);
   return (light.pixel - pixel).norm() < light.radius_px;
 }
 
 /// Returns true if two blobs may be parts of one light.
-bool near(const PixelBox& a, const PixelBox& b) {
+bool may_belong_together(const PixelBox& a, const PixelBox& b) {
   const int gap_across = std::max(a.x, b.x) - std::min(a.x + a.width, b.x + b.width);
   const int gap_along = std::max(a.y, b.y) - std::min(a.y + a.height, b.y + b.height);
   const int size = std::max({a.width, a.height, b.width, b.height});
@@ -25,25 +25,29 @@ bool near(const PixelBox& a, const PixelBox& b) {
 
 /// Returns true if a part is not a piece of a light that an occluder splits.
 bool whole(const LightPart& part) {
-  return part.light && (part.light->glows || part.light->uneven || !is_disc(*part.light));
+  return part.light && (part.light->is_glow || part.light->is_uneven || !is_disc(*part.light));
 }
 
-std::size_t points_of(const LightPart& part) { return part.light ? part.light->outline.size() : 0; }
+std::size_t count_points(const LightPart& part) {
+  return part.light ? part.light->outline.size() : 0;
+}
 
 /// Returns true if a light consists of both parts. Two lamps side by side have more of their points
 /// on a circle each than on a common one. `points` is the number of all points.
-bool is_of_both(const Light& whole, const LightPart& a, const LightPart& b, std::size_t points) {
-  constexpr double min_share = 0.6, min_gain = 1.25, min_of_both = 0.8, max_hidden = 1.5;
+bool consists_of_both_parts(const Light& whole, const LightPart& a, const LightPart& b,
+                            std::size_t points) {
+  constexpr double min_fraction = 0.6, min_gain = 1.25, min_joined_fraction = 0.8, max_hidden = 1.5;
   const PixelBox box = around(a.box, b.box);
   if (2 * whole.radius_px > max_hidden * std::max(box.width, box.height)) return false;
   const auto on_circle = double(whole.outline.size());
-  const auto of_a = double(points_of(a)), of_b = double(points_of(b));
-  return on_circle >= min_share * double(points) && on_circle >= min_of_both * (of_a + of_b) &&
-         on_circle >= min_gain * std::max(of_a, of_b);
+  const auto count_a = double(count_points(a)), count_b = double(count_points(b));
+  return on_circle >= min_fraction * double(points) &&
+         on_circle >= min_joined_fraction * (count_a + count_b) &&
+         on_circle >= min_gain * std::max(count_a, count_b);
 }
 
 /// Returns the reason for the lack of a fitted outline.
-LightReason reason_of(const LightPart& part, const ImageSize& size) {
+LightReason find_formless_reason(const LightPart& part, const ImageSize& size) {
   const PixelBox& box = part.box;
   const bool inside =
       box.x > 0 && box.y > 0 && box.right() < size.width && box.bottom() < size.height;
@@ -53,11 +57,11 @@ LightReason reason_of(const LightPart& part, const ImageSize& size) {
   return small ? LightReason::incomplete : LightReason::wrong_shape;
 }
 
-bool overlap(const Light& a, const Light& b) {
+bool do_overlap(const Light& a, const Light& b) {
   if (is_disc(a) && is_disc(b)) {
     return (a.pixel - b.pixel).norm() < std::max(a.radius_px, b.radius_px);
   }
-  return covers(a, b.pixel) || covers(b, a.pixel);
+  return contains_point(a, b.pixel) || contains_point(b, a.pixel);
 }
 
 /// Removes lights that overlap one with more outline points, because they are pieces of it.
@@ -68,7 +72,7 @@ std::vector<Light> without_pieces(std::vector<Light> found) {
   std::vector<Light> lights;
   for (Light& light : found) {
     const bool piece = std::any_of(lights.begin(), lights.end(),
-                                   [&](const Light& other) { return overlap(light, other); });
+                                   [&](const Light& other) { return do_overlap(light, other); });
     if (!piece) lights.push_back(std::move(light));
   }
   return lights;
@@ -76,21 +80,25 @@ std::vector<Light> without_pieces(std::vector<Light> found) {
 
 }  // namespace
 
-std::vector<Light> join(std::vector<LightPart>& parts, const LightShape& shape,
-                        const Background& background) {
+std::vector<Light> join_parts(std::vector<LightPart>& parts, const LightShape& shape,
+                              const Background& background) {
   // A lamp has few pieces; an image with thousands of pieces contains other objects.
   constexpr int max_tries = 2000;
   int tries = 0;
   for (std::size_t i = 0; i < parts.size() && tries < max_tries; ++i) {
     for (std::size_t j = i + 1; j < parts.size() && tries < max_tries; ++j) {
-      if (whole(parts[i]) || whole(parts[j]) || !near(parts[i].box, parts[j].box)) continue;
+      if (whole(parts[i]) || whole(parts[j]) || !may_belong_together(parts[i].box, parts[j].box))
+        continue;
       ++tries;
-      std::vector<EdgePoint> both = parts[i].outline;
-      both.insert(both.end(), parts[j].outline.begin(), parts[j].outline.end());
-      both = outermost(std::move(both));
-      auto one = shape.light_of(both, background);
-      if (!one || !is_of_both(*one, parts[i], parts[j], both.size())) continue;
-      parts[i] = {std::move(one), std::move(both), around(parts[i].box, parts[j].box)};
+      std::vector<EdgePoint> joined_outline = parts[i].outline;
+      joined_outline.insert(joined_outline.end(), parts[j].outline.begin(), parts[j].outline.end());
+      joined_outline = select_outermost(std::move(joined_outline));
+      auto joined_light = shape.fit_light(joined_outline, background);
+      if (!joined_light ||
+          !consists_of_both_parts(*joined_light, parts[i], parts[j], joined_outline.size()))
+        continue;
+      parts[i] = {std::move(joined_light), std::move(joined_outline),
+                  around(parts[i].box, parts[j].box)};
       parts.erase(parts.begin() + std::ptrdiff_t(j));
       j = i;  // the joined part may have further pieces
     }
@@ -103,8 +111,9 @@ std::vector<Light> join(std::vector<LightPart>& parts, const LightShape& shape,
   return without_pieces(std::move(found));
 }
 
-std::vector<Light> formless_lights(std::vector<LightPart> parts, const std::vector<Light>& lights,
-                                   const LightShape& shape, const ImageSize& size) {
+std::vector<Light> make_formless_lights(std::vector<LightPart> parts,
+                                        const std::vector<Light>& lights, const LightShape& shape,
+                                        const ImageSize& size) {
   constexpr int min_px = 5;
   std::vector<Light> formless;
   for (LightPart& part : parts) {
@@ -112,13 +121,14 @@ std::vector<Light> formless_lights(std::vector<LightPart> parts, const std::vect
     if (std::min(box.width, box.height) < min_px) continue;
     Light light{};
     light.kind = LightKind::formless;
-    light.reason = reason_of(part, size);
+    light.reason = find_formless_reason(part, size);
     light.low = shape.turned({box.x - 0.5, box.y - 0.5});
     light.high = shape.turned({box.right() - 0.5, box.bottom() - 0.5});
     light.pixel = (light.low + light.high) / 2;
     light.radius_px = (light.high - light.low).mean() / 2;
-    const bool inside = std::any_of(lights.begin(), lights.end(),
-                                    [&](const Light& other) { return covers(other, light.pixel); });
+    const bool inside = std::any_of(lights.begin(), lights.end(), [&](const Light& other) {
+      return contains_point(other, light.pixel);
+    });
     if (inside) continue;
     light.outline = std::move(part.outline);
     formless.push_back(std::move(light));

@@ -19,13 +19,13 @@ namespace vlp {
 namespace {
 
 /// Returns the diagonal of the bounding box of the points.
-double extent(const std::vector<Eigen::Vector2d>& points) {
+double compute_extent(const std::vector<Eigen::Vector2d>& points) {
   Eigen::AlignedBox2d box;
   for (const Eigen::Vector2d& point : points) box.extend(point);
   return box.diagonal().norm();
 }
 
-double median_rise_px(const std::vector<EdgePoint>& outline) {
+double compute_median_rise_px(const std::vector<EdgePoint>& outline) {
   std::vector<double> rises;
   rises.reserve(outline.size());
   for (const EdgePoint& edge : outline) rises.push_back(edge.rise_px);
@@ -34,8 +34,8 @@ double median_rise_px(const std::vector<EdgePoint>& outline) {
 
 /// Selects the points on the circle, without those next to an outlier: where the edge of an
 /// occluder meets the outline, both are blurred.
-std::vector<bool> on_circle(const std::vector<EdgePoint>& outline,
-                            const std::vector<bool>& inliers) {
+std::vector<bool> select_points_on_circle(const std::vector<EdgePoint>& outline,
+                                          const std::vector<bool>& inliers) {
   constexpr double reach_px = 4;
   std::vector<Eigen::Vector2d> others;
   for (std::size_t i = 0; i < outline.size(); ++i) {
@@ -54,7 +54,7 @@ std::vector<bool> on_circle(const std::vector<EdgePoint>& outline,
 }
 
 /// Returns the axis ratio of an ellipse.
-double slenderness(const Matrix2& rim_from_circle) {
+double compute_axis_ratio(const Matrix2& rim_from_circle) {
   const double half_square = rim_from_circle.squaredNorm() / 2;
   const double area = std::abs(rim_from_circle.determinant());
   const double difference = std::sqrt(std::max(0.0, half_square * half_square - area * area));
@@ -65,9 +65,9 @@ double slenderness(const Matrix2& rim_from_circle) {
 /// neighboring points, including their own squares, divided by the sum of squares. For independent
 /// errors the fit, which removes three degrees of freedom, causes products of -3 / n of the mean
 /// square; this is corrected.
-double points_together(const std::vector<Eigen::Vector2d>& points,
-                       const std::vector<EdgePoint>& outline, const std::vector<bool>& counted,
-                       const RobustEllipse& fit) {
+double estimate_correlated_points(const std::vector<Eigen::Vector2d>& points,
+                                  const std::vector<EdgePoint>& outline,
+                                  const std::vector<bool>& counted, const RobustEllipse& fit) {
   constexpr double neighbours_px = 4, unknowns = 3;
   const Matrix2 circle_from_rim = fit.rim_from_circle.inverse();
   std::vector<double> errors(points.size(), 0);
@@ -90,7 +90,7 @@ double points_together(const std::vector<Eigen::Vector2d>& points,
 }
 
 /// Converts a circle fit to an ellipse fit.
-RobustEllipse as_ellipse(RobustCircle fit) {
+RobustEllipse to_ellipse(RobustCircle fit) {
   return {fit.circle.center, fit.circle.radius * Matrix2::Identity(), fit.center_covariance,
           std::move(fit.inliers), fit.count};
 }
@@ -106,7 +106,7 @@ std::vector<Eigen::Vector2d> LightShape::turned(std::vector<Eigen::Vector2d> poi
   return points;
 }
 
-std::optional<Eigen::Vector2d> LightShape::plane_of(const Eigen::Vector2d& pixel) const {
+std::optional<Eigen::Vector2d> LightShape::pixel_to_plane(const Eigen::Vector2d& pixel) const {
   if (!camera_.lens) return pixel;
   const auto ray = camera_.lens->unproject(pixel);
   if (!ray) return std::nullopt;
@@ -115,17 +115,17 @@ std::optional<Eigen::Vector2d> LightShape::plane_of(const Eigen::Vector2d& pixel
   return level.head<2>() / level.z();
 }
 
-std::optional<Eigen::Vector2d> LightShape::pixel_of(const Eigen::Vector2d& plane) const {
+std::optional<Eigen::Vector2d> LightShape::plane_to_pixel(const Eigen::Vector2d& plane) const {
   if (!camera_.lens) return plane;
   return camera_.lens->project(camera_.level_from_camera.transpose() * plane.homogeneous());
 }
 
-std::optional<Light> LightShape::light_of(std::vector<EdgePoint> outline,
-                                          const Background& background, bool mottled) const {
+std::optional<Light> LightShape::fit_light(std::vector<EdgePoint> outline,
+                                           const Background& background, bool is_mottled) const {
   std::vector<Eigen::Vector2d> points, pixels;
   double brightest = 0;
   std::erase_if(outline, [&](const EdgePoint& edge) {
-    const auto plane = plane_of(turned(edge.pixel));
+    const auto plane = pixel_to_plane(turned(edge.pixel));
     if (plane) {
       points.push_back(*plane);
       pixels.push_back(edge.pixel);
@@ -137,19 +137,19 @@ std::optional<Light> LightShape::light_of(std::vector<EdgePoint> outline,
   std::vector<double> weights;
   weights.reserve(outline.size());
   for (const EdgePoint& edge : outline) weights.push_back(std::pow(edge.level / brightest, 2));
-  const double per_px = extent(points) / extent(pixels);
+  const double per_px = compute_extent(points) / compute_extent(pixels);
   if (!(per_px > 0)) return std::nullopt;
   // The half-level position is accurate to about half a pixel; noise and a soft edge increase its
   // error.
   const double tolerance_px =
-      std::max({0.35, 8 * background.noise / brightest, 0.4 * median_rise_px(outline)});
+      std::max({0.35, 8 * background.noise / brightest, 0.4 * compute_median_rise_px(outline)});
   const double tolerance = tolerance_px * per_px;
   std::optional<RobustEllipse> fit;
   std::optional<Circle> circle;
   if (camera_.lens) {
     if (auto found = fit_robust_circle(points, weights, tolerance)) {
       circle = found->circle;
-      fit = as_ellipse(std::move(*found));
+      fit = to_ellipse(std::move(*found));
     }
   } else {
     constexpr double nearly_round = 3;
@@ -159,17 +159,17 @@ std::optional<Light> LightShape::light_of(std::vector<EdgePoint> outline,
     }
   }
   if (!fit || fit->count < static_cast<int>(kMinOutlinePoints)) return std::nullopt;
-  if (!camera_.lens && slenderness(fit->rim_from_circle) > camera_.max_axis_ratio)
+  if (!camera_.lens && compute_axis_ratio(fit->rim_from_circle) > camera_.max_axis_ratio)
     return std::nullopt;
 
   Light light{};
-  const auto pixel = pixel_of(fit->center);
+  const auto pixel = plane_to_pixel(fit->center);
   if (!pixel) return std::nullopt;
   light.pixel = light.low = light.high = *pixel;
   for (int i = 0; i < 16; ++i) {
     const double angle = std::numbers::pi / 8 * i;
     const Eigen::Vector2d direction(std::cos(angle), std::sin(angle));
-    const auto rim = pixel_of(fit->center + fit->rim_from_circle * direction);
+    const auto rim = plane_to_pixel(fit->center + fit->rim_from_circle * direction);
     if (!rim) return std::nullopt;
     light.low = light.low.cwiseMin(*rim);
     light.high = light.high.cwiseMax(*rim);
@@ -177,37 +177,39 @@ std::optional<Light> LightShape::light_of(std::vector<EdgePoint> outline,
   light.plane_center = fit->center;
   light.unit_from_plane = fit->rim_from_circle.inverse();
   light.radius_px = std::sqrt(fit->rim_from_circle.determinant()) / per_px;
-  const std::vector<bool> shown = on_circle(outline, fit->inliers);
-  const double together = mottled ? points_together(points, outline, shown, *fit) : 1;
-  const double sigma_px = std::sqrt(together * fit->center_covariance.trace() / 2) / per_px;
+  const std::vector<bool> selected = select_points_on_circle(outline, fit->inliers);
+  const double num_correlated =
+      is_mottled ? estimate_correlated_points(points, outline, selected, *fit) : 1;
+  const double sigma_px = std::sqrt(num_correlated * fit->center_covariance.trace() / 2) / per_px;
   if (!(sigma_px <= kMaxSigma_px)) return std::nullopt;
   light.sigma_px = std::max(kMinSigma_px, sigma_px);
   light.roundness = double(fit->count) / double(outline.size());
   for (std::size_t i = 0; i < outline.size(); ++i) {
-    if (shown[i]) light.outline.push_back(outline[i]);
+    if (selected[i]) light.outline.push_back(outline[i]);
   }
-  if (circle) light.sums = {points, weights, shown, *circle, line_slope_at(*circle), together};
-  light.rise_px = median_rise_px(light.outline);
+  if (circle)
+    light.sums = {points, weights, selected, *circle, compute_line_slope(*circle), num_correlated};
+  light.rise_px = compute_median_rise_px(light.outline);
   return light;
 }
 
-Eigen::Vector2d LightShape::line_slope_at(const Circle& circle) const {
+Eigen::Vector2d LightShape::compute_line_slope(const Circle& circle) const {
   const auto line = [&](double x, double y) {
-    const auto pixel = pixel_of(circle.center + circle.radius / 2 * Eigen::Vector2d(x, y));
+    const auto pixel = plane_to_pixel(circle.center + circle.radius / 2 * Eigen::Vector2d(x, y));
     return pixel ? turned(*pixel).y() : std::numeric_limits<double>::quiet_NaN();
   };
   return Eigen::Vector2d(line(1, 0) - line(-1, 0), line(0, 1) - line(0, -1)) / circle.radius;
 }
 
-Eigen::Vector2d LightShape::read_off(const Circle& circle,
-                                     const Eigen::Vector2d& motion_per_line) const {
+Eigen::Vector2d LightShape::compute_readout_offset(const Circle& circle,
+                                                   const Eigen::Vector2d& motion_per_line) const {
   constexpr int directions = 16;
-  const auto center = pixel_of(circle.center);
+  const auto center = plane_to_pixel(circle.center);
   Eigen::Vector2d off = Eigen::Vector2d::Zero();
   for (int i = 0; i < directions; ++i) {
     const double angle = 2 * std::numbers::pi / directions * i;
     const Eigen::Vector2d direction(std::cos(angle), std::sin(angle));
-    const auto rim = pixel_of(circle.center + circle.radius * direction);
+    const auto rim = plane_to_pixel(circle.center + circle.radius * direction);
     if (!center || !rim) return Eigen::Vector2d::Zero();
     const double later = turned(*rim).y() - turned(*center).y();
     off += 2.0 / directions * motion_per_line.dot(direction) * later * direction;
@@ -215,13 +217,13 @@ Eigen::Vector2d LightShape::read_off(const Circle& circle,
   return off;
 }
 
-void LightShape::shift(const Oval& oval, const Eigen::Vector2d& motion_per_line,
-                       Light& light) const {
-  const auto estimate = light.sums.solved(oval);
+void LightShape::apply_shear(const Oval& oval, const Eigen::Vector2d& motion_per_line,
+                             Light& light) const {
+  const auto estimate = light.sums.solve_with_prior(oval);
   if (!estimate) return;
   const Circle& circle = light.sums.circle();
-  const auto pixel = pixel_of(circle.center + circle.radius * estimate->p.head<2>() -
-                              read_off(circle, motion_per_line));
+  const auto pixel = plane_to_pixel(circle.center + circle.radius * estimate->p.head<2>() -
+                                    compute_readout_offset(circle, motion_per_line));
   if (!pixel) return;
   light.pixel = *pixel;
   const double sigma_px =

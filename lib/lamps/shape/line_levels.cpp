@@ -19,7 +19,7 @@ struct ChordSums {
 };
 
 template <typename Level>
-ChordSums sums_of(const Level* pixels, const Run& chord, double dark) {
+ChordSums sum_chord(const Level* pixels, const PixelRun& chord, double dark) {
   const double count = chord.width(), middle = (chord.begin + chord.end - 1) / 2.0;
   double sum = 0, moment = 0;
   for (int column = chord.begin; column < chord.end; ++column) {
@@ -31,16 +31,16 @@ ChordSums sums_of(const Level* pixels, const Run& chord, double dark) {
 
 }  // namespace
 
-LineLevels::LineLevels(const ImageView& lines, const std::vector<Run>& chords,
+LineLevels::LineLevels(const ImageView& lines, const std::vector<PixelRun>& chords,
                        const Background& background)
     : first_(chords.front().row) {
   constexpr double unevenness = 0.005, steepest = 0.01;
   std::vector<ChordSums> sums;
   sums.reserve(chords.size());
   double moment = 0, spread = 0;
-  for (const Run& chord : chords) {
+  for (const PixelRun& chord : chords) {
     sums.push_back(visit_levels(lines, [&](auto level) {
-      return sums_of(lines.row<decltype(level)>(chord.row), chord, background.level);
+      return sum_chord(lines.row<decltype(level)>(chord.row), chord, background.level);
     }));
     middle_ += sums.back().middle / double(chords.size());
     moment += sums.back().moment;
@@ -50,7 +50,7 @@ LineLevels::LineLevels(const ImageView& lines, const std::vector<Run>& chords,
   std::vector<double> signal;
   signal.reserve(sums.size());
   for (const ChordSums& line : sums) {
-    signal.push_back(std::max(0.0, line.mean / share_at(line.middle)));
+    signal.push_back(std::max(0.0, line.mean / relative_level_at(line.middle)));
     brightest_ = std::max(brightest_, signal.back());
   }
   if (!(brightest_ > 0)) brightest_ = 1;
@@ -60,17 +60,18 @@ LineLevels::LineLevels(const ImageView& lines, const std::vector<Run>& chords,
     const double level = signal[i] / brightest_;
     measured_.push_back({level, std::hypot(noise, unevenness * level)});
   }
-  const Stripes stripes = stripes_of(signal);
+  const Stripes stripes = measure_stripes(signal);
   if (!(stripes.contrast >= kMinContrast)) return;
   period_lines_ = stripes.period_lines;
-  period_sd_ = period_sd(period_lines_, double(signal.size()) / kUsedHeight, 0) * period_lines_;
+  period_sd_ =
+      predict_period_sd(period_lines_, double(signal.size()) / kUsedHeight, 0) * period_lines_;
 }
 
 std::optional<LineLevel> LineLevels::at(int line) const {
   const int last = first_ + static_cast<int>(measured_.size()) - 1;
   if (line >= first_ && line <= last) return measured_[static_cast<std::size_t>(line - first_)];
   if (period_lines_ > 0) {
-    const LineLevel level = predicted(line);
+    const LineLevel level = predict(line);
     return level.sd < 1 ? std::optional(level) : std::nullopt;
   }
   constexpr int nearest = 6;
@@ -82,15 +83,15 @@ std::optional<LineLevel> LineLevels::at(int line) const {
   return LineLevel{sum / nearest, steady_sd};
 }
 
-LineLevel LineLevels::predicted(int line) const {
-  constexpr int most = 4;
+LineLevel LineLevels::predict(int line) const {
+  constexpr int max_periods = 4;
   constexpr double lamp_sd = 0.01, alone_sd = 0.05;  // repeatability of the stripes of a lamp
   constexpr double missed = 1.5;  // interpolation error between two lines at the edge of a stripe
   const int last = first_ + static_cast<int>(measured_.size()) - 1;
   const int sign = line < first_ ? 1 : -1;
   double sum = 0, squares = 0, variance = 0;
   int count = 0;
-  for (int k = 1; count < most; ++k) {
+  for (int k = 1; count < max_periods; ++k) {
     const double at = line + sign * k * period_lines_;
     const int before = static_cast<int>(std::floor(at));
     if (sign > 0 ? before + 2 > last : before - 1 < first_) break;
@@ -98,10 +99,10 @@ LineLevel LineLevels::predicted(int line) const {
     const auto level = [&](int i) {
       return measured_[static_cast<std::size_t>(before + i - first_)].level;
     };
-    const double share = at - before, value = level(0) + share * (level(1) - level(0));
-    const double bend = std::abs(level(-1) - level(0) - level(1) + level(2)) / 2;
+    const double fraction = at - before, value = level(0) + fraction * (level(1) - level(0));
+    const double curvature = std::abs(level(-1) - level(0) - level(1) + level(2)) / 2;
     const double slope = level(1) - level(0);
-    variance += std::pow(missed * share * (1 - share) * bend, 2) +
+    variance += std::pow(missed * fraction * (1 - fraction) * curvature, 2) +
                 std::pow(slope * k * period_sd_, 2) +
                 std::pow(measured_[static_cast<std::size_t>(before - first_)].sd, 2);
     sum += value;

@@ -26,7 +26,8 @@ struct LineLevel {
 class LineLevels {
  public:
   /// @pre `chords` are those of at least eight consecutive lines.
-  LineLevels(const ImageView& lines, const std::vector<Run>& chords, const Background& background);
+  LineLevels(const ImageView& lines, const std::vector<PixelRun>& chords,
+             const Background& background);
 
   /// Returns the brightest level above the dark level, in grey levels.
   double brightest() const { return brightest_; }
@@ -34,10 +35,12 @@ class LineLevels {
   /// Returns the period of the stripes; 0 for steady light.
   double period_lines() const { return period_lines_; }
   /// Returns the ratio of the level at a column to that at the middle column.
-  double share_at(double column) const { return std::max(0.1, 1 + slope_ * (column - middle_)); }
+  double relative_level_at(double column) const {
+    return std::max(0.1, 1 + slope_ * (column - middle_));
+  }
 
  private:
-  LineLevel predicted(int line) const;
+  LineLevel predict(int line) const;
 
   int first_;
   double brightest_ = 0, middle_ = 0, slope_ = 0;

@@ -42,8 +42,9 @@ struct MEstimateStep {
 /// tolerances, and at least a tenth of the tolerance. Returns std::nullopt if less than N + 2
 /// points remain, or if they do not determine the curve.
 template <int N, typename Distance>
-std::optional<MEstimateStep<N>> m_estimate_step(std::span<const double> weights, double tolerance,
-                                                const Distance& distance) {
+std::optional<MEstimateStep<N>> compute_m_estimate_step(std::span<const double> weights,
+                                                        double tolerance,
+                                                        const Distance& distance) {
   constexpr int min_points = N + 2;
   std::vector<CurveDistance<N>> distances;
   std::vector<double> sizes;
@@ -65,14 +66,14 @@ std::optional<MEstimateStep<N>> m_estimate_step(std::span<const double> weights,
   double sum = 0, squares = 0, all = 0, psi_squares = 0, slopes = 0;
   for (std::size_t i = 0; i < weights.size(); ++i) {
     const auto& [error, slope] = distances[i];
-    const double share = error / cut;
-    result.inliers[i] = std::abs(share) < 1;
+    const double relative_error = error / cut;
+    result.inliers[i] = std::abs(relative_error) < 1;
     if (!result.inliers[i]) continue;
-    const double inside = 1 - share * share;
+    const double inside = 1 - relative_error * relative_error;
     const double weight = weights[i] * inside * inside;
     all += weights[i];
     psi_squares += weights[i] * std::pow(inside * inside * error, 2);
-    slopes += weights[i] * inside * (1 - 5 * share * share);
+    slopes += weights[i] * inside * (1 - 5 * relative_error * relative_error);
     squares += error * error;
     normal.add_row(slope, error, weight);
     sum += weight;
@@ -80,7 +81,7 @@ std::optional<MEstimateStep<N>> m_estimate_step(std::span<const double> weights,
   }
   if (result.count < min_points || !(slopes > 0)) return std::nullopt;
   const Cholesky<std::size_t(N)> factor(normal);
-  if (!factor.determines(1e-12)) return std::nullopt;
+  if (!factor.has_full_rank(1e-12)) return std::nullopt;
   const auto step = factor.solve(normal.gradient);
   std::copy(step.begin(), step.end(), result.step.begin());
   result.rms = std::sqrt(squares / result.count);

@@ -46,17 +46,17 @@ std::vector<EdgePoint> outline(const ImageView& image, const Blob& blob, double 
   constexpr int min_width = 8;
   std::vector<EdgePoint> points;
   points.reserve(2 * blob.runs.size());
-  for (const Run& run : blob.runs) {
+  for (const PixelRun& run : blob.runs) {
     if (run.width() < min_width) continue;
     const auto* row = image.row<Level>(run.row);
     add_edge(Profile<Level>{row, image.width, run.begin, 1}, run.width(), run.row, dark, points);
     add_edge(Profile<Level>{row, image.width, run.end - 1, -1}, run.width(), run.row, dark, points);
   }
   // Between the stripes of a saturated lamp, spilled charge has no outline of its own.
-  constexpr double min_share = 0.35;
+  constexpr double min_fraction = 0.35;
   double brightest = 0;
   for (const EdgePoint& point : points) brightest = std::max(brightest, point.level);
-  std::erase_if(points, [&](const EdgePoint& p) { return p.level < min_share * brightest; });
+  std::erase_if(points, [&](const EdgePoint& p) { return p.level < min_fraction * brightest; });
   return points;
 }
 
@@ -96,13 +96,13 @@ class RimEllipse {
 /// result is limited, because a slower rise may belong to the lamp itself.
 double blur_px(const std::vector<EdgePoint>& points, const RimEllipse& rim) {
   constexpr double quarters = 1.349;  // of a normal distribution, in standard deviations
-  constexpr double most = 1.5;
+  constexpr double maximum = 1.5;
   std::vector<double> blurs;
   blurs.reserve(points.size());
   for (const EdgePoint& point : points) {
     blurs.push_back(point.rise_px * std::abs(rim.normal_at(point.pixel).x()) / quarters);
   }
-  return std::min(upper_median(std::move(blurs)), most);
+  return std::min(upper_median(std::move(blurs)), maximum);
 }
 
 /// Level of the light next to the edge in a row: a line fit to a few pixels further inside, because
@@ -128,7 +128,7 @@ constexpr int kBefore = 8, kSamples = 8;
 constexpr double kVariance = (kSamples * kSamples - 1) / 12.0;
 
 template <typename Level>
-Profile<Level> profile_of(const ImageView& image, const InnerLevel& inner) {
+Profile<Level> make_profile(const ImageView& image, const InnerLevel& inner) {
   return {image.row<Level>(static_cast<int>(inner.point.pixel.y())), image.width, inner.origin,
           inner.direction()};
 }
@@ -136,7 +136,7 @@ Profile<Level> profile_of(const ImageView& image, const InnerLevel& inner) {
 template <typename Level>
 std::vector<InnerLevel> inner_levels(const ImageView& image, const std::vector<EdgePoint>& points,
                                      const RimEllipse& rim, double dark) {
-  constexpr double flattest = 0.35, depth_px = 3, max_bent = 0.35;
+  constexpr double flattest = 0.35, depth_px = 3, max_relative_change = 0.35;
   constexpr double square = kSamples * (kSamples * kSamples - 1) / 12.0;
   std::vector<InnerLevel> result;
   result.reserve(points.size());
@@ -151,7 +151,7 @@ std::vector<InnerLevel> inner_levels(const ImageView& image, const std::vector<E
     inner.origin = static_cast<int>(std::lround(point.pixel.x())) - inner.direction() * kBefore;
     inner.first = kBefore + static_cast<int>(std::lround(depth));
     inner.middle = inner.first + (kSamples - 1) / 2.0;
-    const auto profile = profile_of<Level>(image, inner);
+    const auto profile = make_profile<Level>(image, inner);
     if (!profile.has(0) || !profile.has(inner.first + kSamples)) continue;
     double sum = 0, moment = 0;
     for (int i = inner.first; i < inner.first + kSamples; ++i) {
@@ -162,7 +162,7 @@ std::vector<InnerLevel> inner_levels(const ImageView& image, const std::vector<E
     inner.slope = moment / square;
     // An occluder further inside makes the line too steep.
     const double change = std::abs(inner.slope) * (inner.middle - kBefore);
-    if (change < max_bent * inner.level) result.push_back(inner);
+    if (change < max_relative_change * inner.level) result.push_back(inner);
   }
   return result;
 }
@@ -172,7 +172,7 @@ std::vector<InnerLevel> inner_levels(const ImageView& image, const std::vector<E
 template <typename Level>
 std::optional<double> blurred_edge(const Profile<Level>& profile, double at, double width,
                                    double level, double dark) {
-  constexpr int rounds = 4;
+  constexpr int num_iterations = 4;
   constexpr double reach = 3, min_reach_px = 2, further_in_px = 1, far = 2;
   const double reach_px =
       std::max(reach * width, min_reach_px);  // four unknowns need enough pixels
@@ -180,7 +180,7 @@ std::optional<double> blurred_edge(const Profile<Level>& profile, double at, dou
   const int end = static_cast<int>(std::floor(at + reach_px + further_in_px));
   if (!profile.has(begin) || !profile.has(end)) return std::nullopt;
   double edge = at, outside = 0, inside = level, slope = 0;
-  for (int round = 0; round < rounds; ++round) {
+  for (int iteration = 0; iteration < num_iterations; ++iteration) {
     Normal<4> normal;
     for (int i = begin; i <= end; ++i) {
       const double t = i - edge, u = t / width;
@@ -188,11 +188,11 @@ std::optional<double> blurred_edge(const Profile<Level>& profile, double at, dou
       const double density = std::exp(-u * u / 2) / std::sqrt(2 * std::numbers::pi);
       const double rise = t * lit + width * density;
       const double model = outside * (1 - lit) + inside * lit + slope * rise;
-      const double by_edge = -(inside - outside) / width * density - slope * lit;
-      normal.add_row(std::array{by_edge, 1 - lit, lit, rise}, model + dark - profile(i));
+      const double d_level_d_edge = -(inside - outside) / width * density - slope * lit;
+      normal.add_row(std::array{d_level_d_edge, 1 - lit, lit, rise}, model + dark - profile(i));
     }
     const Cholesky<4> factor(normal);
-    if (!factor.determines(1e-9)) return std::nullopt;
+    if (!factor.has_full_rank(1e-9)) return std::nullopt;
     const auto step = factor.solve(normal.gradient);
     edge -= step[0], outside -= step[1], inside -= step[2], slope -= step[3];
     if (!(std::abs(edge - at) < far * width)) return std::nullopt;
@@ -205,22 +205,23 @@ std::optional<double> blurred_edge(const Profile<Level>& profile, double at, dou
 /// at its rim. It is the mean of the medians of both sides, so that a linear change across the
 /// light has no effect. Returns 0 for a light that is too small for slopes away from the middle, or
 /// if a side is hidden.
-double bend_of(const std::vector<InnerLevel>& levels, const RimEllipse& rim) {
+double estimate_curvature(const std::vector<InnerLevel>& levels, const RimEllipse& rim) {
   constexpr double min_u = 1 / 3.0;  // of w: nearer to the middle no slope shows the bend
-  constexpr double most = 0.8;
-  std::array<std::vector<double>, 2> bends;
+  constexpr double maximum = 0.8;
+  std::array<std::vector<double>, 2> curvatures;
   for (const InnerLevel& inner : levels) {
     const bool begins = inner.point.begins;
     const double width_px = rim.half_width_px(begins);
-    const double share = rim.outwards_px(inner.column(inner.middle), begins) / width_px;
-    if (share < min_u) continue;
-    bends[begins ? 0 : 1].push_back(-inner.slope * width_px / (2 * share * inner.level));
+    const double fraction = rim.outwards_px(inner.column(inner.middle), begins) / width_px;
+    if (fraction < min_u) continue;
+    curvatures[begins ? 0 : 1].push_back(-inner.slope * width_px / (2 * fraction * inner.level));
   }
-  const std::size_t fewer = std::min(bends[0].size(), bends[1].size());
-  const std::size_t more = std::max(bends[0].size(), bends[1].size());
-  if (fewer == 0 || 2 * fewer < more) return 0;
-  const double bend = (upper_median(std::move(bends[0])) + upper_median(std::move(bends[1]))) / 2;
-  return std::clamp(bend, -most, most);
+  const std::size_t min_count = std::min(curvatures[0].size(), curvatures[1].size());
+  const std::size_t max_count = std::max(curvatures[0].size(), curvatures[1].size());
+  if (min_count == 0 || 2 * min_count < max_count) return 0;
+  const double curvature =
+      (upper_median(std::move(curvatures[0])) + upper_median(std::move(curvatures[1]))) / 2;
+  return std::clamp(curvature, -maximum, maximum);
 }
 
 /// Returns true if the residuals of the curved line fits are correlated between neighboring pixels,
@@ -228,18 +229,19 @@ double bend_of(const std::vector<InnerLevel>& levels, const RimEllipse& rim) {
 /// -1/4 of the mean square, because a line was fitted. With the n = 6 degrees of freedom of 8
 /// pixels per line, its standard deviation is 1 / sqrt(n).
 template <typename Level>
-bool mottled(const ImageView& image, const std::vector<InnerLevel>& levels, const RimEllipse& rim,
-             double bend, double dark) {
-  constexpr double by_chance = -0.25, beyond_chance = 3.5, min_share = 0.003;
+bool is_mottled(const ImageView& image, const std::vector<InnerLevel>& levels,
+                const RimEllipse& rim, double curvature, double dark) {
+  constexpr double expected_correlation = -0.25, beyond_chance = 3.5, min_fraction = 0.003;
   constexpr int left = kSamples - 2;
   double squares = 0, products = 0, level_squares = 0;
   for (const InnerLevel& inner : levels) {
-    const auto profile = profile_of<Level>(image, inner);
-    const double bent = inner.level * bend / std::pow(rim.half_width_px(inner.point.begins), 2);
+    const auto profile = make_profile<Level>(image, inner);
+    const double quadratic =
+        inner.level * curvature / std::pow(rim.half_width_px(inner.point.begins), 2);
     double before = 0;
     for (int i = inner.first; i < inner.first + kSamples; ++i) {
       const double away = i - inner.middle;
-      const double line = inner.level + inner.slope * away + bent * (away * away - kVariance);
+      const double line = inner.level + inner.slope * away + quadratic * (away * away - kVariance);
       const double off = profile(i) - dark - line;
       squares += off * off;
       products += before * off;
@@ -247,10 +249,10 @@ bool mottled(const ImageView& image, const std::vector<InnerLevel>& levels, cons
     }
     level_squares += left * inner.level * inner.level;
   }
-  const double beyond = products - by_chance * squares;
+  const double beyond = products - expected_correlation * squares;
   const double count = left * double(levels.size());
   return beyond > beyond_chance / std::sqrt(count) * squares &&
-         beyond > min_share * min_share * level_squares;
+         beyond > min_fraction * min_fraction * level_squares;
 }
 
 template <typename Level>
@@ -267,29 +269,29 @@ RefinedOutline refine(const ImageView& image, const std::vector<EdgePoint>& poin
   const double square_across = std::max(0.0, square - between_pixels);
   const auto levels = inner_levels<Level>(image, points, rim, dark);
   const bool inside_only = blur < max_blur_to_bend_px;
-  const double bend = inside_only ? bend_of(levels, rim) : 0;
-  RefinedOutline result{{}, inside_only && mottled<Level>(image, levels, rim, bend, dark)};
+  const double curvature = inside_only ? estimate_curvature(levels, rim) : 0;
+  RefinedOutline result{{}, inside_only && is_mottled<Level>(image, levels, rim, curvature, dark)};
   result.points.reserve(levels.size());
   for (const InnerLevel& inner : levels) {
     const bool begins = inner.point.begins;
     const double back = inner.middle - kBefore, width_px = rim.half_width_px(begins);
-    const double bent = bend * (back * back - kVariance) / (width_px * width_px);
-    const double level = inner.level * (1 + bent) - inner.slope * back;
+    const double quadratic = curvature * (back * back - kVariance) / (width_px * width_px);
+    const double level = inner.level * (1 + quadratic) - inner.slope * back;
     if (level <= 0) continue;
-    const auto profile = profile_of<Level>(image, inner);
+    const auto profile = make_profile<Level>(image, inner);
     const auto at = profile.crossing(dark + level / 2, 0, inner.first);
     if (!at) continue;
     // Slope of the lamp's own profile at its rim, inwards. Vignetting acts on levels that are
     // already blurred.
     const double rim_px = rim.outwards_px(inner.column(kBefore), begins);
-    const double slope = -2 * bend * inner.level * rim_px / (width_px * width_px);
+    const double slope = -2 * curvature * inner.level * rim_px / (width_px * width_px);
     // Blur moves the half-level point outwards if the level increases inwards, and inwards at a
     // curved rim. For a standard deviation s of the blur across it and a radius r of the rim, the
     // displacements are s^2 slope / level and s^2 / (2 r), to first order.
     const double cosine = inner.cosine();
     const double behind_bend = square_across / (2 * rim.radius_px(inner.normal) * cosine);
     double edge = *at + square * slope / (level * cosine * cosine) - behind_bend;
-    if (result.mottled) {
+    if (result.is_mottled) {
       const double width = std::max(std::sqrt(square_across), min_width_px) / cosine;
       const auto fitted = blurred_edge(profile, *at, width, level, dark);
       if (!fitted) continue;
@@ -305,14 +307,14 @@ RefinedOutline refine(const ImageView& image, const std::vector<EdgePoint>& poin
 
 }  // namespace
 
-RefinedOutline refined(const ImageView& image, const std::vector<EdgePoint>& points,
-                       const DiscImage& disc, const Background& background) {
+RefinedOutline refine_outline(const ImageView& image, const std::vector<EdgePoint>& points,
+                              const DiscImage& disc, const Background& background) {
   return visit_levels(image, [&](auto level) {
     return refine<decltype(level)>(image, points, disc, background.level);
   });
 }
 
-std::vector<EdgePoint> outermost(std::vector<EdgePoint> points) {
+std::vector<EdgePoint> select_outermost(std::vector<EdgePoint> points) {
   const auto further_out = [](const EdgePoint& a, const EdgePoint& b) {
     if (a.pixel.y() != b.pixel.y()) return a.pixel.y() < b.pixel.y();
     if (a.begins != b.begins) return a.begins;
@@ -326,8 +328,8 @@ std::vector<EdgePoint> outermost(std::vector<EdgePoint> points) {
   return points;
 }
 
-std::vector<EdgePoint> outline_of(const ImageView& image, const Blob& blob,
-                                  const Background& background) {
+std::vector<EdgePoint> find_outline(const ImageView& image, const Blob& blob,
+                                    const Background& background) {
   return visit_levels(
       image, [&](auto level) { return outline<decltype(level)>(image, blob, background.level); });
 }

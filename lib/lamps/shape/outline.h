@@ -34,7 +34,7 @@ struct RefinedOutline {
   std::vector<EdgePoint> points;
   /// True if the level inside the light varies locally, as with LED chips behind a diffuser. Errors
   /// of neighboring points are then correlated.
-  bool mottled;
+  bool is_mottled;
 };
 
 /// Refines the outline of a disc whose rim is the axis-aligned ellipse in its box. Excludes points
@@ -58,16 +58,16 @@ struct RefinedOutline {
 ///     level(i) = o (1 - F(t / s)) + a F(t / s) + b (t F(t / s) + s f(t / s)),
 ///
 /// a blurred step to a level that rises linearly; F, f: the normal distribution and its density.
-RefinedOutline refined(const ImageView& image, const std::vector<EdgePoint>& points,
-                       const DiscImage& disc, const Background& background);
+RefinedOutline refine_outline(const ImageView& image, const std::vector<EdgePoint>& points,
+                              const DiscImage& disc, const Background& background);
 
 /// Returns the first begin and the last end of each row: the outline of a light that an occluder
 /// splits.
-std::vector<EdgePoint> outermost(std::vector<EdgePoint> points);
+std::vector<EdgePoint> select_outermost(std::vector<EdgePoint> points);
 
 /// Returns the two ends of each run. Excludes ends at the image border and ends of runs that are
 /// too short.
-std::vector<EdgePoint> outline_of(const ImageView& image, const Blob& blob,
-                                  const Background& background);
+std::vector<EdgePoint> find_outline(const ImageView& image, const Blob& blob,
+                                    const Background& background);
 
 }  // namespace vlp

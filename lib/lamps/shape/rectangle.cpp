@@ -24,19 +24,19 @@ namespace {
 using Corners = std::array<Eigen::Vector2d, 4>;
 using Sides = std::array<Side, 4>;
 
-double cross_of(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+double cross_product(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   return a.x() * b.y() - a.y() * b.x();
 }
 
-std::optional<Eigen::Vector2d> meeting(const Side& a, const Side& b) {
+std::optional<Eigen::Vector2d> find_intersection(const Side& a, const Side& b) {
   constexpr double flattest = 0.05;
-  const Eigen::Vector2d along = a.way(), other = b.way();
-  const double sine = cross_of(along, other);
+  const Eigen::Vector2d along = a.direction(), other = b.direction();
+  const double sine = cross_product(along, other);
   if (!(std::abs(sine) > flattest)) return std::nullopt;
-  return a.from + cross_of(b.from - a.from, other) / sine * along;
+  return a.from + cross_product(b.from - a.from, other) / sine * along;
 }
 
-Sides sides_of(const Corners& corners) {
+Sides make_sides(const Corners& corners) {
   return {Side{corners[0], corners[1]},
           {corners[1], corners[2]},
           {corners[2], corners[3]},
@@ -45,34 +45,35 @@ Sides sides_of(const Corners& corners) {
 
 /// Returns the corners; corner i is the begin of side i. Returns std::nullopt if neighboring sides
 /// are nearly parallel.
-std::optional<Corners> corners_of(const Sides& sides) {
+std::optional<Corners> find_corners(const Sides& sides) {
   Corners corners;
   for (std::size_t i = 0; i < 4; ++i) {
-    const auto corner = meeting(sides[(i + 3) % 4], sides[i]);
+    const auto corner = find_intersection(sides[(i + 3) % 4], sides[i]);
     if (!corner) return std::nullopt;
     corners[i] = *corner;
   }
   return corners;
 }
 
-std::optional<Eigen::Vector2d> center_of(const Sides& sides) {
-  const auto corners = corners_of(sides);
+std::optional<Eigen::Vector2d> find_center(const Sides& sides) {
+  const auto corners = find_corners(sides);
   if (!corners) return std::nullopt;
-  return meeting({(*corners)[0], (*corners)[2]}, {(*corners)[1], (*corners)[3]});
+  return find_intersection({(*corners)[0], (*corners)[2]}, {(*corners)[1], (*corners)[3]});
 }
 
 /// Returns true if all angles are right angles within 20 degrees.
-bool rectangular(const Sides& sides) {
+bool is_rectangular(const Sides& sides) {
   const double max_off = std::sin(rad_from_deg(20));
   for (std::size_t i = 0; i < 4; ++i) {
-    const Eigen::Vector2d way = sides[i].way(), next = sides[(i + 1) % 4].way();
-    if (!(std::abs(way.dot(next)) < max_off && cross_of(way, next) > 0)) return false;
+    const Eigen::Vector2d direction = sides[i].direction(), next = sides[(i + 1) % 4].direction();
+    if (!(std::abs(direction.dot(next)) < max_off && cross_product(direction, next) > 0))
+      return false;
   }
   return true;
 }
 
 /// Returns the ratio of the long to the short side.
-double aspect_of(const Sides& sides) {
+double compute_aspect(const Sides& sides) {
   const auto length = [&](std::size_t i) { return (sides[i].to - sides[i].from).norm(); };
   const double ratio = (length(0) + length(2)) / (length(1) + length(3));
   return std::max(ratio, 1 / ratio);
@@ -84,7 +85,7 @@ double square(double value) { return value * value; }
 /// calibrated tilt is accurate to some tenths of a degree. Every given tilt counts as calibrated,
 /// and an identity rotation as an unknown tilt.
 double get_tilt_sd(const LightShape& shape) {
-  return shape.knows_level() ? kLeanedOff / 30 : kLeanedOff;
+  return shape.has_tilt() ? kUnknownTiltSd / 30 : kUnknownTiltSd;
 }
 
 /// Returns the variance of the distance of an edge's middle, in square pixels.
@@ -95,14 +96,15 @@ double compute_distance(const Side& from, const Side& to) {
   return std::abs(((to.from + to.to) / 2 - (from.from + from.to) / 2).dot(from.inwards()));
 }
 
-/// Returns the standard deviation of the logarithm of aspect_of().
-double aspect_sd_of(const std::array<StraightEdge, 4>& edges, double per_px) {
-  constexpr double of_blur = 0.25;
+/// Returns the standard deviation of the logarithm of compute_aspect().
+double compute_aspect_sd(const std::array<StraightEdge, 4>& edges, double per_px) {
+  constexpr double blur_sd_fraction = 0.25;
   double variance = 0;
   for (std::size_t i = 0; i < 4; ++i) {
     const StraightEdge &edge = edges[i], &opposite = edges[(i + 2) % 4];
     const double apart_px = compute_distance(edge.side, opposite.side) / per_px;
-    variance += (compute_middle_variance(edge) + square(of_blur * edge.blur_px)) / square(apart_px);
+    variance += (compute_middle_variance(edge) + square(blur_sd_fraction * edge.blur_px)) /
+                square(apart_px);
   }
   return std::sqrt(variance);
 }
@@ -118,7 +120,7 @@ std::vector<Eigen::Vector2d> convex_hull(std::vector<Eigen::Vector2d> points) {
     const std::size_t first = hull.size();
     for (auto point = begin; point != end; ++point) {
       while (hull.size() >= first + 2 &&
-             !(cross_of(hull.back() - hull[hull.size() - 2], *point - hull.back()) > 0)) {
+             !(cross_product(hull.back() - hull[hull.size() - 2], *point - hull.back()) > 0)) {
         hull.pop_back();
       }
       hull.push_back(*point);
@@ -138,17 +140,17 @@ Corners rectangle_around(const std::vector<Eigen::Vector2d>& points) {
   double min_area = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < hull.size(); ++i) {
     const Eigen::Vector2d& from = hull[i];
-    const Eigen::Vector2d way = (hull[(i + 1) % hull.size()] - from).normalized();
+    const Eigen::Vector2d direction = (hull[(i + 1) % hull.size()] - from).normalized();
     Eigen::AlignedBox2d box;
     for (const Eigen::Vector2d& point : hull) {
       const Eigen::Vector2d away = point - from;
-      box.extend(Eigen::Vector2d(way.dot(away), cross_of(way, away)));
+      box.extend(Eigen::Vector2d(direction.dot(away), cross_product(direction, away)));
     }
     if (!(box.volume() < min_area)) continue;
     min_area = box.volume();
-    const Eigen::Vector2d left(-way.y(), way.x());
+    const Eigen::Vector2d left(-direction.y(), direction.x());
     const auto corner = [&](double along, double across) -> Eigen::Vector2d {
-      return from + along * way + across * left;
+      return from + along * direction + across * left;
     };
     best = {corner(box.min().x(), box.min().y()), corner(box.max().x(), box.min().y()),
             corner(box.max().x(), box.max().y()), corner(box.min().x(), box.max().y())};
@@ -160,7 +162,7 @@ double off(const Side& side, const Eigen::Vector2d& point) {
   return std::abs((point - side.from).dot(side.inwards()));
 }
 
-std::size_t nearest(const Sides& sides, const Eigen::Vector2d& point) {
+std::size_t find_nearest_side(const Sides& sides, const Eigen::Vector2d& point) {
   const auto closer = [&](const Side& a, const Side& b) { return off(a, point) < off(b, point); };
   return static_cast<std::size_t>(std::min_element(sides.begin(), sides.end(), closer) -
                                   sides.begin());
@@ -168,29 +170,30 @@ std::size_t nearest(const Sides& sides, const Eigen::Vector2d& point) {
 
 /// Fits each side to the points next to it. A side along the scanlines has too few points and is
 /// unchanged.
-Sides through(const std::vector<Eigen::Vector2d>& points, Sides sides, double within) {
-  constexpr std::size_t least = 6;
+Sides fit_sides(const std::vector<Eigen::Vector2d>& points, Sides sides, double within) {
+  constexpr std::size_t min_points = 6;
   constexpr double min_spread = 0.25;
   const Sides before = sides;
-  std::array<std::vector<Eigen::Vector2d>, 4> of_sides;
+  std::array<std::vector<Eigen::Vector2d>, 4> side_points;
   for (const Eigen::Vector2d& point : points) {
-    const std::size_t i = nearest(before, point);
-    if (off(before[i], point) < within) of_sides[i].push_back(point);
+    const std::size_t i = find_nearest_side(before, point);
+    if (off(before[i], point) < within) side_points[i].push_back(point);
   }
   for (std::size_t i = 0; i < 4; ++i) {
-    if (of_sides[i].size() < least) continue;
+    if (side_points[i].size() < min_points) continue;
     Eigen::Vector2d mean = Eigen::Vector2d::Zero();
-    for (const Eigen::Vector2d& point : of_sides[i]) mean += point / double(of_sides[i].size());
+    for (const Eigen::Vector2d& point : side_points[i])
+      mean += point / double(side_points[i].size());
     Eigen::Matrix2d spread = Eigen::Matrix2d::Zero();
-    for (const Eigen::Vector2d& point : of_sides[i]) {
+    for (const Eigen::Vector2d& point : side_points[i]) {
       spread += (point - mean) * (point - mean).transpose();
     }
-    const auto axes = symmetric_eigen(spread);
-    Eigen::Vector2d way = axes.vectors.col(1);
-    const double length = std::sqrt(axes.values[1] / double(of_sides[i].size()) * 12);
+    const auto axes = decompose_symmetric(spread);
+    Eigen::Vector2d direction = axes.vectors.col(1);
+    const double length = std::sqrt(axes.values[1] / double(side_points[i].size()) * 12);
     if (length < min_spread * (sides[i].to - sides[i].from).norm()) continue;
-    if (way.dot(before[i].way()) < 0) way = -way;
-    sides[i] = {mean - way * length / 2, mean + way * length / 2};
+    if (direction.dot(before[i].direction()) < 0) direction = -direction;
+    sides[i] = {mean - direction * length / 2, mean + direction * length / 2};
   }
   return sides;
 }
@@ -202,23 +205,23 @@ struct FirstCorners {
   double near;
 };
 
-std::optional<FirstCorners> first_corners(const std::vector<Eigen::Vector2d>& points,
-                                          double per_px) {
+std::optional<FirstCorners> find_first_corners(const std::vector<Eigen::Vector2d>& points,
+                                               double per_px) {
   constexpr double near_px = 2, min_fraction = 0.7;
-  constexpr double coarse_share = 0.08;
+  constexpr double coarse_fraction = 0.08;
   Corners corners = rectangle_around(points);
   const double size = std::min((corners[1] - corners[0]).norm(), (corners[2] - corners[1]).norm());
-  double within = std::max(4 * per_px, coarse_share * size);
-  for (int round = 0; round < 3; ++round) {
-    const auto better = corners_of(through(points, sides_of(corners), within));
+  double within = std::max(4 * per_px, coarse_fraction * size);
+  for (int iteration = 0; iteration < 3; ++iteration) {
+    const auto better = find_corners(fit_sides(points, make_sides(corners), within));
     if (!better) return std::nullopt;
     corners = *better;
     within = std::max(within / 2, near_px * per_px);
   }
-  const Sides sides = sides_of(corners);
-  if (!rectangular(sides)) return std::nullopt;
+  const Sides sides = make_sides(corners);
+  if (!is_rectangular(sides)) return std::nullopt;
   const auto near = std::count_if(points.begin(), points.end(), [&](const Eigen::Vector2d& point) {
-    return off(sides[nearest(sides, point)], point) < near_px * per_px;
+    return off(sides[find_nearest_side(sides, point)], point) < near_px * per_px;
   });
   if (double(near) < min_fraction * double(points.size())) return std::nullopt;
   return FirstCorners{corners, double(near) / double(points.size())};
@@ -227,10 +230,11 @@ std::optional<FirstCorners> first_corners(const std::vector<Eigen::Vector2d>& po
 /// Returns the corners of a slender rectangle whose sides an unknown lens curves. Tries many
 /// curvatures, straightens the points by each of them, which does not change the ends, and selects
 /// the best corners.
-std::optional<FirstCorners> bent_corners(const std::vector<Eigen::Vector2d>& points) {
+std::optional<FirstCorners> find_corners_of_curved_sides(
+    const std::vector<Eigen::Vector2d>& points) {
   constexpr double max_px = 6, step_px = 0.5, min_aspect = 3;
-  const Sides around = sides_of(rectangle_around(points));
-  if (aspect_of(around) < min_aspect) return std::nullopt;
+  const Sides around = make_sides(rectangle_around(points));
+  if (compute_aspect(around) < min_aspect) return std::nullopt;
   const bool first =
       (around[0].to - around[0].from).norm() > (around[1].to - around[1].from).norm();
   const Side& side = around[first ? 0 : 1];
@@ -239,10 +243,10 @@ std::optional<FirstCorners> bent_corners(const std::vector<Eigen::Vector2d>& poi
   std::vector<Eigen::Vector2d> straight = points;
   for (double bow_px = -max_px; bow_px <= max_px; bow_px += step_px) {
     for (std::size_t i = 0; i < points.size(); ++i) {
-      const double along = 2 * (points[i] - side.from).dot(side.way()) / length - 1;
+      const double along = 2 * (points[i] - side.from).dot(side.direction()) / length - 1;
       straight[i] = points[i] - bow_px * (1 - along * along) * side.inwards();
     }
-    const auto corners = first_corners(straight, 1);
+    const auto corners = find_first_corners(straight, 1);
     if (corners && (!best || corners->near > best->near)) best = corners;
   }
   return best;
@@ -255,35 +259,39 @@ std::optional<FirstCorners> bent_corners(const std::vector<Eigen::Vector2d>& poi
 /// of half-length h at the position p is curved by -k h^2 p . n across it. The diagonals intersect
 /// k (a^2 + b^2) p from the center, with a and b half of the sides. The prior of k has the standard
 /// deviation of an equidistant lens of 115 degrees from corner to corner.
-struct Unbent {
+struct CenterOffset {
   Eigen::Vector2d shift;
   double sd_px;
 };
 
-Unbent unbent(const std::array<StraightEdge, 4>& edges, const Eigen::Vector2d& center,
-              const Eigen::Vector2d& middle) {
-  constexpr double bow_sd = 2, of_shift = 0.1;  // ratio to that of the ends; higher orders
+CenterOffset estimate_center_offset(const std::array<StraightEdge, 4>& edges,
+                                    const Eigen::Vector2d& center, const Eigen::Vector2d& middle) {
+  constexpr double curvature_sd_ratio = 2,
+                   higher_order_ratio = 0.1;  // ratio to that of the ends; higher orders
   const double focal_px = middle.norm(), known_sd = 1 / (3 * focal_px * focal_px);
   double information = 1 / (known_sd * known_sd), moment = 0;
-  Eigen::Vector2d by_k = Eigen::Vector2d::Zero();
+  Eigen::Vector2d d_shift_d_k = Eigen::Vector2d::Zero();
   for (const StraightEdge& edge : edges) {
-    const Eigen::Vector2d way = edge.side.to - edge.side.from, in = edge.side.inwards();
-    const double half_square = way.squaredNorm() / 4;
+    const Eigen::Vector2d direction = edge.side.to - edge.side.from, in = edge.side.inwards();
+    const double half_square = direction.squaredNorm() / 4;
     const Eigen::Vector2d at = (edge.side.from + edge.side.to) / 2 - middle;
     const double slope = -half_square * at.dot(in);
-    const double variance = bow_sd * bow_sd * edge.covariance_px.trace() / 2;
+    const double variance =
+        curvature_sd_ratio * curvature_sd_ratio * edge.covariance_px.trace() / 2;
     information += slope * slope / variance;
     moment += slope * edge.bow_px / variance;
-    by_k -= half_square / 2 * (center - middle);
+    d_shift_d_k -= half_square / 2 * (center - middle);
   }
   const double k = moment / information;
-  const double sd_px = std::hypot(1 / std::sqrt(information), of_shift * k) * by_k.norm();
-  return {k * by_k, sd_px / std::numbers::sqrt2};
+  const double sd_px =
+      std::hypot(1 / std::sqrt(information), higher_order_ratio * k) * d_shift_d_k.norm();
+  return {k * d_shift_d_k, sd_px / std::numbers::sqrt2};
 }
 
 /// Returns the polygon at the depth `inset` inside the sides, (u, v); empty if the lens does not
 /// cover it.
-std::vector<Eigen::Vector2d> face_of(const Sides& sides, double inset, const LightShape& shape) {
+std::vector<Eigen::Vector2d> make_polygon(const Sides& sides, double inset,
+                                          const LightShape& shape) {
   constexpr int pieces = 8;
   Sides inside = sides;
   for (Side& side : inside) {
@@ -291,13 +299,13 @@ std::vector<Eigen::Vector2d> face_of(const Sides& sides, double inset, const Lig
     side.from += in;
     side.to += in;
   }
-  const auto corners = corners_of(inside);
+  const auto corners = find_corners(inside);
   std::vector<Eigen::Vector2d> face;
   if (!corners) return face;
   for (std::size_t i = 0; i < 4; ++i) {
     const Eigen::Vector2d &from = (*corners)[i], &to = (*corners)[(i + 1) % 4];
     for (int piece = 0; piece < pieces; ++piece) {
-      const auto pixel = shape.pixel_of(from + (to - from) * piece / pieces);
+      const auto pixel = shape.plane_to_pixel(from + (to - from) * piece / pieces);
       if (!pixel) return {};
       face.push_back(*pixel);
     }
@@ -332,8 +340,9 @@ void apply_right_angles(const LightShape& shape, double per_px, Sides& sides,
     const auto [a, b] = pairs[std::size_t(i)];
     const Side &side = sides[a], &other = sides[b];
     const bool opposite = b - a == 2;
-    const Eigen::Vector2d expected = opposite ? -side.way() : side.inwards();
-    angles[i] = std::atan2(cross_of(expected, other.way()), expected.dot(other.way()));
+    const Eigen::Vector2d expected = opposite ? -side.direction() : side.inwards();
+    angles[i] =
+        std::atan2(cross_product(expected, other.direction()), expected.dot(other.direction()));
     sds[i] = get_tilt_sd(shape) * (opposite ? per_lean * compute_distance(side, other) : 1);
     const double length_px = (side.to - side.from).norm() / per_px;
     const double other_px = (other.to - other.from).norm() / per_px;
@@ -359,8 +368,8 @@ std::optional<Matrix2> center_covariance(const Sides& sides, const EndsCovarianc
                                          double per_px, const LightShape& shape) {
   constexpr double moved_px = 0.05;
   const auto pixel_with = [&](const Sides& moved) -> std::optional<Eigen::Vector2d> {
-    const auto center = center_of(moved);
-    return center ? shape.pixel_of(*center) : std::nullopt;
+    const auto center = find_center(moved);
+    return center ? shape.plane_to_pixel(*center) : std::nullopt;
   };
   const auto here = pixel_with(sides);
   Eigen::Matrix<double, 2, 8> slope;
@@ -382,7 +391,7 @@ bool has_corners(const std::vector<Eigen::Vector2d>& points, const Sides& sides,
   constexpr double beyond = 1.35, min_fraction = 0.1;
   const auto off_middle = [&](const Eigen::Vector2d& at, std::size_t i) {
     const double length = (sides[i].to - sides[i].from).norm();
-    return std::pow(2 * (at - center).dot(sides[i].way()) / length, 2);
+    return std::pow(2 * (at - center).dot(sides[i].direction()) / length, 2);
   };
   const auto far = std::count_if(points.begin(), points.end(), [&](const Eigen::Vector2d& at) {
     return off_middle(at, 0) + off_middle(at, 1) > beyond;
@@ -391,27 +400,27 @@ bool has_corners(const std::vector<Eigen::Vector2d>& points, const Sides& sides,
 }
 
 /// Makes a light of four edges; `points` are the outline in the plane.
-std::optional<Light> light_of(std::array<StraightEdge, 4>& edges, double per_px,
-                              const std::vector<Eigen::Vector2d>& points,
-                              const Eigen::Vector2d& middle, const LightShape& shape) {
-  constexpr double stray_px = 3;
+std::optional<Light> fit_light(std::array<StraightEdge, 4>& edges, double per_px,
+                               const std::vector<Eigen::Vector2d>& points,
+                               const Eigen::Vector2d& middle, const LightShape& shape) {
+  constexpr double outlier_px = 3;
   Sides sides;
   for (std::size_t i = 0; i < 4; ++i) sides[i] = edges[i].side;
   EndsCovariance ends = make_ends_covariance(edges);
   if (shape.has_lens()) apply_right_angles(shape, per_px, sides, ends);
-  const auto corners = corners_of(sides);
-  if (!corners || !rectangular(sides)) return std::nullopt;
-  const auto center = center_of(sides);
+  const auto corners = find_corners(sides);
+  if (!corners || !is_rectangular(sides)) return std::nullopt;
+  const auto center = find_center(sides);
   if (!center || !has_corners(points, sides, *center)) return std::nullopt;
   const auto covariance = center_covariance(sides, ends, per_px, shape);
-  sides = sides_of(*corners);
-  auto pixel = shape.pixel_of(*center);
-  const auto around = face_of(sides, 0, shape);
+  sides = make_sides(*corners);
+  auto pixel = shape.plane_to_pixel(*center);
+  const auto around = make_polygon(sides, 0, shape);
   if (!pixel || !covariance || around.empty()) return std::nullopt;
   Light light{};
   double lens_sd_px = 0;
   if (!shape.has_lens()) {
-    const Unbent behind = unbent(edges, *center, shape.turned(middle));
+    const CenterOffset behind = estimate_center_offset(edges, *center, shape.turned(middle));
     *pixel += behind.shift;
     lens_sd_px = behind.sd_px;
   }
@@ -427,7 +436,7 @@ std::optional<Light> light_of(std::array<StraightEdge, 4>& edges, double per_px,
     end_sd_px = std::max(end_sd_px, std::sqrt(edge.covariance_px.diagonal().maxCoeff()));
     bow_px = std::max(bow_px, std::abs(edge.bow_px));
     light.rise_px = std::max(light.rise_px, edge.points.empty() ? 0 : edge.points[0].rise_px);
-    light.roundness = std::min(light.roundness, edge.share);
+    light.roundness = std::min(light.roundness, edge.fraction);
     light.outline.insert(light.outline.end(), edge.points.begin(), edge.points.end());
   }
   light.low.array() -= 2 * end_sd_px;
@@ -435,15 +444,15 @@ std::optional<Light> light_of(std::array<StraightEdge, 4>& edges, double per_px,
   const double sigma_px = std::hypot(std::sqrt(covariance->trace() / 2), lens_sd_px);
   if (!(sigma_px <= kMaxSigma_px)) return std::nullopt;
   light.sigma_px = std::max(kMinSigma_px, sigma_px);
-  const auto strays = std::count_if(points.begin(), points.end(), [&](const Eigen::Vector2d& at) {
+  const auto outliers = std::count_if(points.begin(), points.end(), [&](const Eigen::Vector2d& at) {
     return std::any_of(sides.begin(), sides.end(), [&](const Side& side) {
-      return (at - side.from).dot(side.inwards()) < -(stray_px + bow_px) * per_px;
+      return (at - side.from).dot(side.inwards()) < -(outlier_px + bow_px) * per_px;
     });
   });
-  light.outside = double(strays) / double(points.size());
-  light.face = face_of(sides, stray_px * per_px, shape);
-  light.aspect = aspect_of(sides);
-  light.aspect_sd = aspect_sd_of(edges, per_px);
+  light.outside = double(outliers) / double(points.size());
+  light.face = make_polygon(sides, outlier_px * per_px, shape);
+  light.aspect = compute_aspect(sides);
+  light.aspect_sd = compute_aspect_sd(edges, per_px);
   return light.face.empty() ? std::nullopt : std::optional(std::move(light));
 }
 
@@ -461,7 +470,7 @@ double find_surest_blur_px(const FoundEdges& edges) {
   return surest->blur_px;
 }
 
-/// Finds hidden edges from the visible ones, see rectangle_of().
+/// Finds hidden edges from the visible ones, see fit_rectangle().
 class HiddenEdges {
  public:
   HiddenEdges(const ImageView& lines, const LineLevels& levels, double dark, double per_px,
@@ -473,30 +482,30 @@ class HiddenEdges {
   bool add_to(FoundEdges& edges, const Sides& sides, EdgeSearch search,
               const std::vector<Eigen::Vector2d>& sizes_m) const {
     constexpr double ramp_lines = 3;
-    const FoundEdges seen = edges;
-    search.stations = 24;
+    const FoundEdges visible = edges;
+    search.positions = 24;
     double min_side = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < 4; ++i) {
-      if (!seen[i] && !seen[(i + 1) % 4]) return false;
+      if (!visible[i] && !visible[(i + 1) % 4]) return false;
       min_side = std::min(min_side, (sides[i].to - sides[i].from).norm());
     }
-    search.blur_px = find_surest_blur_px(seen);
+    search.blur_px = find_surest_blur_px(visible);
     // The window extends to the next stripe, but not to the opposite edge.
     search.reach_px = std::max(
         search.reach_px, std::min(levels_.period_lines() + ramp_lines, min_side / per_px_ / 2));
     for (std::size_t i = 0; i < 4; ++i) {
-      if (seen[i]) continue;
-      const auto side = predict_side(sides[i], seen, i);
+      if (visible[i]) continue;
+      const auto side = predict_side(sides[i], visible, i);
       if (!side) return false;
       const auto find = [&](double offset_px, double offset_sd_px) {
         // Twice the sd, because apply_right_angles() uses the angles again.
-        const double slant_sd_px = compute_direction_sd(seen, i) * side_length_px(*side);
-        return hidden_edge_at(lines_, *side, levels_, dark_, per_px_, search, shape_,
-                              {offset_px, offset_sd_px, slant_sd_px});
+        const double slant_sd_px = compute_direction_sd(visible, i) * side_length_px(*side);
+        return estimate_hidden_edge(lines_, *side, levels_, dark_, per_px_, search, shape_,
+                                    {offset_px, offset_sd_px, slant_sd_px});
       };
       edges[i] = find(0, std::numeric_limits<double>::infinity());
       if (!edges[i]) return false;
-      if (!seen[(i + 2) % 4]) continue;
+      if (!visible[(i + 2) % 4]) continue;
       const auto place = predict_place(edges, i, sizes_m);
       if (!place) continue;
       const Eigen::Vector2d moved =
@@ -526,10 +535,10 @@ class HiddenEdges {
   }
 
   /// Returns the standard deviation of the direction of edge i, predicted from the other edges.
-  double compute_direction_sd(const FoundEdges& seen, std::size_t i) const {
+  double compute_direction_sd(const FoundEdges& visible, std::size_t i) const {
     double sum = 0, variance = 0;
     for (std::size_t k = 1; k < 4; ++k) {
-      const auto& other = seen[(i + k) % 4];
+      const auto& other = visible[(i + k) % 4];
       if (!other) continue;
       sum += compute_direction_weight(*other);
       variance += square(compute_direction_weight(*other)) * compute_direction_variance(*other);
@@ -539,22 +548,24 @@ class HiddenEdges {
 
   /// Rotates side i about its middle by the mean rotation of the other edges, and extends it to its
   /// neighbors.
-  std::optional<Side> predict_side(const Side& side, const FoundEdges& seen, std::size_t i) const {
+  std::optional<Side> predict_side(const Side& side, const FoundEdges& visible,
+                                   std::size_t i) const {
     double sum = 0, moment = 0;
     for (std::size_t k = 1; k < 4; ++k) {
-      const auto& other = seen[(i + k) % 4];
+      const auto& other = visible[(i + k) % 4];
       if (!other) continue;
-      const Eigen::Vector2d way =
-          Eigen::Rotation2Dd(-double(k) * std::numbers::pi / 2) * other->side.way();
+      const Eigen::Vector2d direction =
+          Eigen::Rotation2Dd(-double(k) * std::numbers::pi / 2) * other->side.direction();
       sum += compute_direction_weight(*other);
-      moment += compute_direction_weight(*other) *
-                std::atan2(cross_of(side.way(), way), side.way().dot(way));
+      moment +=
+          compute_direction_weight(*other) *
+          std::atan2(cross_product(side.direction(), direction), side.direction().dot(direction));
     }
     const Eigen::Vector2d middle = (side.from + side.to) / 2;
     const Eigen::Vector2d half = Eigen::Rotation2Dd(moment / sum) * (side.to - middle);
     const Side turned{middle - half, middle + half};
-    const auto from = meeting(turned, seen[(i + 3) % 4]->side);
-    const auto to = meeting(turned, seen[(i + 1) % 4]->side);
+    const auto from = find_intersection(turned, visible[(i + 3) % 4]->side);
+    const auto to = find_intersection(turned, visible[(i + 1) % 4]->side);
     return from && to ? std::optional(Side{*from, *to}) : std::nullopt;
   }
 
@@ -599,14 +610,15 @@ class HiddenEdges {
 
 }  // namespace
 
-std::vector<Run> chords_within(const std::vector<Eigen::Vector2d>& polygon, const ImageSize& size) {
+std::vector<PixelRun> find_chords_in_polygon(const std::vector<Eigen::Vector2d>& polygon,
+                                             const ImageSize& size) {
   constexpr int min_px = 4;
   double top = size.height, bottom = -1;
   for (const Eigen::Vector2d& point : polygon) {
     top = std::min(top, point.y());
     bottom = std::max(bottom, point.y());
   }
-  std::vector<Run> chords;
+  std::vector<PixelRun> chords;
   const int first = std::max(0, static_cast<int>(std::ceil(top)));
   const int last = std::min(size.height - 1, static_cast<int>(std::floor(bottom)));
   for (int row = first; row <= last; ++row) {
@@ -625,10 +637,10 @@ std::vector<Run> chords_within(const std::vector<Eigen::Vector2d>& polygon, cons
   return chords;
 }
 
-std::optional<Light> rectangle_of(const ImageView& lines, const Blob& blob,
-                                  const std::vector<EdgePoint>& outline,
-                                  const Background& background, const LightShape& shape,
-                                  const std::vector<Eigen::Vector2d>& sizes_m) {
+std::optional<Light> fit_rectangle(const ImageView& lines, const Blob& blob,
+                                   const std::vector<EdgePoint>& outline,
+                                   const Background& background, const LightShape& shape,
+                                   const std::vector<Eigen::Vector2d>& sizes_m) {
   constexpr double min_px = 10, max_aspect = 40;
   constexpr std::size_t min_lines = 8;
   const PixelBox box = blob.box();
@@ -637,17 +649,17 @@ std::optional<Light> rectangle_of(const ImageView& lines, const Blob& blob,
   points.reserve(outline.size());
   Eigen::AlignedBox2d in_plane, in_image;
   for (const EdgePoint& edge : outline) {
-    const auto point = shape.plane_of(shape.turned(edge.pixel));
+    const auto point = shape.pixel_to_plane(shape.turned(edge.pixel));
     if (!point) return std::nullopt;
     points.push_back(*point);
     in_plane.extend(*point);
     in_image.extend(edge.pixel);
   }
   const double per_px = in_plane.diagonal().norm() / in_image.diagonal().norm();
-  auto first = first_corners(points, per_px);
+  auto first = find_first_corners(points, per_px);
   if (!shape.has_lens()) {
-    const auto bent = bent_corners(points);
-    if (bent && (!first || bent->near > first->near)) first = bent;
+    const auto curved = find_corners_of_curved_sides(points);
+    if (curved && (!first || curved->near > first->near)) first = curved;
   }
   if (!first) return std::nullopt;
   std::optional<Corners> corners = first->corners;
@@ -655,8 +667,8 @@ std::optional<Light> rectangle_of(const ImageView& lines, const Blob& blob,
   // A disc that stripes partly hide is less slender than this.
   constexpr double min_aspect = 3;
   const auto is_rather_round = [&](const Sides& sides) {
-    if (aspect_of(sides) > min_aspect) return false;
-    const auto disc = shape.light_of(outline, background);
+    if (compute_aspect(sides) > min_aspect) return false;
+    const auto disc = shape.fit_light(outline, background);
     return disc && disc->roundness >= first->near;
   };
   double bow_px = 0, blur_px = 0;
@@ -666,12 +678,13 @@ std::optional<Light> rectangle_of(const ImageView& lines, const Blob& blob,
     EdgeSearch search;
   };
   for (auto [inset_px, search] : {Pass{5, {7, 48}}, Pass{3.5, {5, 48}}, Pass{3.5, {4, 96}}}) {
-    const Sides sides = sides_of(*corners);
+    const Sides sides = make_sides(*corners);
     const double min_side =
         std::min((sides[0].to - sides[0].from).norm(), (sides[1].to - sides[1].from).norm());
-    if (!(min_side > min_px * per_px) || aspect_of(sides) > max_aspect) return std::nullopt;
+    if (!(min_side > min_px * per_px) || compute_aspect(sides) > max_aspect) return std::nullopt;
     const double inset = std::min((inset_px + bow_px) * per_px, min_side / 3);
-    const auto chords = chords_within(shape.turned(face_of(sides, inset, shape)), lines.size());
+    const auto chords =
+        find_chords_in_polygon(shape.turned(make_polygon(sides, inset, shape)), lines.size());
     if (chords.size() < min_lines) return std::nullopt;
     // The chords have to be on consecutive scanlines, because LineLevels assigns levels by index.
     const int rows = chords.back().row - chords.front().row + 1;
@@ -682,7 +695,7 @@ std::optional<Light> rectangle_of(const ImageView& lines, const Blob& blob,
     FoundEdges found_edges;
     for (std::size_t i = 0; i < 4; ++i) {
       found_edges[i] =
-          straight_edge_at(lines, sides[i], levels, background.level, per_px, search, shape);
+          fit_straight_edge(lines, sides[i], levels, background.level, per_px, search, shape);
     }
     if (!std::ranges::all_of(found_edges, [](const auto& edge) { return edge.has_value(); })) {
       const HiddenEdges hidden(lines, levels, background.level, per_px, shape);
@@ -699,11 +712,11 @@ std::optional<Light> rectangle_of(const ImageView& lines, const Blob& blob,
       found[i] = edges[i].side;
       bow_px = std::max(bow_px, std::abs(edges[i].bow_px));
     }
-    corners = rectangular(found) ? corners_of(found) : std::nullopt;
+    corners = is_rectangular(found) ? find_corners(found) : std::nullopt;
     if (!corners) return std::nullopt;
   }
   const Eigen::Vector2d middle((lines.width - 1) / 2.0, (lines.height - 1) / 2.0);
-  return light_of(edges, per_px, points, middle, shape);
+  return fit_light(edges, per_px, points, middle, shape);
 }
 
 }  // namespace vlp

@@ -17,18 +17,18 @@ namespace vlp {
 
 /// Change of the log aspect ratio of a rectangle that an unknown tilt of 5 degrees causes, 35
 /// degrees off axis. Its angles change by about as much, in rad.
-inline constexpr double kLeanedOff = 0.06;
+inline constexpr double kUnknownTiltSd = 0.06;
 
 /// Fits a rectangular light, a panel or a tube, by its four edges.
 ///
 /// @param lines    image whose rows are the scanlines
-/// @param outline  result of outline_of() for the blob
+/// @param outline  result of find_outline() for the blob
 /// @param sizes_m  sizes of the map's rectangles, used only for hidden edges
 /// @return  the light; its sigma is propagated from the eight ends of the sides, and `low` and
 ///        `high` include two standard deviations of the sides
 ///
 /// Starts from the minimum-area rectangle around the outline, aligned by line fits to its sides.
-/// Then fits each side to its edge, see straight_edge_at(). The center is the intersection of the
+/// Then fits each side to its edge, see fit_straight_edge(). The center is the intersection of the
 /// diagonals, because perspective preserves it from any viewing angle.
 ///
 /// Edges are straight in the plane of LightShape. Without a lens they are fitted in the image.
@@ -36,9 +36,9 @@ inline constexpr double kLeanedOff = 0.06;
 /// The offset is subtracted, and its uncertainty is included in sigma_px.
 ///
 /// With a lens, one edge or two opposite ones may be hidden by a dark stripe along them, see
-/// hidden_edge_at(). The direction of a hidden edge follows from the other edges. The position of a
-/// single hidden edge also follows from the aspect ratio if one of `sizes_m` agrees with the
-/// stripes. Right angles correct all edges, within the uncertainty of the tilt.
+/// estimate_hidden_edge(). The direction of a hidden edge follows from the other edges. The
+/// position of a single hidden edge also follows from the aspect ratio if one of `sizes_m` agrees
+/// with the stripes. Right angles correct all edges, within the uncertainty of the tilt.
 ///
 /// Returns std::nullopt in these cases:
 /// - Four edges do not form a rectangle to 20 degrees, since an unknown tilt deforms it.
@@ -46,12 +46,13 @@ inline constexpr double kLeanedOff = 0.06;
 ///   ratio above 40.
 /// - An edge that is not hidden is outside the image or not found.
 /// - Edges are hidden and a circle explains more of the outline.
-std::optional<Light> rectangle_of(const ImageView& lines, const Blob& blob,
-                                  const std::vector<EdgePoint>& outline,
-                                  const Background& background, const LightShape& shape,
-                                  const std::vector<Eigen::Vector2d>& sizes_m);
+std::optional<Light> fit_rectangle(const ImageView& lines, const Blob& blob,
+                                   const std::vector<EdgePoint>& outline,
+                                   const Background& background, const LightShape& shape,
+                                   const std::vector<Eigen::Vector2d>& sizes_m);
 
 /// Returns the pixels inside a convex polygon, (column, row), on each line of an image of `size`.
-std::vector<Run> chords_within(const std::vector<Eigen::Vector2d>& polygon, const ImageSize& size);
+std::vector<PixelRun> find_chords_in_polygon(const std::vector<Eigen::Vector2d>& polygon,
+                                             const ImageSize& size);
 
 }  // namespace vlp

@@ -29,12 +29,12 @@ struct Ellipse {
     double begin, end, height;
   };
   /// Returns the crossing with a scanline; std::nullopt if there is none.
-  std::optional<Crossing> cross(double line) const {
-    const Eigen::Vector2d by_column = unit_from_pixel.col(0);
+  std::optional<Crossing> intersect(double line) const {
+    const Eigen::Vector2d d_column = unit_from_pixel.col(0);
     const Eigen::Vector2d at_line = unit_from_pixel.col(1) * (line - center.y());
-    // |by_column u + at_line|^2 = 1
-    const double a = by_column.squaredNorm(), b = by_column.dot(at_line);
-    const double determinant = by_column.x() * at_line.y() - by_column.y() * at_line.x();
+    // |d_column u + at_line|^2 = 1
+    const double a = d_column.squaredNorm(), b = d_column.dot(at_line);
+    const double determinant = d_column.x() * at_line.y() - d_column.y() * at_line.x();
     const double square = determinant * determinant / a;
     if (!(square < 1)) return std::nullopt;
     const double half = std::sqrt((1 - square) / a), middle = center.x() - b / a;
@@ -56,9 +56,10 @@ struct Ellipse {
 Matrix2 compute_unit_plane_from_pixel(const LightShape& shape, const Eigen::Vector2d& pixel) {
   constexpr double step_px = 1;
   Matrix2 derivative = Matrix2::Identity();
-  const auto at = shape.plane_of(shape.turned(pixel));
+  const auto at = shape.pixel_to_plane(shape.turned(pixel));
   for (int i = 0; i < 2; ++i) {
-    const auto beside = shape.plane_of(shape.turned(pixel + step_px * Eigen::Vector2d::Unit(i)));
+    const auto beside =
+        shape.pixel_to_plane(shape.turned(pixel + step_px * Eigen::Vector2d::Unit(i)));
     if (!at || !beside) return Matrix2::Identity();
     derivative.col(i) = *beside - *at;
   }
@@ -78,7 +79,7 @@ class Face {
   /// Computes means over `window` pixels of a scanline.
   Face(const ImageView& image, const PixelBox& box, const Background& background, int window)
       : box_(box), window_(window) {
-    constexpr double share = 0.02;
+    constexpr double fraction = 0.02;
     const auto dark = static_cast<float>(background.level);
     levels_.reserve(std::size_t(box.area()));
     for (int row = box.y; row < box.bottom(); ++row) {
@@ -87,7 +88,7 @@ class Face {
       }
     }
     const double brightest = *std::max_element(levels_.begin(), levels_.end());
-    soft_ = std::max(share * brightest, (background.threshold - background.level) / 2);
+    soft_ = std::max(fraction * brightest, (background.threshold - background.level) / 2);
     find_means();
     find_lit_lines(background.threshold - background.level);
   }
@@ -205,11 +206,11 @@ class Steps {
 
   /// Returns the sum of e over the crossings of an ellipse with the lit scanlines, scaled to all of
   /// them.
-  double sum_of(const Ellipse& ellipse) const {
+  double sum_steps(const Ellipse& ellipse) const {
     constexpr double max_height = 0.94;  // scanlines are nearly tangent above it
     double sum = 0;
     for (std::size_t i = 0; i < lines_.size(); ++i) {
-      const auto crossing = ellipse.cross(lines_[i]);
+      const auto crossing = ellipse.intersect(lines_[i]);
       if (!crossing || crossing->height > max_height) continue;
       sum += at(i, crossing->begin, 0) + at(i, crossing->end, 1);
     }
@@ -244,7 +245,7 @@ Ring find_best_ring(const Face& face, const PixelBox& blob, const Matrix2& unit_
     for (double dv = -max_shift * size; dv <= max_shift * size; dv += step) {
       for (double du = -max_shift * size; du <= max_shift * size; du += step) {
         const Ellipse ellipse{middle + Eigen::Vector2d(du, dv), unit_from_pixel};
-        const double sum = steps.sum_of(ellipse);
+        const double sum = steps.sum_steps(ellipse);
         if (sum > best.sum) best = {ellipse, sum};
       }
     }
@@ -257,12 +258,14 @@ Ellipse make_ellipse(const Light& light, const LightShape& shape) {
   const Eigen::Vector2d low = shape.turned(light.low), high = shape.turned(light.high);
   const Eigen::Vector2d center = (low + high) / 2;
   Matrix2 unit_from_pixel;
-  const auto at = shape.plane_of(shape.turned(center));
+  const auto at = shape.pixel_to_plane(shape.turned(center));
   for (int i = 0; i < 2; ++i) {
     // The difference spans the whole outline, because of lens distortion.
     const double reach_px = (high - low)[i] / 2;
-    const auto beside = shape.plane_of(shape.turned(center + reach_px * Eigen::Vector2d::Unit(i)));
-    const auto before = shape.plane_of(shape.turned(center - reach_px * Eigen::Vector2d::Unit(i)));
+    const auto beside =
+        shape.pixel_to_plane(shape.turned(center + reach_px * Eigen::Vector2d::Unit(i)));
+    const auto before =
+        shape.pixel_to_plane(shape.turned(center - reach_px * Eigen::Vector2d::Unit(i)));
     if (!at || !beside || !before) return {center, Matrix2::Identity() / light.radius_px};
     unit_from_pixel.col(i) = light.unit_from_plane * (*beside - *before) / (2 * reach_px);
   }
@@ -275,7 +278,7 @@ std::vector<EdgePoint> find_steps_near(const Face& face, const Ellipse& ellipse,
   std::vector<EdgePoint> points;
   std::vector<double> levels;
   for (const int line : face.lit_lines()) {
-    const auto crossing = ellipse.cross(line + face.box().y);
+    const auto crossing = ellipse.intersect(line + face.box().y);
     if (!crossing) continue;
     for (const bool begins : {true, false}) {
       const double column = begins ? crossing->begin : crossing->end;
@@ -318,7 +321,7 @@ std::optional<Light> fit_near(const Ring& ring, const Face& face, const Backgrou
   std::optional<Light> light;
   for (const double reach : {0.16, 0.12, 0.08, 0.08}) {
     const double reach_px = reach * ring.ellipse.mean_radius_px();
-    auto better = shape.light_of(find_steps_near(face, ellipse, reach_px), background);
+    auto better = shape.fit_light(find_steps_near(face, ellipse, reach_px), background);
     if (!better) return std::nullopt;
     light = std::move(better);
     ellipse = make_ellipse(*light, shape);
@@ -349,7 +352,7 @@ std::optional<double> estimate_jackknife_sd_px(const Light& light, const Backgro
       return others.begin() + std::ptrdiff_t(piece * outline.size() / pieces);
     };
     others.erase(at(i), at(i + 1));
-    const auto without = shape.light_of(std::move(others), background);
+    const auto without = shape.fit_light(std::move(others), background);
     if (!without) return std::nullopt;
     centers[i] = without->pixel;
     mean += centers[i] / double(pieces);
@@ -365,7 +368,7 @@ template <typename Level>
 double bright_level(const ImageView& image, const Blob& blob, double dark) {
   std::vector<Level> levels;
   levels.reserve(blob.runs.size());
-  for (const Run& run : blob.runs) {
+  for (const PixelRun& run : blob.runs) {
     const auto* row = image.row<Level>(run.row) + run.begin;
     const std::ptrdiff_t quarter = run.width() / 4;
     levels.push_back(std::max({row[quarter], row[2 * quarter], row[3 * quarter]}));
@@ -394,27 +397,28 @@ double points_of_a_stripe(const std::vector<EdgePoint>& outline) {
 std::optional<Light> fit_to_steps(const ImageView& image, const std::vector<int>& lit_lines,
                                   const Background& background, const LightShape& shape,
                                   Light light) {
-  constexpr int rounds = 3;
-  constexpr double first_blur_px = 0.9, min_agreeing = 0.6;
+  constexpr int num_iterations = 3;
+  constexpr double first_blur_px = 0.9, min_inlier_fraction = 0.6;
   // Consumer cameras code approximately light^(1 / 2.2); others barely have the bit depth to record
   // a rim. The difference to the center with another gamma estimates the error from the tone curve.
   constexpr double gamma = 2, other_gamma = 1.8;
-  StepPicture picture{first_blur_px, gamma};
-  for (int round = 1; round < rounds; ++round) {
-    auto steps = fit_rim_steps(image, light, lit_lines, background, picture, round > 1, shape);
-    if (!shift_of(steps.pieces, shape.has_lens())) return std::nullopt;
+  StepImageModel picture{first_blur_px, gamma};
+  for (int iteration = 1; iteration < num_iterations; ++iteration) {
+    auto steps = fit_rim_steps(image, light, lit_lines, background, picture, iteration > 1, shape);
+    if (!estimate_outline_shift(steps.pieces, shape.has_lens())) return std::nullopt;
     picture.blur_px = steps.blur_px;
-    auto better = shape.light_of(std::move(steps.points), background);
+    auto better = shape.fit_light(std::move(steps.points), background);
     if (!better || 2 * better->outline.size() < light.outline.size()) return std::nullopt;
     light = std::move(*better);
   }
   const auto steps = fit_rim_steps(image, light, lit_lines, background, picture, true, shape);
-  const auto shift = shift_of(steps.pieces, shape.has_lens());
+  const auto shift = estimate_outline_shift(steps.pieces, shape.has_lens());
   picture.gamma = other_gamma;
-  const auto other =
-      shift_of(fit_rim_steps(image, light, lit_lines, background, picture, true, shape).pieces,
-               shape.has_lens());
-  if (!shift || !other || !(shift->agreeing > min_agreeing * double(steps.looked_at))) {
+  const auto other = estimate_outline_shift(
+      fit_rim_steps(image, light, lit_lines, background, picture, true, shape).pieces,
+      shape.has_lens());
+  if (!shift || !other ||
+      !(shift->num_inliers > min_inlier_fraction * double(steps.num_examined))) {
     return std::nullopt;
   }
   light.pixel += shape.turned(shift->px);
@@ -425,13 +429,13 @@ std::optional<Light> fit_to_steps(const ImageView& image, const std::vector<int>
 
 }  // namespace
 
-bool unevenly_lit(const ImageView& image, const Blob& blob, const std::vector<EdgePoint>& outline,
-                  const Background& background) {
+bool is_unevenly_lit(const ImageView& image, const Blob& blob,
+                     const std::vector<EdgePoint>& outline, const Background& background) {
   constexpr double much = 3, min_ends = 0.2;
   constexpr int min_width = 8;
   if (outline.empty()) return false;
   const auto wide = std::count_if(blob.runs.begin(), blob.runs.end(),
-                                  [](const Run& run) { return run.width() >= min_width; });
+                                  [](const PixelRun& run) { return run.width() >= min_width; });
   if (double(outline.size()) < min_ends * 2 * double(wide)) return true;
   std::vector<double> levels;
   levels.reserve(outline.size());
@@ -442,16 +446,16 @@ bool unevenly_lit(const ImageView& image, const Blob& blob, const std::vector<Ed
   return inside > much * upper_median(std::move(levels));
 }
 
-std::optional<Rim> rim_of(const ImageView& image, const Blob& blob, const Background& background,
-                          const LightShape& shape) {
+std::optional<Rim> fit_rim(const ImageView& image, const Blob& blob, const Background& background,
+                           const LightShape& shape) {
   constexpr int min_size = 20, min_lines = 10;
   constexpr double margin = 0.2, min_step = 0.28;
   const PixelBox box = blob.box();
   if (std::min(box.width, box.height) < min_size) return std::nullopt;
-  const int more = static_cast<int>(margin * std::max(box.width, box.height));
-  const PixelBox wide =
-      intersection({box.x - more, box.y - more, box.width + 2 * more, box.height + 2 * more},
-                   {0, 0, image.width, image.height});
+  const int margin_px = static_cast<int>(margin * std::max(box.width, box.height));
+  const PixelBox wide = intersection(
+      {box.x - margin_px, box.y - margin_px, box.width + 2 * margin_px, box.height + 2 * margin_px},
+      {0, 0, image.width, image.height});
   // Window sizes for the search of the ring and for the rim.
   const int size = std::max(wide.width, wide.height);
   const int fine = std::clamp(size / 30, 2, 6), coarse = std::max(fine, size / 50);
@@ -462,13 +466,13 @@ std::optional<Rim> rim_of(const ImageView& image, const Blob& blob, const Backgr
   const Ring best = find_best_ring(blurred, box, compute_unit_plane_from_pixel(shape, middle));
   const auto crossings =
       2 * std::count_if(face.lit_lines().begin(), face.lit_lines().end(),
-                        [&](int line) { return best.ellipse.cross(line).has_value(); });
+                        [&](int line) { return best.ellipse.intersect(line).has_value(); });
   if (!(best.sum > min_step * double(crossings))) return std::nullopt;
 
   auto light = fit_near(best, face, background, shape);
   if (!light) return std::nullopt;
   // The fraction counts the clearest steps, before fit_to_steps() replaces them.
-  const double shown = std::min(1.0, double(light->outline.size()) / double(crossings));
+  const double rim_fraction = std::min(1.0, double(light->outline.size()) / double(crossings));
   auto fitted = fit_to_steps(image, face.lit_lines_of_image(), background, shape, *light);
   bool is_clear = fitted.has_value();
   if (fitted) {
@@ -479,8 +483,8 @@ std::optional<Rim> rim_of(const ImageView& image, const Blob& blob, const Backgr
     light->sigma_px = std::max(scatter_px, jackknife_px.value_or(0));
     is_clear = jackknife_px.has_value();
   }
-  light->uneven = true;
-  light->roundness = shown;
+  light->is_uneven = true;
+  light->roundness = rim_fraction;
   return Rim{std::move(*light), is_clear};
 }
 

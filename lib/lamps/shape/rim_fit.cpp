@@ -35,8 +35,8 @@ class Levels {
   }
 
   int columns() const { return image_.width; }
-  double of(double level) const { return scale_ * level; }
-  double at(int row, int column) const { return of(image_.level_at(column, row)); }
+  double scale_level(double level) const { return scale_ * level; }
+  double at(int row, int column) const { return scale_level(image_.level_at(column, row)); }
 
  private:
   ImageView image_;
@@ -72,7 +72,7 @@ struct StepModel {
   double floor;
 
   CurveDistance<kStepUnknowns> residual(const StepSample& sample) const {
-    const auto share = [](double v) { return std::erfc(-v / std::numbers::sqrt2) / 2; };
+    const auto fraction = [](double v) { return std::erfc(-v / std::numbers::sqrt2) / 2; };
     const auto density = [](double v) {
       return std::exp(-v * v / 2) / std::sqrt(2 * std::numbers::pi);
     };
@@ -81,32 +81,34 @@ struct StepModel {
     const double outer = std::exp(x[kAlong] * sample.along + x[kOut] + p * u + p * p * s * s / 2);
     const double inner = std::exp(x[kAlong] * sample.along + x[kIn] + q * u + q * q * s * s / 2);
     const double before = -u / s - p * s, behind = u / s + q * s;
-    const double out = outer * share(before), in = inner * share(behind);
+    const double out = outer * fraction(before), in = inner * fraction(behind);
     const double at_out = outer * density(before), at_in = inner * density(behind);
     const double light = out + in + std::pow(floor, gamma);
-    const double shown = std::pow(light, 1 / gamma), by_light = shown / light / gamma;
+    const double modeled_level = std::pow(light, 1 / gamma),
+                 d_level_d_light = modeled_level / light / gamma;
     CurveDistance<kStepUnknowns> result;
-    result.error = shown - std::min(sample.level, kClipped);
-    result.slope[kAt] = -by_light * (p * out - at_out / s + q * in + at_in / s);
-    result.slope[kOut] = by_light * out;
-    result.slope[kOutSlope] = by_light * (out * (u + p * s * s) - at_out * s);
-    result.slope[kIn] = by_light * in;
-    result.slope[kInSlope] = by_light * (in * (u + q * s * s) + at_in * s);
-    result.slope[kAlong] = by_light * (out + in) * sample.along;
+    result.error = modeled_level - std::min(sample.level, kClipped);
+    result.slope[kAt] = -d_level_d_light * (p * out - at_out / s + q * in + at_in / s);
+    result.slope[kOut] = d_level_d_light * out;
+    result.slope[kOutSlope] = d_level_d_light * (out * (u + p * s * s) - at_out * s);
+    result.slope[kIn] = d_level_d_light * in;
+    result.slope[kInSlope] = d_level_d_light * (in * (u + q * s * s) + at_in * s);
+    result.slope[kAlong] = d_level_d_light * (out + in) * sample.along;
     result.slope[kLogBlur] =
-        by_light * s *
+        d_level_d_light * s *
         (p * p * s * out + at_out * (u / (s * s) - p) + q * q * s * in - at_in * (u / (s * s) - q));
     return result;
   }
 };
 
 /// Splits the scanlines into pieces of at most `limit` consecutive ones.
-std::vector<std::vector<int>> pieces_of(const std::vector<int>& lines, int most) {
+std::vector<std::vector<int>> split_into_pieces(const std::vector<int>& lines, int limit) {
   std::vector<std::vector<int>> pieces;
   for (std::size_t begin = 0; begin < lines.size();) {
     std::size_t end = begin + 1;
     while (end < lines.size() && lines[end] == lines[end - 1] + 1) ++end;
-    const std::size_t all = end - begin, parts = (all + std::size_t(most) - 1) / std::size_t(most);
+    const std::size_t all = end - begin,
+                      parts = (all + std::size_t(limit) - 1) / std::size_t(limit);
     for (std::size_t i = 0; i < parts; ++i) {
       const auto first = lines.begin() + std::ptrdiff_t(begin);
       pieces.emplace_back(first + std::ptrdiff_t(all * i / parts),
@@ -161,7 +163,7 @@ class CrossedOutline {
   /// Returns the distance from the center as a fraction of that of the outline.
   double radii_at(double column, double line) const {
     constexpr double far = 10;
-    const auto plane = shape_.plane_of(shape_.turned(Eigen::Vector2d(column, line)));
+    const auto plane = shape_.pixel_to_plane(shape_.turned(Eigen::Vector2d(column, line)));
     return plane ? (light_.unit_from_plane * (*plane - light_.plane_center)).norm() : far;
   }
 
@@ -170,8 +172,8 @@ class CrossedOutline {
   Eigen::Vector2d low_, high_;
 };
 
-Piece piece_of(const Levels& levels, const std::vector<int>& lines, bool begins,
-               const CrossedOutline& outline, double reach_px) {
+Piece sample_piece(const Levels& levels, const std::vector<int>& lines, bool begins,
+                   const CrossedOutline& outline, double reach_px) {
   constexpr double straight = 0.7;
   Piece piece;
   const int middle_line = lines[lines.size() / 2];
@@ -198,15 +200,15 @@ struct Step {
   double log_blur, log_blur_sd;
 };
 
-std::optional<Step> step_of(const Piece& piece, double dark, const StepPicture& picture,
-                            bool blur_known) {
-  constexpr std::size_t least = 30;
-  constexpr int rounds = 12;
+std::optional<Step> fit_step(const Piece& piece, double dark, const StepImageModel& picture,
+                             bool blur_known) {
+  constexpr std::size_t min_samples = 30;
+  constexpr int num_iterations = 12;
   constexpr double clear_px = 2, farthest_px = 3;
   // Prior standard deviations of the slopes, of the change along the rim and of the log blur,
   // weighted relative to the noise in grey levels.
   constexpr double noise = 1.5, slope_sd = 0.3, along_sd = 0.05, log_blur_sd = 0.4;
-  if (piece.samples.size() < least) return std::nullopt;
+  if (piece.samples.size() < min_samples) return std::nullopt;
   std::array<double, 2> sums{}, counts{};
   for (const StepSample& sample : piece.samples) {
     if (std::abs(sample.depth_px) < clear_px) continue;
@@ -229,16 +231,16 @@ std::optional<Step> step_of(const Piece& piece, double dark, const StepPicture& 
                           Prior{kLogBlur, known_blur, blur_known ? 1e-3 : log_blur_sd}};
   const double tolerance = std::max({4.0, 0.2 * std::abs(in - out), 0.1 * in});
   std::optional<MEstimateStep<kStepUnknowns>> last;
-  for (int round = 0; round < rounds; ++round) {
+  for (int round = 0; round < num_iterations; ++round) {
     // A clipped pixel does not constrain a model in which it is clipped (Tobin 1958).
     std::vector<CurveDistance<kStepUnknowns>> residuals;
     for (const StepSample& sample : piece.samples) {
       residuals.push_back(model.residual(sample));
       if (sample.clipped() && residuals.back().error >= 0) residuals.pop_back();
     }
-    if (residuals.size() < least) return std::nullopt;
+    if (residuals.size() < min_samples) return std::nullopt;
     const std::vector<double> weights(residuals.size() + priors.size(), 1);
-    last = m_estimate_step<kStepUnknowns>(weights, tolerance, [&](std::size_t i) {
+    last = compute_m_estimate_step<kStepUnknowns>(weights, tolerance, [&](std::size_t i) {
       if (i < residuals.size()) return residuals[i];
       const auto& [unknown, value, sd] = priors[i - residuals.size()];
       CurveDistance<kStepUnknowns> prior{noise / sd * (model.x[unknown] - value),
@@ -247,8 +249,8 @@ std::optional<Step> step_of(const Piece& piece, double dark, const StepPicture& 
       return prior;
     });
     if (!last) return std::nullopt;
-    const StepVector most{0.7, 0.5, 0.1, 0.5, 0.1, 0.05, 0.3};
-    model.x -= last->step.cwiseMin(most).cwiseMax(-most);
+    const StepVector limit{0.7, 0.5, 0.1, 0.5, 0.1, 0.05, 0.3};
+    model.x -= last->step.cwiseMin(limit).cwiseMax(-limit);
     if (!(std::abs(model.x[kAt]) < farthest_px)) return std::nullopt;
   }
   return Step{model.x[kAt], std::sqrt(last->covariance(kAt, kAt)), model.x[kLogBlur],
@@ -259,27 +261,27 @@ std::optional<Step> step_of(const Piece& piece, double dark, const StepPicture& 
 
 RimSteps fit_rim_steps(const ImageView& image, const Light& light,
                        const std::vector<int>& lit_lines, const Background& background,
-                       const StepPicture& picture, bool blur_known, const LightShape& shape) {
-  constexpr double piece_of_radius = 0.2, min_lines = 6, max_sd_px = 0.5;
-  constexpr double min_reach_px = 7, reach_of_blur = 4;
-  constexpr double of_blur = 0.05;  // effect of sharpening and compression
+                       const StepImageModel& picture, bool blur_known, const LightShape& shape) {
+  constexpr double piece_radius_fraction = 0.2, min_lines = 6, max_sd_px = 0.5;
+  constexpr double min_reach_px = 7, reach_blur_ratio = 4;
+  constexpr double blur_sd_fraction = 0.05;  // effect of sharpening and compression
   constexpr std::size_t min_crossings = 3;
-  const double reach_px = std::max(min_reach_px, reach_of_blur * picture.blur_px);
+  const double reach_px = std::max(min_reach_px, reach_blur_ratio * picture.blur_px);
   const CrossedOutline outline(light, shape);
   const Levels levels(image, shape.turned(light.low), shape.turned(light.high));
-  const int most = static_cast<int>(std::max(min_lines, piece_of_radius * light.radius_px));
+  const int limit = static_cast<int>(std::max(min_lines, piece_radius_fraction * light.radius_px));
   RimSteps result{{}, 0, {}, picture.blur_px};
   double log_blur = 0, weight = 0;
-  for (const std::vector<int>& lines : pieces_of(lit_lines, most)) {
+  for (const std::vector<int>& lines : split_into_pieces(lit_lines, limit)) {
     for (const bool begins : {true, false}) {
-      const Piece piece = piece_of(levels, lines, begins, outline, reach_px);
+      const Piece piece = sample_piece(levels, lines, begins, outline, reach_px);
       if (piece.crossings.size() < min_crossings) continue;
-      ++result.looked_at;
-      const auto step = step_of(piece, levels.of(background.level), picture, blur_known);
+      ++result.num_examined;
+      const auto step = fit_step(piece, levels.scale_level(background.level), picture, blur_known);
       if (!step || !(step->sd_px < max_sd_px)) continue;
       log_blur += step->log_blur / std::pow(step->log_blur_sd, 2);
       weight += 1 / std::pow(step->log_blur_sd, 2);
-      const double sd_px = std::hypot(step->sd_px, of_blur * picture.blur_px);
+      const double sd_px = std::hypot(step->sd_px, blur_sd_fraction * picture.blur_px);
       const Crossing& middle = piece.crossings[piece.crossings.size() / 2];
       result.pieces.push_back({outline.inwards(middle), step->at_px, sd_px});
       for (const Crossing& crossing : piece.crossings) {
@@ -298,12 +300,12 @@ RimSteps fit_rim_steps(const ImageView& image, const Light& light,
 namespace {
 
 template <int N>
-std::optional<OutlineShift> shift_by(const std::vector<RimPiece>& pieces) {
-  constexpr int rounds = 8;
+std::optional<OutlineShift> estimate_shift(const std::vector<RimPiece>& pieces) {
+  constexpr int num_iterations = 8;
   constexpr double tukey = 4.685, sigma_from_median = 1.4826;
   if (pieces.size() < N + 2) return std::nullopt;
   using Vector = Eigen::Matrix<double, N, 1>;
-  const auto slope_of = [](const RimPiece& piece) {
+  const auto evaluate_slope = [](const RimPiece& piece) {
     const double c = piece.inwards.x(), s = piece.inwards.y();
     Vector slope;
     slope[0] = c, slope[1] = s, slope[2] = -1;
@@ -312,25 +314,25 @@ std::optional<OutlineShift> shift_by(const std::vector<RimPiece>& pieces) {
   };
   Vector x = Vector::Zero();
   OutlineShift shift{};
-  for (int round = 0; round < rounds; ++round) {
+  for (int round = 0; round < num_iterations; ++round) {
     std::vector<double> errors, sizes;
     for (const RimPiece& piece : pieces) {
-      errors.push_back(piece.behind_px / piece.sd_px - slope_of(piece).dot(x));
+      errors.push_back(piece.behind_px / piece.sd_px - evaluate_slope(piece).dot(x));
       sizes.push_back(std::abs(errors.back()));
     }
     const double scale = std::max(1.0, sigma_from_median * upper_median(std::move(sizes)));
     Normal<std::size_t(N)> normal;
     double squares = 0, all = 0;
     for (std::size_t i = 0; i < pieces.size(); ++i) {
-      const double share = errors[i] / (tukey * scale);
-      if (std::abs(share) >= 1) continue;
-      const double weight = std::pow(1 - share * share, 2);
-      normal.add_row(slope_of(pieces[i]), errors[i], weight);
+      const double fraction = errors[i] / (tukey * scale);
+      if (std::abs(fraction) >= 1) continue;
+      const double weight = std::pow(1 - fraction * fraction, 2);
+      normal.add_row(evaluate_slope(pieces[i]), errors[i], weight);
       squares += weight * errors[i] * errors[i];
       all += weight;
     }
     const Cholesky<std::size_t(N)> factor(normal);
-    if (!factor.determines(1e-9) || !(all > N + 1)) return std::nullopt;
+    if (!factor.has_full_rank(1e-9) || !(all > N + 1)) return std::nullopt;
     const auto step = factor.solve(normal.gradient);
     for (int i = 0; i < N; ++i) x[i] += step[std::size_t(i)];
     const double beyond = std::max(1.0, squares / (all - N));
@@ -340,15 +342,16 @@ std::optional<OutlineShift> shift_by(const std::vector<RimPiece>& pieces) {
       shift.covariance(1, i) = beyond * column[1];
     }
     shift.px = x.template head<2>();
-    shift.agreeing = all;
+    shift.num_inliers = all;
   }
   return shift;
 }
 
 }  // namespace
 
-std::optional<OutlineShift> shift_of(const std::vector<RimPiece>& pieces, bool round) {
-  return round ? shift_by<3>(pieces) : shift_by<5>(pieces);
+std::optional<OutlineShift> estimate_outline_shift(const std::vector<RimPiece>& pieces,
+                                                   bool round) {
+  return round ? estimate_shift<3>(pieces) : estimate_shift<5>(pieces);
 }
 
 }  // namespace vlp

@@ -15,7 +15,7 @@ namespace vlp {
 
 /// Imaging model of a step of light: standard deviation of the blur, and the tone curve level =
 /// light^(1 / gamma).
-struct StepPicture {
+struct StepImageModel {
   double blur_px, gamma;
 };
 
@@ -30,7 +30,7 @@ struct RimPiece {
 struct RimSteps {
   std::vector<RimPiece> pieces;
   /// Number of examined pieces, with or without a clear step.
-  std::size_t looked_at;
+  std::size_t num_examined;
   /// Points where scanlines cross the pieces; EdgePoint::level is their weight.
   std::vector<EdgePoint> points;
   /// Weighted mean of the fitted log blurs; the given blur if it is known.
@@ -45,26 +45,26 @@ struct RimSteps {
 ///
 /// The levels exp(o + p u) outside and exp(i + q u) inside may rise on both sides, for example with
 /// a halo and a source deep in a reflector. Between them is a step at x, up or down, blurred by s,
-/// above the dark floor; F is the normal distribution. StepPicture converts light to levels,
+/// above the dark floor; F is the normal distribution. StepImageModel converts light to levels,
 /// because half of a coded level is not half of the light: the larger the step, the further out it
 /// appears (lib/THEORY.md). A clipped pixel is a lower bound of its light. The blur is also fitted
 /// unless `blur_known`.
 RimSteps fit_rim_steps(const ImageView& image, const Light& light,
                        const std::vector<int>& lit_lines, const Background& background,
-                       const StepPicture& picture, bool blur_known, const LightShape& shape);
+                       const StepImageModel& picture, bool blur_known, const LightShape& shape);
 
 /// Offset of an outline, (column, line), estimated from its pieces, and its covariance.
 struct OutlineShift {
   Eigen::Vector2d px;
   Matrix2 covariance;
   /// Sum of the weights of the pieces, about the number of inliers.
-  double agreeing;
+  double num_inliers;
 };
 
 /// Estimates the offset of an outline by robust least squares (Tukey's biweight). Also estimates
 /// its change of size, and its ovality unless the outline is `round` in the plane of LightShape. If
 /// the scatter of the pieces exceeds their standard deviations, these are scaled. Returns
 /// std::nullopt if there are too few pieces.
-std::optional<OutlineShift> shift_of(const std::vector<RimPiece>& pieces, bool round);
+std::optional<OutlineShift> estimate_outline_shift(const std::vector<RimPiece>& pieces, bool round);
 
 }  // namespace vlp

@@ -14,7 +14,7 @@
 namespace vlp {
 namespace {
 
-constexpr int kLeast = 5;
+constexpr int kMinPoints = 5;
 
 std::optional<Circle> through(const Eigen::Vector2d& a, const Eigen::Vector2d& b,
                               const Eigen::Vector2d& c) {
@@ -32,7 +32,7 @@ std::optional<Circle> through(const Eigen::Vector2d& a, const Eigen::Vector2d& b
 std::optional<Circle> best_supported(std::span<const Eigen::Vector2d> points, double tolerance) {
   constexpr int triples = 40;
   std::optional<Circle> best;
-  double most = kLeast - 1;
+  double max_score = kMinPoints - 1;
   const std::size_t n = points.size();
   Eigen::AlignedBox2d box;
   for (const Eigen::Vector2d& point : points) box.extend(point);
@@ -58,7 +58,7 @@ std::optional<Circle> best_supported(std::span<const Eigen::Vector2d> points, do
       outside += square > outer;
     }
     const double score = close - outside / 2.0;
-    if (score > most) most = score, best = circle;
+    if (score > max_score) max_score = score, best = circle;
     if (close == static_cast<int>(n)) break;  // none has more
   }
   return best;
@@ -68,12 +68,12 @@ std::optional<Circle> best_supported(std::span<const Eigen::Vector2d> points, do
 
 std::optional<RobustCircle> fit_robust_circle(std::span<const Eigen::Vector2d> points,
                                               std::span<const double> weights, double tolerance) {
-  if (points.size() < kLeast) return std::nullopt;
+  if (points.size() < kMinPoints) return std::nullopt;
   const auto begin = best_supported(points, tolerance);
   if (!begin) return std::nullopt;
   RobustCircle fit{*begin, {}, {}, 0, 0};
-  for (int round = 0; round < 5; ++round) {
-    auto better = m_estimate_step<3>(weights, tolerance, [&](std::size_t i) {
+  for (int iteration = 0; iteration < 5; ++iteration) {
+    auto better = compute_m_estimate_step<3>(weights, tolerance, [&](std::size_t i) {
       const Eigen::Vector2d away = points[i] - fit.circle.center;
       const double norm = std::max(away.norm(), std::numeric_limits<double>::min());
       return CurveDistance<3>{norm - fit.circle.radius, {-away.x() / norm, -away.y() / norm, -1}};

@@ -38,7 +38,7 @@ struct Conic {
 std::optional<RobustEllipse> fit_robust_ellipse(std::span<const Eigen::Vector2d> points,
                                                 std::span<const double> weights, double tolerance) {
   constexpr double max_oval = 1.0 / 8, max_axis_ratio = 3;
-  constexpr int rounds = 10;
+  constexpr int num_iterations = 10;
   if (points.empty()) return std::nullopt;
   Eigen::Vector2d low = points[0], high = points[0];
   for (const Eigen::Vector2d& point : points) {
@@ -52,10 +52,10 @@ std::optional<RobustEllipse> fit_robust_ellipse(std::span<const Eigen::Vector2d>
   const double unit = circle->circle.radius;
   Conic ellipse{Eigen::Vector2d::Zero(), Matrix2::Identity()};
   RobustEllipse fit{};
-  for (int round = 0; round < rounds; ++round) {
+  for (int iteration = 0; iteration < num_iterations; ++iteration) {
     // The tolerance decreases as the ellipse converges.
-    const double narrowed = std::max(tolerance, oval * std::pow(0.6, round));
-    auto better = m_estimate_step<5>(weights, narrowed / unit, [&](std::size_t i) {
+    const double narrowed = std::max(tolerance, oval * std::pow(0.6, iteration));
+    auto better = compute_m_estimate_step<5>(weights, narrowed / unit, [&](std::size_t i) {
       return ellipse.distance((points[i] - circle->circle.center) / unit);
     });
     if (!better) return std::nullopt;
@@ -68,9 +68,9 @@ std::optional<RobustEllipse> fit_robust_ellipse(std::span<const Eigen::Vector2d>
     fit.inliers = std::move(better->inliers);
     fit.count = better->count;
   }
-  const auto axes = symmetric_eigen(Eigen::Matrix2d(ellipse.conic));
-  const double least = axes.values[0], most = axes.values[1];
-  if (!(least * max_axis_ratio * max_axis_ratio > most)) return std::nullopt;
+  const auto axes = decompose_symmetric(Eigen::Matrix2d(ellipse.conic));
+  const double min_eigenvalue = axes.values[0], max_eigenvalue = axes.values[1];
+  if (!(min_eigenvalue * max_axis_ratio * max_axis_ratio > max_eigenvalue)) return std::nullopt;
   fit.center = circle->circle.center + unit * ellipse.center;
   const Eigen::Vector2d semi_axes = axes.values.cwiseInverse().cwiseSqrt();
   fit.rim_from_circle =
@@ -89,14 +89,14 @@ std::optional<RobustEllipse> fit_slender_ellipse(std::span<const Eigen::Vector2d
   for (const Eigen::Vector2d& point : points) {
     scatter += (point - middle) * (point - middle).transpose() / count;
   }
-  const auto root_of = [](const Matrix2& square) -> Matrix2 {
-    const auto axes = symmetric_eigen(Eigen::Matrix2d(square));
+  const auto compute_square_root = [](const Matrix2& square) -> Matrix2 {
+    const auto axes = decompose_symmetric(Eigen::Matrix2d(square));
     return axes.vectors * axes.values.cwiseMax(0).cwiseSqrt().asDiagonal() *
            axes.vectors.transpose();
   };
   // Points distributed around an ellipse have the standard deviation semi-axis / sqrt(2) along each
   // axis.
-  const Matrix2 to_points = std::numbers::sqrt2 * root_of(scatter);
+  const Matrix2 to_points = std::numbers::sqrt2 * compute_square_root(scatter);
   const double mean_scale = std::sqrt(to_points.determinant());
   if (!(mean_scale > 0)) return std::nullopt;
   const Matrix2 from_points = to_points.inverse();
@@ -107,7 +107,7 @@ std::optional<RobustEllipse> fit_slender_ellipse(std::span<const Eigen::Vector2d
   if (!fit) return std::nullopt;
   const Matrix2 rim = to_points * fit->rim_from_circle;
   fit->center = middle + to_points * fit->center;
-  fit->rim_from_circle = root_of(rim * rim.transpose());
+  fit->rim_from_circle = compute_square_root(rim * rim.transpose());
   fit->center_covariance = to_points * fit->center_covariance * to_points.transpose();
   return fit;
 }

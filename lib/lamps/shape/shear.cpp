@@ -11,10 +11,10 @@ namespace vlp {
 namespace {
 
 /// Relative deviation of an oval from that predicted by the motion.
-constexpr double kUnlike = 0.15;
+constexpr double kModelDeviation = 0.15;
 
 /// Returns the derivative of the oval with respect to the motion (v, w) / 2.
-Eigen::Matrix<double, 2, 3> oval_from_motion(const OutlineSums& light) {
+Eigen::Matrix<double, 2, 3> compute_d_oval_d_motion(const OutlineSums& light) {
   const Eigen::Vector2d &slope = light.line_slope(), &at = light.circle().center;
   const Eigen::Matrix2d times_slope{{slope.x(), -slope.y()}, {slope.y(), slope.x()}};
   Eigen::Matrix<double, 2, 3> result;
@@ -22,11 +22,11 @@ Eigen::Matrix<double, 2, 3> oval_from_motion(const OutlineSums& light) {
   return result;
 }
 
-Matrix2 unlike(const Eigen::Vector2d& oval) {
-  return kUnlike * kUnlike * oval.squaredNorm() * Matrix2::Identity();
+Matrix2 compute_model_covariance(const Eigen::Vector2d& oval) {
+  return kModelDeviation * kModelDeviation * oval.squaredNorm() * Matrix2::Identity();
 }
 
-struct Shown {
+struct MeasuredOval {
   Eigen::Matrix<double, 2, 3> from_motion;
   Eigen::Vector2d oval;
   Matrix2 information;
@@ -42,14 +42,14 @@ struct Motion {
   Eigen::Matrix3d information;
 };
 
-Motion motion_of(const std::vector<Shown>& lights) {
+Motion estimate_motion(const std::vector<MeasuredOval>& lights) {
   // Prior of the rotation: a camera that observes lamps rotates by less than a radian or two in
   // 10,000 scanlines.
   constexpr double max_turn = 1e-4;
   Motion motion{Eigen::Vector3d::Zero(), Eigen::Matrix3d::Zero()};
   motion.information(2, 2) = 1 / (max_turn * max_turn);
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
-  for (const Shown& light : lights) {
+  for (const MeasuredOval& light : lights) {
     const Eigen::Matrix<double, 3, 2> weighed = light.from_motion.transpose() * light.information;
     motion.information += weighed * light.from_motion;
     right += weighed * light.oval;
@@ -62,8 +62,8 @@ Motion motion_of(const std::vector<Shown>& lights) {
 
 OutlineSums::OutlineSums(std::span<const Eigen::Vector2d> points, std::span<const double> weights,
                          const std::vector<bool>& counted, const Circle& circle,
-                         const Eigen::Vector2d& line_slope, double together)
-    : circle_(circle), line_slope_(line_slope), together_(together) {
+                         const Eigen::Vector2d& line_slope, double num_correlated)
+    : circle_(circle), line_slope_(line_slope), num_correlated_(num_correlated) {
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (!counted[i]) continue;
     const Eigen::Vector2d away = (points[i] - circle_.center) / circle_.radius;
@@ -78,9 +78,10 @@ OutlineSums::OutlineSums(std::span<const Eigen::Vector2d> points, std::span<cons
   }
 }
 
-std::optional<OutlineSums::Estimate> OutlineSums::solved(const std::optional<Oval>& known) const {
-  constexpr int unknowns = 5, least = 2 * unknowns;
-  if (count_ < least) return std::nullopt;
+std::optional<OutlineSums::Estimate> OutlineSums::solve_with_prior(
+    const std::optional<Oval>& known) const {
+  constexpr int unknowns = 5, min_points = 2 * unknowns;
+  if (count_ < min_points) return std::nullopt;
   const auto solve = [&](double variance) -> std::optional<Estimate> {
     Matrix5 information = normal_ / variance;
     Vector5 right = gradient_ / variance;
@@ -95,7 +96,7 @@ std::optional<OutlineSums::Estimate> OutlineSums::solved(const std::optional<Ova
   };
   const auto variance_left = [&](const Vector5& p) {
     const double left = squares_ - 2 * gradient_.dot(p) + p.dot(normal_ * p);
-    return together_ * std::max(left, 1e-12 * weight_) / (count_ - unknowns);
+    return num_correlated_ * std::max(left, 1e-12 * weight_) / (count_ - unknowns);
   };
   constexpr double first = 1e-4;  // of the radius, squared
   auto estimate = solve(first);
@@ -103,28 +104,29 @@ std::optional<OutlineSums::Estimate> OutlineSums::solved(const std::optional<Ova
   return estimate;
 }
 
-std::optional<Shear> Shear::common(std::span<const OutlineSums> lights) {
+std::optional<Shear> Shear::estimate(std::span<const OutlineSums> lights) {
   constexpr double max_sd = 0.01;      // of the radius; of lights that are used
   constexpr double beyond_doubt = 30;  // a chi-square of 2
   constexpr double contradicts = 14;   // a chi-square of 2
-  std::vector<Shown> shown;
+  std::vector<MeasuredOval> ovals;
   for (const OutlineSums& light : lights) {
-    const auto estimate = light.solved(std::nullopt);
+    const auto estimate = light.solve_with_prior(std::nullopt);
     if (!estimate) continue;
     const Matrix2 covariance = estimate->covariance.bottomRightCorner<2, 2>();
     if (covariance.trace() > 2 * max_sd * max_sd) continue;
     const Eigen::Vector2d oval = estimate->p.tail<2>();
-    shown.push_back({oval_from_motion(light), oval, (covariance + unlike(oval)).inverse()});
+    ovals.push_back({compute_d_oval_d_motion(light), oval,
+                     (covariance + compute_model_covariance(oval)).inverse()});
   }
-  const std::size_t all = shown.size();
-  while (!shown.empty() && 2 * shown.size() >= all) {
-    const Motion motion = motion_of(shown);
-    const auto worst =
-        std::max_element(shown.begin(), shown.end(), [&](const Shown& a, const Shown& b) {
+  const std::size_t all = ovals.size();
+  while (!ovals.empty() && 2 * ovals.size() >= all) {
+    const Motion motion = estimate_motion(ovals);
+    const auto worst = std::max_element(
+        ovals.begin(), ovals.end(), [&](const MeasuredOval& a, const MeasuredOval& b) {
           return a.chi_square(motion.value) < b.chi_square(motion.value);
         });
     if (worst->chi_square(motion.value) > contradicts) {
-      shown.erase(worst);
+      ovals.erase(worst);
       continue;
     }
     if (motion.value.dot(motion.information * motion.value) < beyond_doubt) break;
@@ -133,10 +135,11 @@ std::optional<Shear> Shear::common(std::span<const OutlineSums> lights) {
   return std::nullopt;
 }
 
-Oval Shear::oval_of(const OutlineSums& light) const {
-  const auto from_motion = oval_from_motion(light);
+Oval Shear::predict_oval(const OutlineSums& light) const {
+  const auto from_motion = compute_d_oval_d_motion(light);
   const Eigen::Vector2d oval = from_motion * motion_;
-  return {oval, from_motion * covariance_ * from_motion.transpose() + unlike(oval)};
+  return {oval,
+          from_motion * covariance_ * from_motion.transpose() + compute_model_covariance(oval)};
 }
 
 Eigen::Vector2d Shear::motion_at(const OutlineSums& light) const {

@@ -42,12 +42,12 @@ class OutlineSums {
   /// @param num_correlated  number of neighboring points with a common error
   OutlineSums(std::span<const Eigen::Vector2d> points, std::span<const double> weights,
               const std::vector<bool>& counted, const Circle& circle,
-              const Eigen::Vector2d& line_slope, double together = 1);
+              const Eigen::Vector2d& line_slope, double num_correlated = 1);
 
   /// Solves for p, with the oval as a prior if it is known. The variance is that of the residuals
   /// times the number of points with a common error. Returns std::nullopt if the points do not
   /// determine p.
-  std::optional<Estimate> solved(const std::optional<Oval>& known) const;
+  std::optional<Estimate> solve_with_prior(const std::optional<Oval>& known) const;
 
   bool empty() const { return count_ == 0; }
   const Circle& circle() const { return circle_; }
@@ -58,7 +58,7 @@ class OutlineSums {
   Eigen::Vector2d line_slope_ = Eigen::Vector2d::Zero();
   Matrix5 normal_ = Matrix5::Zero();
   Vector5 gradient_ = Vector5::Zero();
-  double squares_ = 0, weight_ = 0, together_ = 1;
+  double squares_ = 0, weight_ = 0, num_correlated_ = 1;
   int count_ = 0;
 };
 
@@ -74,10 +74,10 @@ class Shear {
   /// Estimates the motion from lights with a sufficiently visible outline. Rejects lights that
   /// contradict the majority. Returns std::nullopt if less than half of the lights agree, or if the
   /// motion is not significant.
-  static std::optional<Shear> common(std::span<const OutlineSums> lights);
+  static std::optional<Shear> estimate(std::span<const OutlineSums> lights);
 
   /// Returns the oval of a light's outline that the motion causes, with its covariance.
-  Oval oval_of(const OutlineSums& light) const;
+  Oval predict_oval(const OutlineSums& light) const;
   /// Returns the motion of a light in the level plane per scanline.
   Eigen::Vector2d motion_at(const OutlineSums& light) const;
 

@@ -37,9 +37,9 @@ template <int N>
 struct Model {
   Eigen::Matrix<double, N, 1> x;
 
-  /// Returns the residual and its derivative with respect to the unknowns. `with_level` receives
-  /// the derivative with respect to the scanline's level.
-  CurveDistance<N> residual(const Sample& sample, double* with_level = nullptr) const {
+  /// Returns the residual and its derivative with respect to the unknowns. `d_residual_d_level`
+  /// receives the derivative with respect to the scanline's level.
+  CurveDistance<N> residual(const Sample& sample, double* d_residual_d_level = nullptr) const {
     const double t = sample.t, middle = 4 * t * (1 - t);
     double move = (1 - t) * x[kFrom] + t * x[kTo];
     if constexpr (N > kBow) move += middle * x[kBow];
@@ -48,19 +48,19 @@ struct Model {
     const double density = std::exp(-depth * depth / 2) / std::sqrt(2 * std::numbers::pi);
     const double level = (1 - t) * x[kLevelFrom] + t * x[kLevelTo] + middle * x[kLevelBend];
     const double s = sample.lit.level, step = s * (level - x[kOutside]);
-    const double shown = x[kOutside] + (level - x[kOutside]) * inside;
+    const double modeled = x[kOutside] + (level - x[kOutside]) * inside;
     CurveDistance<N> result;
-    result.error = sample.value - s * shown;
-    const double with_move = step * density / x[kBlur] * sample.per_move;
-    result.slope[kFrom] = with_move * (1 - t);
-    result.slope[kTo] = with_move * t;
+    result.error = sample.value - s * modeled;
+    const double d_residual_d_move = step * density / x[kBlur] * sample.per_move;
+    result.slope[kFrom] = d_residual_d_move * (1 - t);
+    result.slope[kTo] = d_residual_d_move * t;
     result.slope[kBlur] = step * density * depth / x[kBlur];
     result.slope[kLevelFrom] = -s * inside * (1 - t);
     result.slope[kLevelTo] = -s * inside * t;
     result.slope[kLevelBend] = -s * inside * middle;
     result.slope[kOutside] = -s * (1 - inside);
-    if constexpr (N > kBow) result.slope[kBow] = with_move * middle;
-    if (with_level != nullptr) *with_level = -shown;
+    if constexpr (N > kBow) result.slope[kBow] = d_residual_d_move * middle;
+    if (d_residual_d_level != nullptr) *d_residual_d_level = -modeled;
     return result;
   }
 };
@@ -81,21 +81,21 @@ class Samples {
     if (!trace()) return;
     // A corner is blurred by both sides.
     constexpr double corner_px = 4;
-    const Eigen::Vector2d way = trace_.back() - trace_.front();
-    const double length_px = way.norm();
+    const Eigen::Vector2d direction = trace_.back() - trace_.front();
+    const double length_px = direction.norm();
     if (length_px < 3 * corner_px) return;
-    const int along = std::abs(way.y()) >= std::abs(way.x()) ? 1 : 0;
+    const int along = std::abs(direction.y()) >= std::abs(direction.x()) ? 1 : 0;
     const double margin = corner_px / length_px;
     const double from = at(margin)[along], to = at(1 - margin)[along];
     const int begin = static_cast<int>(std::ceil(std::min(from, to)));
     const int end = static_cast<int>(std::floor(std::max(from, to)));
-    std::vector<int> stations;
-    for (int station = begin; station <= end; ++station) {
-      if (along == 0 || shows(station)) stations.push_back(station);
+    std::vector<int> positions;
+    for (int position = begin; position <= end; ++position) {
+      if (along == 0 || is_lit(position)) positions.push_back(position);
     }
-    const std::size_t every = (stations.size() + search.stations - 1) / search.stations;
-    for (std::size_t i = 0; i < stations.size(); i += every) {
-      if (add_station(stations[i], along, search.reach_px)) continue;
+    const std::size_t every = (positions.size() + search.positions - 1) / search.positions;
+    for (std::size_t i = 0; i < positions.size(); i += every) {
+      if (add_position(positions[i], along, search.reach_px)) continue;
       samples.clear();
       return;
     }
@@ -115,16 +115,16 @@ class Samples {
   static constexpr int kPieces = 16;
 
   /// Returns true if a scanline is not dark.
-  bool shows(int line) const {
-    constexpr double least = 0.1;
+  bool is_lit(int line) const {
+    constexpr double minimum = 0.1;
     const auto lit = levels_.at(line);
-    return lit && lit->level > least;
+    return lit && lit->level > minimum;
   }
 
   bool trace() {
     for (int i = 0; i <= kPieces; ++i) {
       const double t = double(i) / kPieces;
-      const auto pixel = shape_.pixel_of(side_.from + t * (side_.to - side_.from));
+      const auto pixel = shape_.plane_to_pixel(side_.from + t * (side_.to - side_.from));
       if (!pixel) return false;
       const Eigen::Vector2d at = shape_.turned(*pixel);
       if (!(at.minCoeff() > -1 && at.x() < lines_.width && at.y() < lines_.height)) return false;
@@ -134,27 +134,27 @@ class Samples {
   }
 
   /// Returns the point where the side crosses a column (along 0) or row (1).
-  Eigen::Vector2d crossing(int station, int along) const {
+  Eigen::Vector2d crossing(int position, int along) const {
     for (std::size_t i = 0; i + 1 < trace_.size(); ++i) {
-      const double a = trace_[i][along] - station, b = trace_[i + 1][along] - station;
+      const double a = trace_[i][along] - position, b = trace_[i + 1][along] - position;
       if (a * b <= 0 && a != b) return trace_[i] + a / (a - b) * (trace_[i + 1] - trace_[i]);
     }
     return trace_.front();
   }
 
-  double value_of(int column, int row) const {
+  double read_value(int column, int row) const {
     return (lines_.level_at(column, row) - dark_) / levels_.brightest();
   }
 
   /// Adds the pixels across the side at one column or row. Returns false if they are outside the
   /// image or the plane.
-  bool add_station(int station, int along, double reach_px) {
+  bool add_position(int position, int along, double reach_px) {
     constexpr double apart_px = 2;
     const int across = 1 - along;
-    const Eigen::Vector2d edge = crossing(station, along);
+    const Eigen::Vector2d edge = crossing(position, along);
     const Eigen::Vector2d middle = edge.array().round();
     const auto plane = [&](const Eigen::Vector2d& pixel) {
-      return shape_.plane_of(shape_.turned(pixel));
+      return shape_.pixel_to_plane(shape_.turned(pixel));
     };
     const auto here = plane(middle);
     const auto right = plane(middle + Eigen::Vector2d(apart_px, 0));
@@ -180,11 +180,11 @@ class Samples {
       const auto lit = levels_.at(row);
       if (!lit) continue;
       const Eigen::Vector2d away = *here + plane_from_pixel * (pixel - middle) - side_.from;
-      const double share = levels_.share_at(column);
+      const double fraction = levels_.relative_level_at(column);
       samples.push_back({row,
-                         {share * lit->level, share * lit->sd},
-                         value_of(column, row),
-                         away.dot(side_.way()) / length,
+                         {fraction * lit->level, fraction * lit->sd},
+                         read_value(column, row),
+                         away.dot(side_.direction()) / length,
                          away.dot(inwards) / px,
                          per_px_ / px});
     }
@@ -220,7 +220,7 @@ constexpr std::size_t kNumPriors = N > kBow ? 4 : 3;
 
 template <int N>
 CurveDistance<N> evaluate_prior(const Model<N>& model, std::size_t which, const Priors& priors) {
-  constexpr double change = 0.1 / 100, bend = 0.05 / 100, blur_sd = 0.15;
+  constexpr double change = 0.1 / 100, curvature = 0.05 / 100, blur_sd = 0.15;
   CurveDistance<N> result{0, Eigen::Matrix<double, N, 1>::Zero()};
   const auto expect = [&](int unknown, double value, double sd) {
     result.error = kNoise / sd * (model.x[unknown] - value);
@@ -230,7 +230,7 @@ CurveDistance<N> evaluate_prior(const Model<N>& model, std::size_t which, const 
     expect(kLevelTo, model.x[kLevelFrom], change * priors.length_px);
     result.slope[kLevelFrom] = -result.slope[kLevelTo];
   } else if (which == 1) {
-    expect(kLevelBend, 0, bend * priors.length_px);
+    expect(kLevelBend, 0, curvature * priors.length_px);
   } else if (which == 2) {
     if (priors.blur_px > 0) expect(kBlur, priors.blur_px, blur_sd * priors.blur_px);
   } else if constexpr (N > kBow) {
@@ -243,9 +243,11 @@ CurveDistance<N> evaluate_prior(const Model<N>& model, std::size_t which, const 
 /// is used, because bright pixels are noisier than dark ones (White 1980). Errors of the levels of
 /// scanlines are common to their pixels. The priors contribute as well.
 template <int N>
-std::optional<Matrix2> covariance_of_ends(const Model<N>& model, const std::vector<Sample>& samples,
-                                          const std::vector<double>& weights,
-                                          const std::vector<bool>& inliers, const Priors& priors) {
+std::optional<Matrix2> compute_ends_covariance(const Model<N>& model,
+                                               const std::vector<Sample>& samples,
+                                               const std::vector<double>& weights,
+                                               const std::vector<bool>& inliers,
+                                               const Priors& priors) {
   Normal<std::size_t(N)> normal;
   double count = 0;
   for (std::size_t i = 0; i < samples.size(); ++i) {
@@ -257,7 +259,7 @@ std::optional<Matrix2> covariance_of_ends(const Model<N>& model, const std::vect
     normal.add_row(evaluate_prior(model, which, priors).slope, 0);
   }
   const Cholesky<std::size_t(N)> factor(normal);
-  if (!factor.determines(1e-12) || !(count > N)) return std::nullopt;
+  if (!factor.has_full_rank(1e-12) || !(count > N)) return std::nullopt;
   const auto from = factor.inverse_column(kFrom), to = factor.inverse_column(kTo);
   const auto ends_moved_by = [&](const Eigen::Matrix<double, N, 1>& pull) {
     Eigen::Vector2d moved(0, 0);
@@ -267,16 +269,16 @@ std::optional<Matrix2> covariance_of_ends(const Model<N>& model, const std::vect
     return moved;
   };
   Matrix2 covariance = Matrix2::Zero();
-  std::map<int, std::pair<Eigen::Vector2d, double>> of_lines;
+  std::map<int, std::pair<Eigen::Vector2d, double>> line_errors;
   for (std::size_t i = 0; i < samples.size(); ++i) {
     if (!inliers[i]) continue;
-    double with_level = 0;
-    const auto [error, slope] = model.residual(samples[i], &with_level);
+    double d_residual_d_level = 0;
+    const auto [error, slope] = model.residual(samples[i], &d_residual_d_level);
     const Eigen::Vector2d moved = weights[i] * ends_moved_by(slope);
     covariance += error * error * moved * moved.transpose();
-    auto& [by_level, sd] =
-        of_lines.try_emplace(samples[i].line, Eigen::Vector2d(0, 0), 0).first->second;
-    by_level += with_level * moved;
+    auto& [d_ends_d_level, sd] =
+        line_errors.try_emplace(samples[i].line, Eigen::Vector2d(0, 0), 0).first->second;
+    d_ends_d_level += d_residual_d_level * moved;
     sd = samples[i].lit.sd;
   }
   covariance *= count / (count - N);
@@ -285,8 +287,8 @@ std::optional<Matrix2> covariance_of_ends(const Model<N>& model, const std::vect
         kNoise * ends_moved_by(evaluate_prior(model, which, priors).slope);
     covariance += moved * moved.transpose();
   }
-  for (const auto& [line, of_line] : of_lines) {
-    const Eigen::Vector2d moved = of_line.first * of_line.second;
+  for (const auto& [line, line_error] : line_errors) {
+    const Eigen::Vector2d moved = line_error.first * line_error.second;
     covariance += moved * moved.transpose();
   }
   return covariance;
@@ -309,7 +311,7 @@ std::optional<StraightEdge> fit(const Samples& all, const Side& side, double per
   model.x[kLevelFrom] = model.x[kLevelTo] = 1;
   std::optional<MEstimateStep<N>> last;
   for (const double tolerance : tolerances) {
-    last = m_estimate_step<N>(weights, tolerance, [&](std::size_t i) {
+    last = compute_m_estimate_step<N>(weights, tolerance, [&](std::size_t i) {
       return i < samples.size() ? model.residual(samples[i])
                                 : evaluate_prior(model, i - samples.size(), priors);
     });
@@ -325,7 +327,7 @@ std::optional<StraightEdge> fit(const Samples& all, const Side& side, double per
   const auto& x = model.x;
   const double min_level = std::min(x[kLevelFrom], x[kLevelTo]);
   if (!(min_level - x[kOutside] > min_step)) return std::nullopt;
-  const auto covariance = covariance_of_ends(model, samples, weights, last->inliers, priors);
+  const auto covariance = compute_ends_covariance(model, samples, weights, last->inliers, priors);
   if (!covariance) return std::nullopt;
 
   const Eigen::Vector2d inwards = side.inwards() * per_px;
@@ -342,8 +344,8 @@ std::optional<StraightEdge> fit(const Samples& all, const Side& side, double per
     ++close;
     like += std::abs(model.residual(sample).error) < explained * sample.lit.level + 0.02;
   }
-  edge.share = close > 0 ? double(like) / close : 0;
-  if (edge.share < min_fraction) return std::nullopt;
+  edge.fraction = close > 0 ? double(like) / close : 0;
+  if (edge.fraction < min_fraction) return std::nullopt;
   return edge;
 }
 
@@ -366,11 +368,11 @@ class HiddenEdge {
       const double sd = std::hypot(sample->lit.sd, line_sd * sample->lit.level);
       double moment = 0, squares = 0;
       for (; sample != samples_.end() && sample->line == line; ++sample) {
-        const double share = inside(*sample, ends_px);
-        const double error = (sample->value - sample->lit.level * share) / noise;
+        const double fraction = inside(*sample, ends_px);
+        const double error = (sample->value - sample->lit.level * fraction) / noise;
         sum += error * error;
-        moment += error * share / noise;
-        squares += share * share / (noise * noise);
+        moment += error * fraction / noise;
+        squares += fraction * fraction / (noise * noise);
       }
       sum -= moment * moment / (1 / (sd * sd) + squares);
     }
@@ -411,7 +413,7 @@ struct Ends {
 };
 
 Ends average_ends(const HiddenEdge& edge, const HiddenEdgePrior& prior, double reach_px) {
-  constexpr int rounds = 4, offsets = 21, slants = 9;
+  constexpr int num_iterations = 4, offsets = 21, slants = 9;
   constexpr double deviations = 3.5;
   Matrix2 ends_from_node;  // a node is an offset and a slant
   ends_from_node << 1, -1, 1, 1;
@@ -419,23 +421,23 @@ Ends average_ends(const HiddenEdge& edge, const HiddenEdgePrior& prior, double r
   Eigen::Vector2d range(std::min(deviations * prior.offset_sd_px, reach_px),
                         deviations * prior.slant_sd_px);
   Matrix2 covariance = Matrix2::Zero();
-  for (int round = 0; round < rounds; ++round) {
+  for (int round = 0; round < num_iterations; ++round) {
     const Eigen::Vector2d step = 2 * range.cwiseQuotient(Eigen::Vector2d(offsets - 1, slants - 1));
     std::vector<std::pair<Eigen::Vector2d, double>> nodes;
-    double least = std::numeric_limits<double>::infinity();
+    double minimum = std::numeric_limits<double>::infinity();
     for (int i = 0; i < offsets; ++i) {
       for (int j = 0; j < slants; ++j) {
         const Eigen::Vector2d node = mean - range + step.cwiseProduct(Eigen::Vector2d(i, j));
         nodes.emplace_back(node, edge.cost(ends_from_node * node) +
                                      std::pow((node[0] - prior.offset_px) / prior.offset_sd_px, 2) +
                                      std::pow(node[1] / prior.slant_sd_px, 2));
-        least = std::min(least, nodes.back().second);
+        minimum = std::min(minimum, nodes.back().second);
       }
     }
     double sum = 0;
     Eigen::Vector2d moment = Eigen::Vector2d::Zero();
     for (auto& [node, weight] : nodes) {
-      weight = std::exp((least - weight) / 2);
+      weight = std::exp((minimum - weight) / 2);
       sum += weight;
       moment += weight * node;
     }
@@ -451,13 +453,13 @@ Ends average_ends(const HiddenEdge& edge, const HiddenEdgePrior& prior, double r
 
 }  // namespace
 
-std::optional<StraightEdge> straight_edge_at(const ImageView& lines, const Side& side,
-                                             const LineLevels& levels, double dark, double per_px,
-                                             const EdgeSearch& search, const LightShape& shape) {
+std::optional<StraightEdge> fit_straight_edge(const ImageView& lines, const Side& side,
+                                              const LineLevels& levels, double dark, double per_px,
+                                              const EdgeSearch& search, const LightShape& shape) {
   constexpr double min_lit = 0.35, rise_of_blur = 1.349;
-  constexpr std::size_t least = 40;
+  constexpr std::size_t minimum = 40;
   const Samples all(lines, side, levels, dark, per_px, search, shape);
-  if (all.samples.size() < least) return std::nullopt;
+  if (all.samples.size() < minimum) return std::nullopt;
   const double length_px = (all.at(1) - all.at(0)).norm();
   const Priors priors{length_px, search.blur_px, std::hypot(lines.width, lines.height) / 2};
   auto edge = shape.has_lens() ? fit<kBow>(all, side, per_px, priors)
@@ -467,7 +469,7 @@ std::optional<StraightEdge> straight_edge_at(const ImageView& lines, const Side&
   const auto points = static_cast<int>(length_px);
   for (int i = 0; i < points; ++i) {
     const double t = (i + 0.5) / points;
-    const auto pixel = shape.pixel_of(found.from + t * (found.to - found.from));
+    const auto pixel = shape.plane_to_pixel(found.from + t * (found.to - found.from));
     if (!pixel) continue;
     const Eigen::Vector2d at = shape.turned(*pixel);
     const auto lit = levels.at(static_cast<int>(std::lround(at.y())));
@@ -478,20 +480,21 @@ std::optional<StraightEdge> straight_edge_at(const ImageView& lines, const Side&
   return edge;
 }
 
-std::optional<StraightEdge> hidden_edge_at(const ImageView& lines, const Side& side,
-                                           const LineLevels& levels, double dark, double per_px,
-                                           const EdgeSearch& search, const LightShape& shape,
-                                           const HiddenEdgePrior& prior) {
+std::optional<StraightEdge> estimate_hidden_edge(const ImageView& lines, const Side& side,
+                                                 const LineLevels& levels, double dark,
+                                                 double per_px, const EdgeSearch& search,
+                                                 const LightShape& shape,
+                                                 const HiddenEdgePrior& prior) {
   constexpr double min_fraction = 0.8;
   const Samples all(lines, side, levels, dark, per_px, search, shape, true);
   if (all.samples.empty()) return std::nullopt;
   const HiddenEdge hidden(all.samples, search.blur_px);
   const auto [ends_px, covariance_px] = average_ends(hidden, prior, search.reach_px);
-  const double share = hidden.compute_explained_fraction(ends_px);
-  if (share < min_fraction) return std::nullopt;
+  const double fraction = hidden.compute_explained_fraction(ends_px);
+  if (fraction < min_fraction) return std::nullopt;
   const Eigen::Vector2d inwards = side.inwards() * per_px;
   const Side found{side.from + ends_px[0] * inwards, side.to + ends_px[1] * inwards};
-  return StraightEdge{found, covariance_px, search.blur_px, 0, share, {}};
+  return StraightEdge{found, covariance_px, search.blur_px, 0, fraction, {}};
 }
 
 }  // namespace vlp

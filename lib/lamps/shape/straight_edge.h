@@ -19,9 +19,9 @@ namespace vlp {
 struct Side {
   Eigen::Vector2d from, to;
 
-  Eigen::Vector2d way() const { return (to - from).normalized(); }
+  Eigen::Vector2d direction() const { return (to - from).normalized(); }
   Eigen::Vector2d inwards() const {
-    const Eigen::Vector2d along = way();
+    const Eigen::Vector2d along = direction();
     return {-along.y(), along.x()};
   }
 };
@@ -38,7 +38,7 @@ struct StraightEdge {
   /// Distance of the middle of the edge from the line through its ends; 0 with a lens.
   double bow_px;
   /// Fraction of the pixels next to the edge that the model explains.
-  double share;
+  double fraction;
   /// Points on the edge, on lit scanlines.
   std::vector<EdgePoint> points;
 };
@@ -48,7 +48,7 @@ struct EdgeSearch {
   /// Half-width of the search window across the side.
   double reach_px;
   /// Maximum number of sampling positions along the side.
-  std::size_t stations;
+  std::size_t positions;
   /// Standard deviation of the blur of the light's other edges; 0 if unknown.
   double blur_px = 0;
 };
@@ -80,24 +80,25 @@ struct HiddenEdgePrior {
 /// The covariance includes the scatter of the pixels and the standard deviations of the scanline
 /// levels, see LineLevels. Returns std::nullopt if an end has a standard deviation above half a
 /// pixel, or if less than 80 % of the pixels match the edge model.
-std::optional<StraightEdge> straight_edge_at(const ImageView& lines, const Side& side,
-                                             const LineLevels& levels, double dark, double per_px,
-                                             const EdgeSearch& search, const LightShape& shape);
+std::optional<StraightEdge> fit_straight_edge(const ImageView& lines, const Side& side,
+                                              const LineLevels& levels, double dark, double per_px,
+                                              const EdgeSearch& search, const LightShape& shape);
 
 /// Estimates an edge that a dark stripe hides partly or completely: the mean and the covariance of
 /// its ends, from the likelihood of all pixels near the side.
 ///
 /// An edge in a dark stripe lies between the last lit scanline and the next scanline that would be
-/// lit if the light extended to it. The pixels are those of straight_edge_at() with L = 1 and h =
+/// lit if the light extended to it. The pixels are those of fit_straight_edge() with L = 1 and h =
 /// 0; the level of each scanline may vary within its standard deviation. The probability, times the
 /// prior, is summed on a grid of offsets and slants that is refined four times. Returns
 /// std::nullopt if the side is not in the image, or if the mean contradicts a fifth of the pixels
 /// on lit scanlines. The edge may lie outside the image; it has no `points`.
 ///
 /// @pre search.blur_px > 0
-std::optional<StraightEdge> hidden_edge_at(const ImageView& lines, const Side& side,
-                                           const LineLevels& levels, double dark, double per_px,
-                                           const EdgeSearch& search, const LightShape& shape,
-                                           const HiddenEdgePrior& prior);
+std::optional<StraightEdge> estimate_hidden_edge(const ImageView& lines, const Side& side,
+                                                 const LineLevels& levels, double dark,
+                                                 double per_px, const EdgeSearch& search,
+                                                 const LightShape& shape,
+                                                 const HiddenEdgePrior& prior);
 
 }  // namespace vlp

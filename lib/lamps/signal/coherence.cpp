@@ -19,7 +19,7 @@ using PieceLevels = Eigen::Array<double, kPieces, 1>;
 
 /// Returns the levels of each scanline's parts above the dark level.
 template <typename Level>
-std::vector<PieceLevels> piece_levels(const ImageView& lines, const std::vector<Run>& chords,
+std::vector<PieceLevels> piece_levels(const ImageView& lines, const std::vector<PixelRun>& chords,
                                       double dark) {
   std::vector<PieceLevels> levels;
   levels.reserve(chords.size());
@@ -40,9 +40,9 @@ std::vector<PieceLevels> piece_levels(const ImageView& lines, const std::vector<
 
 }  // namespace
 
-double coherence_of(const ImageView& lines, const std::vector<Run>& chords,
-                    const Background& background, double period_lines) {
-  constexpr double share = 0.05;
+double compute_coherence(const ImageView& lines, const std::vector<PixelRun>& chords,
+                         const Background& background, double period_lines) {
+  constexpr double fraction = 0.05;
   constexpr std::size_t min_values = 3;
   const auto levels = visit_levels(lines, [&](auto level) {
     return piece_levels<decltype(level)>(lines, chords, background.level);
@@ -56,25 +56,26 @@ double coherence_of(const ImageView& lines, const std::vector<Run>& chords,
     sums.emplace_back(sums.back() + line);
     brightest = std::max(brightest, line.mean());
   }
-  const double soft = (background.threshold - background.level) / 2 + share * brightest;
-  PieceLevels both = PieceLevels::Zero(), own = both, others = both;
+  const double soft = (background.threshold - background.level) / 2 + fraction * brightest;
+  PieceLevels cross_sums = PieceLevels::Zero(), own_squares = cross_sums,
+              other_squares = cross_sums;
   for (std::size_t line = quarter; line + quarter <= levels.size(); ++line) {
     const PieceLevels before = (sums[line] - sums[line - quarter]) / double(quarter);
     const PieceLevels after = (sums[line + quarter] - sums[line]) / double(quarter);
     const PieceLevels step = ((after.max(0) + soft) / (before.max(0) + soft)).log();
-    const PieceLevels rest = step.sum() - step;
-    both += step * rest;
-    own += step.square();
-    others += rest.square();
+    const PieceLevels other_parts = step.sum() - step;
+    cross_sums += step * other_parts;
+    own_squares += step.square();
+    other_squares += other_parts.square();
   }
-  std::array<double, kPieces> alike{};
+  std::array<double, kPieces> coherences{};
   for (std::size_t i = 0; i < kPieces; ++i) {
     const auto piece = static_cast<Eigen::Index>(i);
-    const double scale = std::sqrt(own[piece] * others[piece]);
-    alike[i] = scale > 0 ? both[piece] / scale : 0;
+    const double scale = std::sqrt(own_squares[piece] * other_squares[piece]);
+    coherences[i] = scale > 0 ? cross_sums[piece] / scale : 0;
   }
-  std::sort(alike.begin(), alike.end());
-  return alike[1];
+  std::sort(coherences.begin(), coherences.end());
+  return coherences[1];
 }
 
 }  // namespace vlp

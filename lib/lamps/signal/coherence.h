@@ -18,8 +18,8 @@ inline constexpr double kMinCoherence = 0.85;
 /// a scanline at the same time. A lamp's stripes are therefore on the same scanlines in all its
 /// parts, whatever its shape. In letters and patterns the parts differ.
 ///
-/// @param lines       image whose rows are the scanlines, see lines_of()
-/// @param chords      pixels of the light on each scanline, see chords_of()
+/// @param lines       image whose rows are the scanlines, see make_scanline_image()
+/// @param chords      pixels of the light on each scanline, see find_chords_in_ellipse()
 /// @param background  dark level and noise of the image
 /// @param period_lines  period of the stripes
 /// @return  coherence, at most 1; 0 if the light has too few scanlines
@@ -36,7 +36,7 @@ inline constexpr double kMinCoherence = 0.85;
 /// Independent parts with three independent scanlines, as in one and a half periods, each reach
 /// kMinCoherence with a probability of (1 - 0.85) / 2, and four of five together with 1.5e-4.
 /// Tilted bars reach it within 7 degrees if a light shows two of them.
-double coherence_of(const ImageView& lines, const std::vector<Run>& chords,
-                    const Background& background, double period_lines);
+double compute_coherence(const ImageView& lines, const std::vector<PixelRun>& chords,
+                         const Background& background, double period_lines);
 
 }  // namespace vlp

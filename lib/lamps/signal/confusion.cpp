@@ -18,16 +18,17 @@ Confusion empty_confusion(std::span<const LabelledLight> lights, std::set<int> l
   return confusion;
 }
 
-Eigen::Index place_of(const Confusion& confusion, int lamp) {
+Eigen::Index find_index(const Confusion& confusion, int lamp) {
   return std::lower_bound(confusion.lamps.begin(), confusion.lamps.end(), lamp) -
          confusion.lamps.begin();
 }
 
-void judge(const LampClassifier& classifier, const LabelledLight& light, Confusion& confusion) {
-  const auto answer = lamp_of(classifier, light.stripes);
+void count_answer(const LampClassifier& classifier, const LabelledLight& light,
+                  Confusion& confusion) {
+  const auto answer = identify_lamp(classifier, light.stripes);
   const auto unknown = static_cast<Eigen::Index>(confusion.lamps.size());
-  ++confusion.counts(place_of(confusion, light.lamp),
-                     answer ? place_of(confusion, *answer) : unknown);
+  ++confusion.counts(find_index(confusion, light.lamp),
+                     answer ? find_index(confusion, *answer) : unknown);
 }
 
 }  // namespace
@@ -38,15 +39,16 @@ int Confusion::unknown() const { return counts.rightCols<1>().sum(); }
 
 int Confusion::wrong() const { return counts.sum() - right() - unknown(); }
 
-Confusion confusion_of(const LampClassifier& classifier, std::span<const LabelledLight> lights) {
+Confusion compute_confusion(const LampClassifier& classifier,
+                            std::span<const LabelledLight> lights) {
   std::set<int> known;
   for (const auto& lamp : classifier.lamps) known.insert(lamp.lamp);
   Confusion confusion = empty_confusion(lights, std::move(known));
-  for (const LabelledLight& light : lights) judge(classifier, light, confusion);
+  for (const LabelledLight& light : lights) count_answer(classifier, light, confusion);
   return confusion;
 }
 
-Confusion cross_validated(std::span<const LabelledLight> lights, const TrainClassifier& train) {
+Confusion cross_validate(std::span<const LabelledLight> lights, const TrainClassifier& train) {
   Confusion confusion = empty_confusion(lights);
   for (int fold = 0; fold < kFolds; ++fold) {
     std::vector<LabelledLight> others, held_out;
@@ -54,7 +56,7 @@ Confusion cross_validated(std::span<const LabelledLight> lights, const TrainClas
       (light.image % kFolds == std::size_t(fold) ? held_out : others).push_back(light);
     }
     const LampClassifier classifier = train(others);
-    for (const LabelledLight& light : held_out) judge(classifier, light, confusion);
+    for (const LabelledLight& light : held_out) count_answer(classifier, light, confusion);
   }
   return confusion;
 }

@@ -20,7 +20,7 @@ namespace vlp {
 
 namespace {
 
-double distance_squared(const Eigen::Matrix4d& covariance, const LampFeatures& difference) {
+double compute_distance_squared(const Eigen::Matrix4d& covariance, const LampFeatures& difference) {
   return difference.dot(covariance.llt().solve(difference));
 }
 
@@ -32,12 +32,13 @@ void standardize(std::span<const LabelledLight> lights, LampClassifier& classifi
   classifier.mean.setZero();
   classifier.scale.setZero();
   const auto n = static_cast<double>(lights.size());
-  for (const LabelledLight& light : lights) classifier.mean += features_of(light.stripes) / n;
+  for (const LabelledLight& light : lights)
+    classifier.mean += compute_lamp_features(light.stripes) / n;
   for (const LabelledLight& light : lights) {
-    classifier.scale += (features_of(light.stripes) - classifier.mean).cwiseAbs2() / n;
+    classifier.scale += (compute_lamp_features(light.stripes) - classifier.mean).cwiseAbs2() / n;
   }
-  constexpr double least = 1e-6;  // for a constant feature
-  classifier.scale = classifier.scale.cwiseSqrt().cwiseMax(least);
+  constexpr double minimum = 1e-6;  // for a constant feature
+  classifier.scale = classifier.scale.cwiseSqrt().cwiseMax(minimum);
 }
 
 /// Fits centers and covariance to the lights that are `used`.
@@ -49,15 +50,15 @@ void fit(std::span<const LabelledLight> lights, const std::vector<bool>& used,
     auto& lamp = lamps.try_emplace(lights[i].lamp, none).first->second;
     if (!used[i]) continue;
     ++lamp.examples;
-    lamp.center += standardized(classifier, features_of(lights[i].stripes));
+    lamp.center += standardized(classifier, compute_lamp_features(lights[i].stripes));
   }
   for (auto& [id, lamp] : lamps) lamp.center /= std::max(1, lamp.examples);
   classifier.covariance.setZero();
   double count = 0;
   for (std::size_t i = 0; i < lights.size(); ++i) {
     if (!used[i]) continue;
-    const LampFeatures off =
-        standardized(classifier, features_of(lights[i].stripes)) - lamps.at(lights[i].lamp).center;
+    const LampFeatures off = standardized(classifier, compute_lamp_features(lights[i].stripes)) -
+                             lamps.at(lights[i].lamp).center;
     classifier.covariance += off * off.transpose();
     ++count;
   }
@@ -66,8 +67,8 @@ void fit(std::span<const LabelledLight> lights, const std::vector<bool>& used,
   constexpr double shrinkage = 10;  // equivalent number of lights
   const Eigen::Vector4d diagonal = classifier.covariance.diagonal();
   classifier.covariance *= freedom / (freedom + shrinkage);
-  const LampFeatures least(kLampDrift / 3, kDutyMargin / 2, 0.01, kDutyMargin / 2);
-  classifier.covariance.diagonal() = diagonal + least.cwiseQuotient(classifier.scale).cwiseAbs2();
+  const LampFeatures minimum(kLampDrift / 3, kDutyMargin / 2, 0.01, kDutyMargin / 2);
+  classifier.covariance.diagonal() = diagonal + minimum.cwiseQuotient(classifier.scale).cwiseAbs2();
   classifier.lamps.clear();
   for (const auto& [id, lamp] : lamps) classifier.lamps.push_back(lamp);
 }
@@ -84,21 +85,21 @@ LampClassifier train_classifier(std::span<const LabelledLight> lights) {
     std::map<int, LampFeatures> centers;
     for (const auto& lamp : classifier.lamps) centers[lamp.lamp] = lamp.center;
     for (std::size_t i = 0; i < lights.size(); ++i) {
-      const LampFeatures off =
-          standardized(classifier, features_of(lights[i].stripes)) - centers.at(lights[i].lamp);
+      const LampFeatures off = standardized(classifier, compute_lamp_features(lights[i].stripes)) -
+                               centers.at(lights[i].lamp);
       constexpr double trimmed = 9;  // stricter than in use: outliers widen the covariance
-      used[i] = distance_squared(classifier.covariance, off) < trimmed;
+      used[i] = compute_distance_squared(classifier.covariance, off) < trimmed;
     }
   }
   return classifier;
 }
 
-std::optional<int> lamp_of(const LampClassifier& classifier, const Stripes& stripes) {
+std::optional<int> identify_lamp(const LampClassifier& classifier, const Stripes& stripes) {
   constexpr double min_probability = 0.99, farthest = 6, farthest_unclear = 3;
-  const LampFeatures z = standardized(classifier, features_of(stripes));
+  const LampFeatures z = standardized(classifier, compute_lamp_features(stripes));
   const Eigen::LLT<Eigen::Matrix4d> factor(classifier.covariance);
-  if (!readable(stripes)) return std::nullopt;
-  double nearest = std::pow(trustworthy(stripes) ? farthest : farthest_unclear, 2);
+  if (!is_readable(stripes)) return std::nullopt;
+  double nearest = std::pow(is_reliable(stripes) ? farthest : farthest_unclear, 2);
   const LampClassifier::Class* lamp = nullptr;
   std::vector<double> distances;
   distances.reserve(classifier.lamps.size());
@@ -114,15 +115,15 @@ std::optional<int> lamp_of(const LampClassifier& classifier, const Stripes& stri
   return lamp->lamp;
 }
 
-std::vector<LampDistance> inseparable(const LampClassifier& classifier) {
-  constexpr double least = 6;
+std::vector<LampDistance> find_inseparable_lamps(const LampClassifier& classifier) {
+  constexpr double minimum = 6;
   std::vector<LampDistance> pairs;
   for (std::size_t i = 0; i < classifier.lamps.size(); ++i) {
     for (std::size_t j = i + 1; j < classifier.lamps.size(); ++j) {
       const auto &a = classifier.lamps[i], &b = classifier.lamps[j];
       const double distance =
-          std::sqrt(distance_squared(classifier.covariance, a.center - b.center));
-      if (distance < least) pairs.push_back({a.lamp, b.lamp, distance});
+          std::sqrt(compute_distance_squared(classifier.covariance, a.center - b.center));
+      if (distance < minimum) pairs.push_back({a.lamp, b.lamp, distance});
     }
   }
   return pairs;
@@ -154,7 +155,7 @@ Eigen::Matrix4d read_covariance(const YamlValue& value) {
   for (int row = 0; row < 4; ++row) {
     covariance.row(row) = read_features(rows[static_cast<std::size_t>(row)]).transpose();
   }
-  if (covariance != covariance.transpose() || !inverse_of_positive(covariance)) {
+  if (covariance != covariance.transpose() || !invert_positive_definite(covariance)) {
     throw value.error("is not a covariance: it should be symmetric and positive");
   }
   return covariance;

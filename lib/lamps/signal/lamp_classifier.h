@@ -63,7 +63,7 @@ LampClassifier train_classifier(std::span<const LabelledLight> lights);
 /// - (z - c_k)^T C^-1 (z - c_k) exceeds 36 (3e-7 of normal lights), or 9 if the stripes are not
 ///   is_reliable().
 /// - The stripes are not is_readable().
-std::optional<int> lamp_of(const LampClassifier& classifier, const Stripes& stripes);
+std::optional<int> identify_lamp(const LampClassifier& classifier, const Stripes& stripes);
 
 /// Two lamps and their Mahalanobis distance, the square root of (c_j - c_k)^T C^-1 (c_j - c_k).
 struct LampDistance {
@@ -71,9 +71,9 @@ struct LampDistance {
   double distance;
 };
 
-/// Returns the pairs of lamps that lamp_of() cannot separate, with a distance below 6. At distance
-/// 6 one light in forty is unknown.
-std::vector<LampDistance> inseparable(const LampClassifier& classifier);
+/// Returns the pairs of lamps that identify_lamp() cannot separate, with a distance below 6. At
+/// distance 6 one light in forty is unknown.
+std::vector<LampDistance> find_inseparable_lamps(const LampClassifier& classifier);
 
 /// Reads a file of format `vlp-classifier/1`. Its keys are the names of the fields above, and
 /// `features`, which has to be kLampFeatures.

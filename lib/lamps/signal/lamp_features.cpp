@@ -7,7 +7,7 @@
 
 namespace vlp {
 
-LampFeatures features_of(const Stripes& stripes) {
+LampFeatures compute_lamp_features(const Stripes& stripes) {
   assert(stripes.period_lines > 0);
   return {std::log(stripes.period_lines), stripes.duty, stripes.count_per_line, stripes.lit_area};
 }

@@ -27,6 +27,6 @@ inline constexpr std::array<std::string_view, 4> kLampFeatures{"log_period_lines
                                                                "count_per_line", "lit_area"};
 
 /// Returns the features of a light's stripes. @pre The stripes have a period.
-LampFeatures features_of(const Stripes& stripes);
+LampFeatures compute_lamp_features(const Stripes& stripes);
 
 }  // namespace vlp

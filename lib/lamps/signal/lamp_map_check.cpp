@@ -20,11 +20,11 @@ double exposure_lines(const StripeConditions& conditions) {
 
 /// Returns the relative standard deviation of a lamp's period; 0 if the size of the lamp is
 /// unknown.
-double period_sd_of(const Lamp& lamp, const StripeConditions& conditions) {
-  const auto lines = lines_on(lamp, conditions);
+double predict_lamp_period_sd(const Lamp& lamp, const StripeConditions& conditions) {
+  const auto lines = compute_lines_on_lamp(lamp, conditions);
   if (!lines) return 0;
   const double period = 1 / (*lamp.frequency_hz * conditions.row_time_s);
-  return period_sd(period, *lines, exposure_lines(conditions));
+  return predict_period_sd(period, *lines, exposure_lines(conditions));
 }
 
 bool have_similar_duties(const Lamp& a, const Lamp& b) {
@@ -70,14 +70,14 @@ std::string explain_missing_room(const LampMapFile& lamps, const std::string& ar
   return "";
 }
 
-std::optional<double> lines_on(const Lamp& lamp, const StripeConditions& conditions) {
+std::optional<double> compute_lines_on_lamp(const Lamp& lamp, const StripeConditions& conditions) {
   const double above_m = lamp.position_m.z() - conditions.camera_height_m;
   const auto& size_m = lamp.shape.size_m;
   if (!size_m || !conditions.focal_px || !(above_m > 0)) return std::nullopt;
   return size_m->minCoeff() * *conditions.focal_px / above_m;
 }
 
-double period_sd(double period_lines, double lines, double exposure_lines) {
+double predict_period_sd(double period_lines, double lines, double exposure_lines) {
   const double periods = kUsedHeight * lines / period_lines;
   if (periods < kMinPeriods) return std::numeric_limits<double>::infinity();
   constexpr double noise = 0.02, blunt_lines = 1.2;
@@ -86,17 +86,19 @@ double period_sd(double period_lines, double lines, double exposure_lines) {
   return edge / period_lines * std::sqrt(6 / (periods * (periods * periods - 1)));
 }
 
-std::vector<LampsAlike> lamps_alike(const LampMap& lamps, const StripeConditions& conditions) {
-  std::vector<LampsAlike> pairs;
+std::vector<AmbiguousLamps> find_ambiguous_lamps(const LampMap& lamps,
+                                                 const StripeConditions& conditions) {
+  std::vector<AmbiguousLamps> pairs;
   for (std::size_t i = 0; i < lamps.lamps.size(); ++i) {
     for (std::size_t j = i + 1; j < lamps.lamps.size(); ++j) {
       const Lamp &a = lamps.lamps[i], &b = lamps.lamps[j];
       if (!a.frequency_hz || !b.frequency_hz) continue;
       if (!have_similar_duties(a, b)) continue;
       const double gap = std::abs(std::log(*a.frequency_hz / *b.frequency_hz));
-      const double sd = std::max(period_sd_of(a, conditions), period_sd_of(b, conditions));
+      const double sd =
+          std::max(predict_lamp_period_sd(a, conditions), predict_lamp_period_sd(b, conditions));
       const double needed = kLampDrift + 4 * sd;
-      // lamps_unreadable() reports lamps without a measurable period.
+      // find_unreadable_lamps() reports lamps without a measurable period.
       if (gap >= needed || !std::isfinite(needed)) continue;
       pairs.push_back({a.id, b.id, std::expm1(gap), std::expm1(needed)});
     }
@@ -104,18 +106,18 @@ std::vector<LampsAlike> lamps_alike(const LampMap& lamps, const StripeConditions
   return pairs;
 }
 
-std::vector<LampUnreadable> lamps_unreadable(const LampMap& lamps,
-                                             const StripeConditions& conditions) {
-  std::vector<LampUnreadable> unreadable;
+std::vector<UnreadableLamp> find_unreadable_lamps(const LampMap& lamps,
+                                                  const StripeConditions& conditions) {
+  std::vector<UnreadableLamp> unreadable;
   for (const Lamp& lamp : lamps.lamps) {
     if (!lamp.frequency_hz) continue;
     const double phase = std::numbers::pi * *lamp.frequency_hz * conditions.exposure_s.value_or(0);
     const double contrast = phase > 0 ? std::abs(std::sin(phase) / phase) : 1;
-    const auto lines = lines_on(lamp, conditions);
+    const auto lines = compute_lines_on_lamp(lamp, conditions);
     const double periods = lines ? kUsedHeight * *lines * *lamp.frequency_hz * conditions.row_time_s
                                  : std::numeric_limits<double>::infinity();
     const double period_lines = 1 / (*lamp.frequency_hz * conditions.row_time_s);
-    if (period_lines < kShortestPeriod_lines || periods < kMinPeriods || contrast < kMinContrast) {
+    if (period_lines < kMinPeriod_lines || periods < kMinPeriods || contrast < kMinContrast) {
       unreadable.push_back({lamp.id, period_lines, periods, contrast});
     }
   }

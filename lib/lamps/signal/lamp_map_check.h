@@ -26,11 +26,11 @@ struct StripeConditions {
 /// size is the shorter axis of the lamp, which is across the scanlines in the worst case. Only the
 /// fraction kUsedHeight of the scanlines is used. Returns std::nullopt without a size or a focal
 /// length, or if the lamp is not above the camera.
-std::optional<double> lines_on(const Lamp& lamp, const StripeConditions& conditions);
+std::optional<double> compute_lines_on_lamp(const Lamp& lamp, const StripeConditions& conditions);
 
-/// Predicts the relative standard deviation of the period that stripes_of() measures on `lines`
-/// scanlines. A period is the slope of least-squares lines through the numbered begins and through
-/// the numbered ends of stripes, with M = kUsedHeight lines / period of each:
+/// Predicts the relative standard deviation of the period that measure_stripes() measures on
+/// `lines` scanlines. A period is the slope of least-squares lines through the numbered begins and
+/// through the numbered ends of stripes, with M = kUsedHeight lines / period of each:
 ///
 ///     sd(period) / period = (e / period) sqrt(6 / (M (M^2 - 1))).
 ///
@@ -42,7 +42,7 @@ std::optional<double> lines_on(const Lamp& lamp, const StripeConditions& conditi
 ///
 /// This is an upper bound of the error measured on square waves; periods of an integer number of
 /// scanlines have smaller errors. Returns infinity below kMinPeriods.
-double period_sd(double period_lines, double lines, double exposure_lines);
+double predict_period_sd(double period_lines, double lines, double exposure_lines);
 
 /// Returns whether two lamps cannot be distinguished: their frequencies differ by less than
 /// kLampDrift, and their duties are unknown or differ by less than twice kDutyMargin. Returns false
@@ -56,21 +56,23 @@ bool share_frequency(const Lamp& a, const Lamp& b);
 std::string explain_missing_room(const LampMapFile& lamps, const std::string& argument);
 
 /// Two lamps that cannot be distinguished reliably.
-struct LampsAlike {
+struct AmbiguousLamps {
   int first, second;
   /// Ratio of their frequencies minus 1, and the minimum of it that would be sufficient.
   double gap, needed;
 };
 
-/// Returns the pairs of lamps that lamp_by_frequency() may fail to identify. Their frequencies
-/// differ by less than kLampDrift plus four standard deviations of a period, at which 95 % of the
-/// lights are identified. Their duties are unknown or differ by less than twice kDutyMargin. Lamps
-/// without a frequency are skipped; for lamps without a size only the drift counts.
-std::vector<LampsAlike> lamps_alike(const LampMap& lamps, const StripeConditions& conditions);
+/// Returns the pairs of lamps that identify_lamp_by_frequency() may fail to identify. Their
+/// frequencies differ by less than kLampDrift plus four standard deviations of a period, at which
+/// 95 % of the lights are identified. Their duties are unknown or differ by less than twice
+/// kDutyMargin. Lamps without a frequency are skipped; for lamps without a size only the drift
+/// counts.
+std::vector<AmbiguousLamps> find_ambiguous_lamps(const LampMap& lamps,
+                                                 const StripeConditions& conditions);
 
 /// Lamp that cannot be identified under the given conditions: it shows too few stripes, an exposure
 /// of about a whole period removes them, or its period is too short for the shutter.
-struct LampUnreadable {
+struct UnreadableLamp {
   int lamp;
   double period_lines;
   /// Number of periods on the lamp.
@@ -80,9 +82,9 @@ struct LampUnreadable {
   double contrast;
 };
 
-/// Returns the lamps with a period below kShortestPeriod_lines, less than kMinPeriods periods, or a
+/// Returns the lamps with a period below kMinPeriod_lines, less than kMinPeriods periods, or a
 /// contrast below kMinContrast.
-std::vector<LampUnreadable> lamps_unreadable(const LampMap& lamps,
-                                             const StripeConditions& conditions);
+std::vector<UnreadableLamp> find_unreadable_lamps(const LampMap& lamps,
+                                                  const StripeConditions& conditions);
 
 }  // namespace vlp

@@ -45,7 +45,7 @@ struct RegionCandidate {
 
 /// Returns the log-likelihood ratio of two fits. Three harmonics leave 6 independent values of a
 /// period, or as many as it has scanlines; the unknowns are the coefficients and the period.
-double log_ratio(const PeriodFit& better, const PeriodFit& worse) {
+double compute_log_ratio(const PeriodFit& better, const PeriodFit& worse) {
   constexpr double values_per_period = 6, unknowns = 7, min_unexplained = 1e-3;
   const double periods =
       worse.periods > 0 ? std::min(better.periods, worse.periods) : better.periods;
@@ -58,8 +58,8 @@ double log_ratio(const PeriodFit& better, const PeriodFit& worse) {
 /// Computes the brightness of a region along the readout direction, in the region and
 /// `margin_lines` scanlines on both sides. A cell column is weighted by its amplitude in the
 /// region.
-LineProfile profile_of(const CellLevels& cells, const ModulationMap& map,
-                       const ModulatedRegion& region, double margin_lines) {
+LineProfile compute_profile(const CellLevels& cells, const ModulationMap& map,
+                            const ModulatedRegion& region, double margin_lines) {
   const int first_cell = (region.box.x - cells.box.x) / kCellWidth_px;
   std::vector<float> weights(std::size_t(region.box.width / kCellWidth_px), 0);
   for (const auto& [step, begin, end] : region.spans) {
@@ -102,7 +102,7 @@ PeriodFit fit_lamp(const LineProfile& profile, double period_lines) {
   return best;
 }
 
-std::size_t best_lamp(const RegionCandidate& candidate) {
+std::size_t find_best_lamp(const RegionCandidate& candidate) {
   const auto best = std::min_element(
       candidate.lamp_fits.begin(), candidate.lamp_fits.end(),
       [](const PeriodFit& a, const PeriodFit& b) { return a.unexplained < b.unexplained; });
@@ -129,14 +129,14 @@ using Claims = std::vector<const RegionCandidate*>;
 /// Assigns the best lamp to a candidate if every competing lamp is clearly worse. A lamp that is
 /// assigned to another candidate does not compete, unless the phase indicates that this candidate
 /// is a part or a mirror image of it.
-void decide(const Claims& claims, RegionCandidate& candidate) {
+void assign_lamp(const Claims& claims, RegionCandidate& candidate) {
   if (candidate.lamp_fits.empty() || !candidate.is_modulated || candidate.is_other_period) return;
-  const std::size_t best = best_lamp(candidate);
+  const std::size_t best = find_best_lamp(candidate);
   const PeriodFit& fit = candidate.lamp_fits[best];
   if (fit.unexplained > kMaxUnexplained) return;
   for (std::size_t i = 0; i < candidate.lamp_fits.size(); ++i) {
     const PeriodFit& other = candidate.lamp_fits[i];
-    if (i == best || log_ratio(fit, other) > kMinLogRatio) continue;
+    if (i == best || compute_log_ratio(fit, other) > kMinLogRatio) continue;
     if (claims[i] == nullptr || are_in_phase(candidate, other, *claims[i], claims[i]->fit)) return;
   }
   candidate.lamp = best;
@@ -180,23 +180,23 @@ RegionCandidate examine(const CellLevels& cells, const ModulationMap& map, Modul
   RegionCandidate candidate{std::move(region), {}, {}, {}, {}, 0, false, false};
   double margin = min_period_lines;
   for (const double period : lamp_periods_lines) margin = std::max(margin, period);
-  candidate.profile = profile_of(cells, map, candidate.region, margin);
+  candidate.profile = compute_profile(cells, map, candidate.region, margin);
   const LineProfile& profile = candidate.profile;
   candidate.fit = find_period(profile, min_period_lines);
   for (const double period : lamp_periods_lines) {
-    candidate.lamp_fits.push_back(period < kShortestPeriod_lines ? PeriodFit{period}
-                                                                 : fit_lamp(profile, period));
+    candidate.lamp_fits.push_back(period < kMinPeriod_lines ? PeriodFit{period}
+                                                            : fit_lamp(profile, period));
   }
   if (!lamp_periods_lines.empty()) {
-    const PeriodFit& lamp = candidate.lamp_fits[best_lamp(candidate)];
-    candidate.is_other_period = log_ratio(candidate.fit, lamp) > kMinLogRatio;
+    const PeriodFit& lamp = candidate.lamp_fits[find_best_lamp(candidate)];
+    candidate.is_other_period = compute_log_ratio(candidate.fit, lamp) > kMinLogRatio;
     if (!candidate.is_other_period) candidate.fit = lamp;
   }
   candidate.phase_coherence =
       compute_phase_coherence(cells, map, candidate.region, candidate.fit.period_lines);
   // Few periods are significant only if they match a lamp.
   const bool has_lamp_period = !lamp_periods_lines.empty() && !candidate.is_other_period;
-  const double min_periods = has_lamp_period ? kMinPeriods : kEnoughPeriods;
+  const double min_periods = has_lamp_period ? kMinPeriods : kMinReliablePeriods;
   candidate.is_modulated =
       candidate.fit.unexplained < kMaxUnexplained && candidate.fit.depth > kMinLightDepth &&
       candidate.phase_coherence > kMinPhaseCoherence && count_periods(candidate) > min_periods;
@@ -204,21 +204,21 @@ RegionCandidate examine(const CellLevels& cells, const ModulationMap& map, Modul
 }
 
 /// Returns the distance between two boxes along the axis in which it is larger.
-int gap_between(const PixelBox& a, const PixelBox& b) {
+int compute_gap(const PixelBox& a, const PixelBox& b) {
   const int across = std::max(a.x, b.x) - std::min(a.right(), b.right());
   const int along = std::max(a.y, b.y) - std::min(a.bottom(), b.bottom());
   return std::max(across, along);
 }
 
 /// Returns true if two candidates are parts of one light.
-bool belong_together(const RegionCandidate& a, const RegionCandidate& b) {
+bool are_parts_of_one_light(const RegionCandidate& a, const RegionCandidate& b) {
   if (a.lamp != b.lamp) return false;
   const double ratio = a.fit.period_lines / b.fit.period_lines;
   if (!a.lamp && std::abs(ratio - 1) > 2 * kLampDrift) return false;
   const auto size = [](const RegionCandidate& c) {
     return std::max(c.region.box.width, c.region.box.height);
   };
-  if (2 * gap_between(a.region.box, b.region.box) > std::max(size(a), size(b))) return false;
+  if (2 * compute_gap(a.region.box, b.region.box) > std::max(size(a), size(b))) return false;
   return are_in_phase(a, a.fit, b, b.fit);
 }
 
@@ -249,16 +249,16 @@ void add_area(const ModulationMap& map, const ModulatedRegion& region, double pe
 }
 
 /// Measures the stripes of a candidate after division by its envelope. The period is that of
-/// stripes_of() if it agrees with the fitted period, and the fitted period otherwise.
-Stripes measure_stripes(const RegionCandidate& candidate) {
+/// measure_stripes() if it agrees with the fitted period, and the fitted period otherwise.
+Stripes measure_candidate_stripes(const RegionCandidate& candidate) {
   const PeriodFit& fit = candidate.fit;
-  Stripes stripes = stripes_of(divide_by_envelope(candidate.profile, fit.period_lines));
+  Stripes stripes = measure_stripes(divide_by_envelope(candidate.profile, fit.period_lines));
   if (!(std::abs(stripes.period_lines / fit.period_lines - 1) < 2 * kLampDrift)) {
     stripes.period_lines = fit.period_lines;
   }
   stripes.clarity = 1 - fit.unexplained;
   stripes.periods = count_periods(candidate);
-  stripes.regular = true;
+  stripes.is_regular = true;
   return stripes;
 }
 
@@ -275,7 +275,7 @@ ModulatedLight make_light(const ModulationMap& map,
                        0,
                        brightest.fit,
                        brightest.lamp,
-                       measure_stripes(brightest),
+                       measure_candidate_stripes(brightest),
                        brightest.phase_coherence,
                        0,
                        0};
@@ -302,8 +302,8 @@ ModulatedLight make_light(const ModulationMap& map,
 }
 
 /// Joins candidates that belong together to lights.
-std::vector<ModulatedLight> join_parts(const ModulationMap& map,
-                                       std::vector<RegionCandidate>& candidates) {
+std::vector<ModulatedLight> join_candidates(const ModulationMap& map,
+                                            std::vector<RegionCandidate>& candidates) {
   std::erase_if(candidates, [](const RegionCandidate& c) { return !c.is_modulated; });
   std::vector<ModulatedLight> lights;
   std::vector<bool> used(candidates.size(), false);
@@ -313,7 +313,7 @@ std::vector<ModulatedLight> join_parts(const ModulationMap& map,
     used[i] = true;
     for (std::size_t k = 0; k < parts.size(); ++k) {
       for (std::size_t j = i + 1; j < candidates.size(); ++j) {
-        if (used[j] || !belong_together(*parts[k], candidates[j])) continue;
+        if (used[j] || !are_parts_of_one_light(*parts[k], candidates[j])) continue;
         used[j] = true;
         parts.push_back(&candidates[j]);
       }
@@ -325,7 +325,7 @@ std::vector<ModulatedLight> join_parts(const ModulationMap& map,
     return !light.lamp &&
            std::any_of(lights.begin(), lights.end(), [&](const ModulatedLight& other) {
              return other.lamp && other.energy > light.energy &&
-                    gap_between(light.box, other.box) <
+                    compute_gap(light.box, other.box) <
                         std::max(other.box.width, other.box.height) / 2;
            });
   });
@@ -334,11 +334,11 @@ std::vector<ModulatedLight> join_parts(const ModulationMap& map,
 
 /// Returns the periods for demodulation: those of the lamps, or a bank of overlapping filters if
 /// these are unknown.
-std::vector<double> periods_to_search(std::span<const double> lamp_periods_lines, int lines) {
+std::vector<double> choose_periods(std::span<const double> lamp_periods_lines, int lines) {
   constexpr double bank_ratio = 1.15, min_bank_lines = 4;
   std::vector<double> periods;
   for (const double period : lamp_periods_lines) {
-    if (period >= kShortestPeriod_lines) periods.push_back(period);
+    if (period >= kMinPeriod_lines) periods.push_back(period);
   }
   if (!lamp_periods_lines.empty()) return periods;
   for (double period = min_bank_lines; period < lines / kMinPeriods; period *= bank_ratio) {
@@ -358,7 +358,7 @@ std::optional<BoxSearch> search_box(const ImageView& lines, const PixelBox& box,
                                     std::span<const double> lamp_periods_lines) {
   // Noise of at least one grey level is assumed.
   constexpr double min_noise = 1;
-  const auto periods = periods_to_search(lamp_periods_lines, box.height);
+  const auto periods = choose_periods(lamp_periods_lines, box.height);
   if (periods.empty()) return std::nullopt;
   const double shortest = *std::min_element(periods.begin(), periods.end());
   const int lines_per_bin = std::max(1, static_cast<int>(shortest / kBinsPerPeriod));
@@ -369,7 +369,7 @@ std::optional<BoxSearch> search_box(const ImageView& lines, const PixelBox& box,
        find_modulated_regions(result.map, min_significant_amplitude(noise, shortest))) {
     if (region.cells < kMinCells) continue;
     result.candidates.push_back(examine(cells, result.map, std::move(region), lamp_periods_lines,
-                                        std::max(kShortestPeriod_lines, shortest / 2)));
+                                        std::max(kMinPeriod_lines, shortest / 2)));
   }
   return result;
 }
@@ -389,7 +389,7 @@ std::vector<ModulatedLight> find_modulated_lights(const ImageView& lines,
   const Claims none(lamp_periods_lines.size(), nullptr);
   Claims claims = none;
   for (BoxSearch& each : searches) {
-    for (RegionCandidate& candidate : each.candidates) decide(none, candidate);
+    for (RegionCandidate& candidate : each.candidates) assign_lamp(none, candidate);
   }
   for (const BoxSearch& each : searches) {
     for (const RegionCandidate& candidate : each.candidates) {
@@ -400,12 +400,12 @@ std::vector<ModulatedLight> find_modulated_lights(const ImageView& lines,
   }
   for (BoxSearch& each : searches) {
     for (RegionCandidate& candidate : each.candidates) {
-      if (!candidate.lamp) decide(claims, candidate);
+      if (!candidate.lamp) assign_lamp(claims, candidate);
     }
   }
   std::vector<ModulatedLight> lights;
   for (BoxSearch& each : searches) {
-    for (ModulatedLight& light : join_parts(each.map, each.candidates)) {
+    for (ModulatedLight& light : join_candidates(each.map, each.candidates)) {
       lights.push_back(std::move(light));
     }
   }

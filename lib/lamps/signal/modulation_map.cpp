@@ -145,7 +145,9 @@ class Watershed {
   }
 
   /// Returns the basin of a cell; negative if it has none.
-  int basin_of(std::size_t cell) { return labels_[cell] < 0 ? labels_[cell] : root(labels_[cell]); }
+  int find_basin(std::size_t cell) {
+    return labels_[cell] < 0 ? labels_[cell] : root(labels_[cell]);
+  }
   int peak_cell(int basin) const { return peaks_[std::size_t(basin)]; }
   std::size_t size() const { return parents_.size(); }
 
@@ -283,18 +285,19 @@ std::vector<ModulatedRegion> find_modulated_regions(const ModulationMap& map,
     }
   }
   std::sort(order.begin(), order.end(), [&](int a, int b) {
-    const float of_a = map.amplitude[std::size_t(a)], of_b = map.amplitude[std::size_t(b)];
-    return of_a != of_b ? of_a > of_b : a < b;
+    const float amplitude_a = map.amplitude[std::size_t(a)],
+                amplitude_b = map.amplitude[std::size_t(b)];
+    return amplitude_a != amplitude_b ? amplitude_a > amplitude_b : a < b;
   });
   Watershed watershed(map);
   for (const int cell : order) watershed.add(cell);
-  std::vector<int> region_of(watershed.size(), -1);
+  std::vector<int> region_indices(watershed.size(), -1);
   std::vector<ModulatedRegion> regions;
   for (int step = 0; step < map.steps; ++step) {
     for (int cell = 0; cell < map.cells; ++cell) {
-      const int basin = watershed.basin_of(map.index(step, cell));
+      const int basin = watershed.find_basin(map.index(step, cell));
       if (basin < 0) continue;
-      int& region = region_of[std::size_t(basin)];
+      int& region = region_indices[std::size_t(basin)];
       if (region < 0) {
         region = static_cast<int>(regions.size());
         const auto peak = std::size_t(watershed.peak_cell(basin));

@@ -18,7 +18,7 @@ constexpr int kHarmonics = 3;
 constexpr double kMinEnvelope = 0.08;
 
 /// Returns the mean over `length` bins around each bin, over the available bins.
-std::vector<double> moving_mean(const std::vector<double>& values, double length) {
+std::vector<double> compute_moving_mean(const std::vector<double>& values, double length) {
   const auto count = values.size();
   const auto end = double(count);
   std::vector<double> sums(count + 1, 0), means(count);
@@ -38,7 +38,7 @@ std::vector<double> moving_mean(const std::vector<double>& values, double length
 using HarmonicCoefficients = std::array<double, 2 * kHarmonics>;
 
 /// Returns cos and sin of the harmonics of an angle.
-HarmonicCoefficients harmonics_at(double angle_rad) {
+HarmonicCoefficients compute_harmonics(double angle_rad) {
   HarmonicCoefficients basis;
   const double c = std::cos(angle_rad), s = std::sin(angle_rad);
   basis[0] = c, basis[1] = s;
@@ -61,7 +61,7 @@ struct Envelope {
   double largest;
 
   Envelope(const LineProfile& profile, double period_bins)
-      : levels(moving_mean(moving_mean(profile.levels, period_bins), period_bins)),
+      : levels(compute_moving_mean(compute_moving_mean(profile.levels, period_bins), period_bins)),
         largest(*std::max_element(levels.begin(), levels.end())) {}
 
   /// Returns the weight of a bin, up to 1; 0 if it has too little light.
@@ -89,13 +89,13 @@ PeriodFit fit_period(const LineProfile& profile, double period_lines) {
     if (weight == 0) continue;
     ++lit;
     const double value = profile.levels[i] / envelope.levels[i] - 1;
-    normal.add_row(harmonics_at(start + step * double(i)), value, weight);
+    normal.add_row(compute_harmonics(start + step * double(i)), value, weight);
     squares += weight * value * value;
   }
   fit.periods = lit / period;
   if (!(squares > 0)) return fit;
   const Cholesky<2 * kHarmonics> factor(normal);
-  if (!factor.determines(1e-9)) return fit;
+  if (!factor.has_full_rank(1e-9)) return fit;
   const HarmonicCoefficients coefficients = factor.solve(normal.gradient);
   fit.unexplained = std::clamp(1 - multiply(coefficients, normal.gradient) / squares, 0.0, 1.0);
   fit.depth = std::hypot(coefficients[0], coefficients[1]);

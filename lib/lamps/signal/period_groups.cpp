@@ -25,17 +25,17 @@ PeriodGroup make_group(std::span<const MeasuredPeriod> lights, std::vector<std::
   for (double& value : log_periods) value = std::abs(value - group.log_period);
   // The standard deviation of a median is 1.25 times that of a mean. Three lights or less do not
   // determine their scatter.
-  constexpr double single = 0.003, least = 1e-5, sd_of_mad = 1.4826, sd_of_median = 1.2533;
+  constexpr double single = 0.003, min_sd = 1e-5, sd_of_mad = 1.4826, sd_of_median = 1.2533;
   const std::size_t count = group.lights.size();
   const double scatter = count > 3 ? sd_of_mad * upper_median(std::move(log_periods)) : single;
-  group.sd = std::max(least, sd_of_median * scatter / std::sqrt(double(count)));
+  group.sd = std::max(min_sd, sd_of_median * scatter / std::sqrt(double(count)));
   return group;
 }
 
 /// Removes the densest group from `sorted`, indices of lights in the order of their periods, and
 /// returns it.
-std::vector<std::size_t> take_densest(std::span<const MeasuredPeriod> lights,
-                                      std::vector<std::size_t>& sorted) {
+std::vector<std::size_t> remove_densest_group(std::span<const MeasuredPeriod> lights,
+                                              std::vector<std::size_t>& sorted) {
   constexpr double half_width = 0.015;
   const auto log_period = [&](std::size_t i) { return std::log(lights[sorted[i]].period_lines); };
   std::size_t best_begin = 0, best_end = 0;
@@ -52,7 +52,7 @@ std::vector<std::size_t> take_densest(std::span<const MeasuredPeriod> lights,
 
 }  // namespace
 
-std::vector<PeriodGroup> period_groups(std::span<const MeasuredPeriod> lights) {
+std::vector<PeriodGroup> group_periods(std::span<const MeasuredPeriod> lights) {
   std::map<int, std::vector<std::size_t>> labelled;
   std::vector<std::size_t> others;
   for (std::size_t i = 0; i < lights.size(); ++i) {
@@ -69,7 +69,7 @@ std::vector<PeriodGroup> period_groups(std::span<const MeasuredPeriod> lights) {
   const std::size_t all = others.size();
   std::size_t largest = 0;
   while (!others.empty()) {
-    std::vector<std::size_t> group = take_densest(lights, others);
+    std::vector<std::size_t> group = remove_densest_group(lights, others);
     largest = std::max(largest, group.size());
     if (10 * group.size() < largest || 50 * group.size() < all) break;
     groups.push_back(make_group(lights, std::move(group), std::nullopt));

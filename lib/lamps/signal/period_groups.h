@@ -34,6 +34,6 @@ struct PeriodGroup {
 /// 1.5 % of the period with most neighbors. Discards groups with less than a tenth of the lights of
 /// the largest group, or with less than one in fifty of these lights, because they are partly
 /// hidden lights.
-std::vector<PeriodGroup> period_groups(std::span<const MeasuredPeriod> lights);
+std::vector<PeriodGroup> group_periods(std::span<const MeasuredPeriod> lights);
 
 }  // namespace vlp

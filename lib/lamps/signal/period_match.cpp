@@ -14,19 +14,21 @@ namespace vlp {
 namespace {
 
 constexpr double kScatter = 0.003, kFarthest = kMaxResidualSds * kScatter;
-constexpr double kShortest_s = 1e-8, kLongest_s = 1e-3;  // valid range of a calibration
+constexpr double kMinRowTime_s = 1e-8, kMaxRowTime_s = 1e-3;  // valid range of a calibration
 /// Standard deviation of a measured duty about that of the map. Blur and a long exposure bias it
 /// towards 0.5; saturation increases it.
 constexpr double kDutySd = 0.1;
 
-double variance_of(const PeriodGroup& group) { return group.sd * group.sd + kScatter * kScatter; }
-
-double cost_of(const PeriodGroup& group, double residual) {
-  return std::log1p(residual * residual / variance_of(group));
+double compute_variance(const PeriodGroup& group) {
+  return group.sd * group.sd + kScatter * kScatter;
 }
 
-double weight_of(const PeriodGroup& group, double residual) {
-  return 1 / (variance_of(group) + residual * residual);
+double compute_cost(const PeriodGroup& group, double residual) {
+  return std::log1p(residual * residual / compute_variance(group));
+}
+
+double compute_weight(const PeriodGroup& group, double residual) {
+  return 1 / (compute_variance(group) + residual * residual);
 }
 
 }  // namespace
@@ -50,38 +52,38 @@ std::vector<PeriodMatch> PeriodMatching::matches() const {
     for (const auto& [log_frequency, lamps] : lamps_) {
       if (group.lamp && (known == log_frequency_.end() || known->second != log_frequency)) continue;
       const double start = -group.log_period - log_frequency;
-      if (start < std::log(kShortest_s) || start > std::log(kLongest_s)) continue;
-      all.push_back(refined(start));
+      if (start < std::log(kMinRowTime_s) || start > std::log(kMaxRowTime_s)) continue;
+      all.push_back(refine_match(start));
     }
   }
   return all;
 }
 
-PeriodMatch PeriodMatching::refined(double log_row_time) const {
+PeriodMatch PeriodMatching::refine_match(double log_row_time) const {
   constexpr int steps = 20;
-  PeriodMatch match = matched(log_row_time);
+  PeriodMatch match = evaluate_match(log_row_time);
   for (int step = 0; step < steps; ++step) {
     double weights = 0, sum = 0;
     for (std::size_t i = 0; i < groups_.size(); ++i) {
       if (!match.residuals[i]) continue;
-      const double weight = weight_of(groups_[i], *match.residuals[i]);
+      const double weight = compute_weight(groups_[i], *match.residuals[i]);
       weights += weight;
       sum += weight * *match.residuals[i];
     }
     if (!(weights > 0)) break;
-    match = matched(match.log_row_time + sum / weights);
+    match = evaluate_match(match.log_row_time + sum / weights);
   }
   return match;
 }
 
-PeriodMatch PeriodMatching::matched(double log_row_time) const {
+PeriodMatch PeriodMatching::evaluate_match(double log_row_time) const {
   PeriodMatch match{log_row_time, 0, {}, {}};
   match.residuals.resize(groups_.size());
   match.lamps.resize(groups_.size());
   std::map<double, std::size_t> taken;  // frequency -> group
   std::vector<LampsByLogFrequency::const_iterator> nearest(groups_.size(), lamps_.end());
   for (std::size_t i = 0; i < groups_.size(); ++i) {
-    nearest[i] = nearest_frequency(groups_[i], log_row_time);
+    nearest[i] = find_nearest_frequency(groups_[i], log_row_time);
     if (nearest[i] == lamps_.end()) continue;
     const double residual = -groups_[i].log_period - nearest[i]->first - log_row_time;
     if (std::abs(residual) > kFarthest) continue;
@@ -97,15 +99,15 @@ PeriodMatch PeriodMatching::matched(double log_row_time) const {
     match.residuals[i] = residual;
   }
   for (std::size_t i = 0; i < groups_.size(); ++i) {
-    match.cost += cost_of(groups_[i], match.residuals[i].value_or(kFarthest));
+    match.cost += compute_cost(groups_[i], match.residuals[i].value_or(kFarthest));
     if (!match.residuals[i]) continue;
     match.lamps[i] = groups_[i].lamp ? std::vector{*groups_[i].lamp} : nearest[i]->second;
-    match.cost += duty_cost(groups_[i], match.lamps[i]);
+    match.cost += compute_duty_cost(groups_[i], match.lamps[i]);
   }
   return match;
 }
 
-PeriodMatching::LampsByLogFrequency::const_iterator PeriodMatching::nearest_frequency(
+PeriodMatching::LampsByLogFrequency::const_iterator PeriodMatching::find_nearest_frequency(
     const PeriodGroup& group, double log_row_time) const {
   if (group.lamp) {
     const auto known = log_frequency_.find(*group.lamp);
@@ -120,11 +122,13 @@ PeriodMatching::LampsByLogFrequency::const_iterator PeriodMatching::nearest_freq
   return above_is_nearer ? above : below;
 }
 
-double PeriodMatching::duty_cost(const PeriodGroup& group, const std::vector<int>& lamps) const {
+double PeriodMatching::compute_duty_cost(const PeriodGroup& group,
+                                         const std::vector<int>& lamps) const {
   if (duty_.empty() || !group.duty) return 0;
-  double least = std::numeric_limits<double>::infinity();
-  for (const int lamp : lamps) least = std::min(least, std::abs(*group.duty - duty_.at(lamp)));
-  return std::log1p(least * least / (kDutySd * kDutySd));
+  double min_difference = std::numeric_limits<double>::infinity();
+  for (const int lamp : lamps)
+    min_difference = std::min(min_difference, std::abs(*group.duty - duty_.at(lamp)));
+  return std::log1p(min_difference * min_difference / (kDutySd * kDutySd));
 }
 
 }  // namespace vlp

@@ -34,12 +34,12 @@ class PeriodMatching {
  private:
   using LampsByLogFrequency = std::map<double, std::vector<int>>;
 
-  PeriodMatch refined(double log_row_time) const;
-  PeriodMatch matched(double log_row_time) const;
-  LampsByLogFrequency::const_iterator nearest_frequency(const PeriodGroup& group,
-                                                        double log_row_time) const;
+  PeriodMatch refine_match(double log_row_time) const;
+  PeriodMatch evaluate_match(double log_row_time) const;
+  LampsByLogFrequency::const_iterator find_nearest_frequency(const PeriodGroup& group,
+                                                             double log_row_time) const;
   /// Returns the cost of the group's duty if the group is one of these lamps.
-  double duty_cost(const PeriodGroup& group, const std::vector<int>& lamps) const;
+  double compute_duty_cost(const PeriodGroup& group, const std::vector<int>& lamps) const;
 
   std::vector<PeriodGroup> groups_;
   LampsByLogFrequency lamps_;

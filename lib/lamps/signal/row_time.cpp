@@ -12,8 +12,8 @@
 namespace vlp {
 namespace {
 
-RowTime row_time_of(const PeriodMatch& match, const std::vector<PeriodGroup>& groups) {
-  constexpr double measuring = 5e-4;  // common relative error of measured periods
+RowTime make_row_time(const PeriodMatch& match, const std::vector<PeriodGroup>& groups) {
+  constexpr double common_error = 5e-4;  // common relative error of measured periods
   double squares = 0, information = 0;
   int lamps = 0, lights = 0;
   for (std::size_t i = 0; i < groups.size(); ++i) {
@@ -27,12 +27,12 @@ RowTime row_time_of(const PeriodMatch& match, const std::vector<PeriodGroup>& gr
   // The scatter is not weighted, because five lamps do not reveal which of them is the most
   // reliable.
   if (lamps > 1) variance = std::max(variance, squares / (lamps - 1) / lamps);
-  variance += measuring * measuring;
+  variance += common_error * common_error;
   const double row_time_s = std::exp(match.log_row_time);
   return {row_time_s, row_time_s * std::sqrt(variance), lamps, lights};
 }
 
-std::string microseconds(double row_time_s) {
+std::string format_microseconds(double row_time_s) {
   char text[32];
   std::snprintf(text, sizeof text, "%.2f us", 1e6 * row_time_s);
   return text;
@@ -41,7 +41,7 @@ std::string microseconds(double row_time_s) {
 }  // namespace
 
 RowTimeCandidates estimate_row_time(std::span<const MeasuredPeriod> lights, const LampMap& lamps) {
-  RowTimeCandidates found{period_groups(lights), {}, {}};
+  RowTimeCandidates found{group_periods(lights), {}, {}};
   if (found.groups.empty()) {
     found.problem =
         "no light has clear stripes: add captures with lamps nearer, larger or sharper, and with a "
@@ -59,7 +59,7 @@ RowTimeCandidates estimate_row_time(std::span<const MeasuredPeriod> lights, cons
   constexpr double same = 0.02;
   for (PeriodMatch& match : matches) {
     if (match.cost >= matches.front().cost + kClearCost) break;
-    const RowTime row_time = row_time_of(match, found.groups);
+    const RowTime row_time = make_row_time(match, found.groups);
     const bool is_known = std::any_of(
         found.candidates.begin(), found.candidates.end(), [&](const RowTimeCandidate& other) {
           return std::abs(std::log(row_time.row_time_s / other.row_time.row_time_s)) < same;
@@ -85,8 +85,8 @@ RowTimeResult choose_row_time(const RowTimeCandidates& found,
   if (ranked.size() > 1 && ranked[1].first < ranked[0].first + kClearCost) {
     return {{},
             "the " + groups + " stripe periods that are seen fit a row time of " +
-                microseconds(best.row_time.row_time_s) + " and one of " +
-                microseconds(ranked[1].second->row_time.row_time_s) +
+                format_microseconds(best.row_time.row_time_s) + " and one of " +
+                format_microseconds(ranked[1].second->row_time.row_time_s) +
                 ", and neither the duties nor the places of the lamps decide: add captures that "
                 "show more "
                 "lamps, or a table that says which lamp is which"};

@@ -15,15 +15,15 @@ namespace vlp {
 
 namespace {
 
-constexpr double kClear = 0.7;
+constexpr double kMinClarity = 0.7;
 
 /// Values of four frequencies, for vector instructions.
 using Lanes = Eigen::Array4d;
 
 /// Returns the fraction of the variance that a sine of each frequency (per line) and a constant
 /// explain.
-Lanes explained(const std::vector<double>& signal, double mean, double variance,
-                const Lanes& frequencies) {
+Lanes compute_explained_fraction(const std::vector<double>& signal, double mean, double variance,
+                                 const Lanes& frequencies) {
   const Lanes step = 2 * std::numbers::pi * frequencies;
   const Lanes turn_c = step.cos(), turn_s = step.sin();
   Lanes c = Lanes::Ones(), s = Lanes::Zero();
@@ -46,13 +46,13 @@ Lanes explained(const std::vector<double>& signal, double mean, double variance,
   const Lanes ss = (n - sum_cc) / 2 - sum_s * sum_s / n;
   const Lanes cs = sum_cs / 2 - sum_c * sum_s / n;
   const Lanes determinant = cc * ss - cs * cs;
-  const Lanes share = (ss * a * a - 2 * cs * a * b + cc * b * b) / determinant / (n * variance);
-  return (determinant > 1e-6 * n * n).select(share, 0);
+  const Lanes fraction = (ss * a * a - 2 * cs * a * b + cc * b * b) / determinant / (n * variance);
+  return (determinant > 1e-6 * n * n).select(fraction, 0);
 }
 
 /// Returns the positions of the begins or ends of stripes, where the signal crosses the middle
 /// between dark and bright.
-std::vector<double> passages(const std::vector<double>& signal, double middle, bool rising) {
+std::vector<double> find_crossings(const std::vector<double>& signal, double middle, bool rising) {
   std::vector<double> places;
   for (std::size_t i = 1; i < signal.size(); ++i) {
     const double before = signal[i - 1] - middle, after = signal[i] - middle;
@@ -66,13 +66,14 @@ std::vector<double> passages(const std::vector<double>& signal, double middle, b
 /// Fits the period to the begins and ends of stripes by least squares: one offset for the begins,
 /// one for the ends. Exact for square waves, where few periods bias a sine fit. Returns
 /// std::nullopt if there are too few or if they do not agree with `guess`.
-std::optional<double> period_of(const std::vector<double>& signal, double middle, double guess) {
-  double moment = 0, square = 0, misfit = 0;
+std::optional<double> fit_period_to_crossings(const std::vector<double>& signal, double middle,
+                                              double guess) {
+  double moment = 0, square = 0, squared_residuals = 0;
   int count = 0;
   std::array<std::vector<double>, 2> places, numbers;
   for (const bool rising : {true, false}) {
     auto& at = places[rising];
-    at = passages(signal, middle, rising);
+    at = find_crossings(signal, middle, rising);
     double number = 0;
     for (std::size_t i = 0; i < at.size(); ++i) {
       if (i > 0) number += std::max(1.0, std::round((at[i] - at[i - 1]) / guess));
@@ -95,11 +96,11 @@ std::optional<double> period_of(const std::vector<double>& signal, double middle
   for (const std::size_t type : {std::size_t(0), std::size_t(1)}) {
     if (places[type].size() < 2) continue;
     for (std::size_t i = 0; i < places[type].size(); ++i) {
-      misfit += std::pow(places[type][i] - period * numbers[type][i], 2);
+      squared_residuals += std::pow(places[type][i] - period * numbers[type][i], 2);
     }
   }
-  constexpr double max_misfit = 0.12, max_off = 0.35;
-  const bool in_time = std::sqrt(misfit / count) < max_misfit * period;
+  constexpr double max_residual = 0.12, max_off = 0.35;
+  const bool in_time = std::sqrt(squared_residuals / count) < max_residual * period;
   if (!in_time || std::abs(period / guess - 1) > max_off) return std::nullopt;
   return period;
 }
@@ -120,13 +121,15 @@ double lit_area(const std::vector<double>& signal, double middle) {
 
 }  // namespace
 
-bool trustworthy(const Stripes& stripes) {
-  return stripes.clarity > kClear && stripes.periods > kEnoughPeriods;
+bool is_reliable(const Stripes& stripes) {
+  return stripes.clarity > kMinClarity && stripes.periods > kMinReliablePeriods;
 }
 
-bool readable(const Stripes& stripes) { return stripes.regular || stripes.clarity > kClear; }
+bool is_readable(const Stripes& stripes) {
+  return stripes.is_regular || stripes.clarity > kMinClarity;
+}
 
-Stripes stripes_of(const std::vector<double>& signal) {
+Stripes measure_stripes(const std::vector<double>& signal) {
   constexpr std::size_t min_lines = 8;
   if (signal.size() < min_lines) return {};
   const auto n = static_cast<double>(signal.size());
@@ -144,22 +147,22 @@ Stripes stripes_of(const std::vector<double>& signal) {
   if (!(high > low) || !(variance > rounding * high * high)) return stripes;
 
   // The step is sufficiently small for a parabola through the best three values.
-  const double step = 0.2 / n, lowest = 0.9 / n, highest = 1 / kShortestPeriod_lines;
+  const double step = 0.2 / n, lowest = 0.9 / n, highest = 1 / kMinPeriod_lines;
   const Lanes steps(0, step, 2 * step, 3 * step);
   double best = lowest;
   for (double first = lowest; first <= highest; first += 4 * step) {
-    const Lanes shares = explained(signal, mean, variance, first + steps);
+    const Lanes fractions = compute_explained_fraction(signal, mean, variance, first + steps);
     for (Eigen::Index i = 0; i < 4 && first + steps[i] <= highest; ++i) {
-      if (shares[i] > stripes.clarity) stripes.clarity = shares[i], best = first + steps[i];
+      if (fractions[i] > stripes.clarity) stripes.clarity = fractions[i], best = first + steps[i];
     }
   }
-  const Lanes beside = explained(signal, mean, variance, best - step + steps);
-  const double before = beside[0], after = beside[2];
-  const double bend = before - 2 * stripes.clarity + after;
-  if (bend < 0) best += std::clamp((before - after) / bend / 2, -1.0, 1.0) * step;
+  const Lanes neighbors = compute_explained_fraction(signal, mean, variance, best - step + steps);
+  const double before = neighbors[0], after = neighbors[2];
+  const double curvature = before - 2 * stripes.clarity + after;
+  if (curvature < 0) best += std::clamp((before - after) / curvature / 2, -1.0, 1.0) * step;
   const double middle = (low + high) / 2;
-  const auto in_time = period_of(signal, middle, 1 / best);
-  stripes.regular = in_time.has_value();
+  const auto in_time = fit_period_to_crossings(signal, middle, 1 / best);
+  stripes.is_regular = in_time.has_value();
   stripes.period_lines = in_time.value_or(1 / best);
   stripes.periods = n / stripes.period_lines;
   // The duty is measured over whole periods.
@@ -170,7 +173,7 @@ Stripes stripes_of(const std::vector<double>& signal) {
   }
   stripes.duty = std::clamp((lit / std::min(used, n) - low) / (high - low), 0.0, 1.0);
   const std::size_t edges =
-      passages(signal, middle, true).size() + passages(signal, middle, false).size();
+      find_crossings(signal, middle, true).size() + find_crossings(signal, middle, false).size();
   stripes.count_per_line = static_cast<double>(edges) / (2 * n);
   stripes.lit_area = lit_area(signal, middle);
   return stripes;
@@ -181,9 +184,9 @@ namespace {
 /// Returns the level of a scanline between two columns: the second brightest of five parts. An
 /// object may hide some of them, and a speck may brighten one.
 template <typename Level>
-double level_of(const Level* pixels, int begin, int end) {
+double measure_level(const Level* pixels, int begin, int end) {
   constexpr int parts = 5;
-  double most = 0, second = 0;
+  double brightest = 0, second = 0;
   int counted = 0;
   for (int part = 0; part < parts; ++part) {
     const int from = begin + (end - begin) * part / parts;
@@ -192,33 +195,34 @@ double level_of(const Level* pixels, int begin, int end) {
     double sum = 0;
     for (int column = from; column < to; ++column) sum += pixels[column];
     const double mean = sum / (to - from);
-    second = std::max(second, std::min(most, mean));
-    most = std::max(most, mean);
+    second = std::max(second, std::min(brightest, mean));
+    brightest = std::max(brightest, mean);
     ++counted;
   }
-  return counted > 1 ? second : most;
+  return counted > 1 ? second : brightest;
 }
 
 template <typename Level>
-std::vector<double> signal_of(const ImageView& image, const std::vector<Run>& chords, double dark) {
+std::vector<double> measure_signal(const ImageView& image, const std::vector<PixelRun>& chords,
+                                   double dark) {
   std::vector<double> signal;
   signal.reserve(chords.size());
   for (const auto& [row, begin, end] : chords) {
-    signal.push_back(level_of(image.row<Level>(row), begin, end) - dark);
+    signal.push_back(measure_level(image.row<Level>(row), begin, end) - dark);
   }
   return signal;
 }
 
 }  // namespace
 
-std::vector<Run> chords_of(const Eigen::Vector2d& low, const Eigen::Vector2d& high,
-                           const ImageSize& size) {
+std::vector<PixelRun> find_chords_in_ellipse(const Eigen::Vector2d& low,
+                                             const Eigen::Vector2d& high, const ImageSize& size) {
   constexpr double used_width = 0.8;
   const Eigen::Vector2d center = (low + high) / 2, half = (high - low) / 2;
   const int first = std::max(0, static_cast<int>(std::ceil(center.y() - kUsedHeight * half.y())));
   const int last =
       std::min(size.height - 1, static_cast<int>(std::floor(center.y() + kUsedHeight * half.y())));
-  std::vector<Run> chords;
+  std::vector<PixelRun> chords;
   for (int row = first; row <= last; ++row) {
     const double off = (row - center.y()) / half.y();
     const double used = used_width * half.x() * std::sqrt(std::max(0.0, 1 - off * off));
@@ -229,10 +233,10 @@ std::vector<Run> chords_of(const Eigen::Vector2d& low, const Eigen::Vector2d& hi
   return chords;
 }
 
-std::vector<double> line_signal(const ImageView& image, const std::vector<Run>& chords,
-                                double dark) {
-  return visit_levels(image,
-                      [&](auto level) { return signal_of<decltype(level)>(image, chords, dark); });
+std::vector<double> compute_line_signal(const ImageView& image, const std::vector<PixelRun>& chords,
+                                        double dark) {
+  return visit_levels(
+      image, [&](auto level) { return measure_signal<decltype(level)>(image, chords, dark); });
 }
 
 }  // namespace vlp

@@ -12,26 +12,26 @@
 namespace vlp {
 
 /// Minimum period of stripes, in scanlines; the theoretical limit is two scanlines.
-inline constexpr double kShortestPeriod_lines = 2.2;
+inline constexpr double kMinPeriod_lines = 2.2;
 
 /// Minimum contrast of a modulated light, and minimum number of periods of an identified one.
 inline constexpr double kMinContrast = 0.2, kMinPeriods = 1.3;
 
 /// Number of periods below which patterns without stripes may match a lamp by chance.
-inline constexpr double kEnoughPeriods = 2.5;
+inline constexpr double kMinReliablePeriods = 2.5;
 
 /// Fraction of a disc's height that is used: scanlines at the rim are short and dim.
 inline constexpr double kUsedHeight = 0.9;
 
 /// Returns the pixels of a light on each scanline, without those at its rim. The light is an
 /// ellipse in the box from `low` to `high` (column, row) of an image of `size`.
-std::vector<Run> chords_of(const Eigen::Vector2d& low, const Eigen::Vector2d& high,
-                           const ImageSize& size);
+std::vector<PixelRun> find_chords_in_ellipse(const Eigen::Vector2d& low,
+                                             const Eigen::Vector2d& high, const ImageSize& size);
 
 /// Computes the level of each chord of a light above `dark`. Suppresses partial occlusion and
 /// specks: the level is that of the second brightest of five parts.
-std::vector<double> line_signal(const ImageView& image, const std::vector<Run>& chords,
-                                double dark);
+std::vector<double> compute_line_signal(const ImageView& image, const std::vector<PixelRun>& chords,
+                                        double dark);
 
 /// Stripes of a light and their statistics.
 struct Stripes {
@@ -45,7 +45,7 @@ struct Stripes {
   /// Number of periods in the signal.
   double periods;
   /// True if the begins and ends of all stripes agree with the period.
-  bool regular;
+  bool is_regular;
   /// Number of stripes per scanline: half of the number of begins and ends divided by the number of
   /// scanlines. The signal crosses the middle between dark and bright there.
   double count_per_line;
@@ -54,18 +54,18 @@ struct Stripes {
 };
 
 /// Returns true if the stripes are clear and numerous: clarity above 0.7 and more than
-/// kEnoughPeriods periods. Stripes of a partly hidden lamp are not.
-bool trustworthy(const Stripes& stripes);
+/// kMinReliablePeriods periods. Stripes of a partly hidden lamp are not.
+bool is_reliable(const Stripes& stripes);
 
 /// Returns true if the period is meaningful: the stripes are regular, or their clarity exceeds 0.7.
 /// An object that hides a part of a lamp creates stripes that match another lamp by chance.
-bool readable(const Stripes& stripes);
+bool is_readable(const Stripes& stripes);
 
-/// Measures the stripes of a signal, the result of line_signal(). For a disc it covers
+/// Measures the stripes of a signal, the result of compute_line_signal(). For a disc it covers
 /// `kUsedHeight` of the radius above and below the middle. The period is first that of the
-/// best-fitting sine with a constant (least squares, Lomb 1976), between kShortestPeriod_lines and
+/// best-fitting sine with a constant (least squares, Lomb 1976), between kMinPeriod_lines and
 /// the length of the signal. If the begins and ends of the stripes agree with it, they determine
 /// the period. Contrast and clarity are 0 for signals of less than 8 scanlines.
-Stripes stripes_of(const std::vector<double>& signal);
+Stripes measure_stripes(const std::vector<double>& signal);
 
 }  // namespace vlp

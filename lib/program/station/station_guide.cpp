@@ -21,13 +21,13 @@ class Log {
  public:
   explicit Log(bool quiet) : quiet_(quiet) {}
 
-  void tell(const Unit& unit, const std::vector<WatchedRun::Arrival>& arrivals) {
+  void report(const Unit& unit, const std::vector<WatchedRun::Arrival>& arrivals) {
     if (quiet_) return;
     for (const auto& [step, image, gone] : arrivals) {
-      if (!gone) spdlog::info("{}", last_image_line(unit, step, image));
+      if (!gone) spdlog::info("{}", make_last_image_line(unit, step, image));
     }
     for (; done_ < kStationSteps.size() && unit.step(kStationSteps[done_]).done(); ++done_) {
-      spdlog::info("{} is done", name_of(kStationSteps[done_]));
+      spdlog::info("{} is done", to_string(kStationSteps[done_]));
     }
   }
 
@@ -37,7 +37,8 @@ class Log {
 };
 
 /// Returns true if an image arrived. Of the frames of a source, only used ones are considered.
-bool came(const Unit& unit, const std::vector<WatchedRun::Arrival>& arrivals, bool of_source) {
+bool has_arrived(const Unit& unit, const std::vector<WatchedRun::Arrival>& arrivals,
+                 bool of_source) {
   return std::any_of(arrivals.begin(), arrivals.end(), [&](const WatchedRun::Arrival& arrival) {
     const auto& images = unit.step(arrival.step).images;
     const auto image = images.find(arrival.image);
@@ -47,12 +48,12 @@ bool came(const Unit& unit, const std::vector<WatchedRun::Arrival>& arrivals, bo
 
 /// Checks whether the golden unit is due. Called at the first image of a unit, which may arrive
 /// long after its serial number was scanned.
-void ask_for_golden(Unit& unit, const Terminal& terminal) {
+void check_golden_unit(Unit& unit, const Terminal& terminal) {
   std::string why = golden_problem(unit.config());
-  if (!why.empty() && why != unit.distrusted() && !terminal.interactive()) {
+  if (!why.empty() && why != unit.invalid_reason() && !terminal.interactive()) {
     spdlog::warn("{}; no unit passes", why);
   }
-  unit.distrust(std::move(why));
+  unit.invalidate(std::move(why));
 }
 
 }  // namespace
@@ -60,26 +61,26 @@ void ask_for_golden(Unit& unit, const Terminal& terminal) {
 void guide_unit(const StationRunOptions& options, Unit& unit, WatchedRun& watched,
                 StepSources& sources, Spool& spool, Terminal& terminal) {
   using Clock = std::chrono::steady_clock;
-  constexpr int look_every_ms = 50;
+  constexpr int poll_interval_ms = 50;
   Clock::time_point last = Clock::now();
   Log log(terminal.interactive());
-  bool changed = true, begun = false;
-  while (unit.current() && !unit.hopeless()) {
-    const auto arrivals = watched.look(static_cast<std::size_t>(options.threads));
-    if (!begun && !arrivals.empty()) {
-      begun = true;
-      ask_for_golden(unit, terminal);
+  bool changed = true, has_begun = false;
+  while (unit.current() && !unit.is_hopeless()) {
+    const auto arrivals = watched.poll_changes(static_cast<std::size_t>(options.threads));
+    if (!has_begun && !arrivals.empty()) {
+      has_begun = true;
+      check_golden_unit(unit, terminal);
     }
-    log.tell(unit, arrivals);
+    log.report(unit, arrivals);
     changed = changed || !arrivals.empty();
     if (changed && terminal.interactive()) {
-      auto lines = station_screen(unit);
-      for (ScreenLine& line : spool_lines(spool.notice())) lines.push_back(std::move(line));
+      auto lines = make_station_screen(unit);
+      for (ScreenLine& line : make_spool_lines(spool.notice())) lines.push_back(std::move(line));
       lines.push_back({"q: verdict now   Ctrl-C: leave, to go on later"});
       terminal.draw(lines);
     }
     changed = false;
-    if (came(unit, arrivals, sources.any())) last = Clock::now();
+    if (has_arrived(unit, arrivals, sources.any())) last = Clock::now();
     sources.feed(unit, watched);
     if (sources.ended(unit)) {
       unit.end_early("the frames ended");
@@ -90,7 +91,7 @@ void guide_unit(const StationRunOptions& options, Unit& unit, WatchedRun& watche
       unit.end_early(fmt::format("no image came for {:g} s", *options.idle_s));
       break;
     }
-    if (terminal.key(arrivals.empty() ? look_every_ms : 0) == 'q') {
+    if (terminal.key(arrivals.empty() ? poll_interval_ms : 0) == 'q') {
       unit.end_early("the operator ended the run");
       break;
     }

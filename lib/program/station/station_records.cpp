@@ -35,11 +35,11 @@ constexpr const char* kAny = "any";
 
 /// Prints a line to stdout. Escapes control characters, so that names in records can neither add a
 /// line nor control the terminal.
-void say_line(const std::string& text) { fmt::print("{}\n", printable_line(text)); }
+void print_line(const std::string& text) { fmt::print("{}\n", printable_line(text)); }
 
 /// Opens the runs of a station, or of records alone. Reports the state of the spool. If the records
-/// are unavailable, commands that continue without them report it (warn_if_away()).
-std::unique_ptr<KnownRuns> known_runs(const StationRecordsOptions& options) {
+/// are unavailable, commands that continue without them report it (warn_if_unavailable()).
+std::unique_ptr<KnownRuns> open_runs(const StationRecordsOptions& options) {
   if (options.station.empty() == options.records.empty()) {
     throw std::invalid_argument("which records? Give --station or --records");
   }
@@ -48,7 +48,7 @@ std::unique_ptr<KnownRuns> known_runs(const StationRecordsOptions& options) {
     auto known = std::make_unique<KnownRuns>(read_station(options.station));
     const std::string state = known->spool()->state();
     if (state.empty()) return known;
-    if (known->are_away()) {
+    if (known->are_offline()) {
       spdlog::debug("{}", printable(state));
     } else {
       spdlog::warn("{}", printable(state));
@@ -61,8 +61,8 @@ std::unique_ptr<KnownRuns> known_runs(const StationRecordsOptions& options) {
 }
 
 /// Reports that a command used the runs in the spool because the records are unavailable.
-void warn_if_away(KnownRuns& known) {
-  if (known.spool() != nullptr && known.are_away()) {
+void warn_if_unavailable(KnownRuns& known) {
+  if (known.spool() != nullptr && known.are_offline()) {
     spdlog::warn("{}", printable(known.spool()->notice()));
   }
 }
@@ -83,21 +83,21 @@ RunFilter requested_runs(const StationRecordsOptions& options, const KnownRuns& 
 }
 
 /// Returns the named run, or the last that the filter accepts.
-RunRecord run_of(KnownRuns& known, const StationRecordsOptions& options) {
+RunRecord load_archive_run(KnownRuns& known, const StationRecordsOptions& options) {
   RunRecord run =
       options.run.empty() ? known.last(requested_runs(options, known)) : known.find(options.run);
-  warn_if_away(known);
+  warn_if_unavailable(known);
   return run;
 }
 
 /// Returns requested_runs() restricted to units, unless --kind is given.
-RunFilter comparable(const StationRecordsOptions& options, const KnownRuns& known) {
+RunFilter comparable_runs(const StationRecordsOptions& options, const KnownRuns& known) {
   RunFilter filter = requested_runs(options, known);
   if (options.filter.kind.empty()) filter.kind = "unit";
   return filter;
 }
 
-const StationConfig* station_of(const KnownRuns& known) {
+const StationConfig* find_station(const KnownRuns& known) {
   return known.station() ? &*known.station() : nullptr;
 }
 
@@ -109,10 +109,10 @@ void check_one_station(const std::vector<TrendPoint>& points,
 
 /// Checks that --output is not an input of the command: the records, station.yaml, or a file named
 /// in it.
-void check_output_of(const StationRecordsOptions& options, const KnownRuns& known) {
+void check_output_option(const StationRecordsOptions& options, const KnownRuns& known) {
   if (options.output.empty()) return;
   std::vector<std::string> inputs{options.station, options.records};
-  if (const StationConfig* station = station_of(known)) {
+  if (const StationConfig* station = find_station(known)) {
     inputs.push_back(station->records);
     for (const auto& file : station->inputs) inputs.push_back(file.string());
   }
@@ -120,7 +120,7 @@ void check_output_of(const StationRecordsOptions& options, const KnownRuns& know
 }
 
 /// Returns the folder for the files of a run.
-std::filesystem::path results_of(const StationRecordsOptions& options) {
+std::filesystem::path find_results_folder(const StationRecordsOptions& options) {
   if (!options.output.empty()) return options.output;
   if (!options.station.empty()) return read_station(options.station).results;
   throw std::invalid_argument("where to? Give --station, whose results it goes to, or --output");
@@ -128,7 +128,7 @@ std::filesystem::path results_of(const StationRecordsOptions& options) {
 
 /// Returns the result of a study. Converts std::invalid_argument to Undetermined.
 template <typename Study>
-auto determined(const Study& study) {
+auto run_study(const Study& study) {
   try {
     return study();
   } catch (const std::invalid_argument& error) {
@@ -137,7 +137,7 @@ auto determined(const Study& study) {
 }
 
 /// Parses reference values UNIT=VALUE. Returns them by unit.
-std::map<std::string, double> references_of(const std::vector<std::string>& texts) {
+std::map<std::string, double> parse_references(const std::vector<std::string>& texts) {
   std::map<std::string, double> references;
   for (const std::string& text : texts) {
     const auto at = text.rfind('=');
@@ -153,38 +153,41 @@ std::map<std::string, double> references_of(const std::vector<std::string>& text
   return references;
 }
 
-std::string words_of(const TestedEstimate& estimate) {
+std::string describe(const EstimateTest& estimate) {
   return fmt::format("{:>12.4g}{:>12.3g}{:>9.2f}{:>9.4f}   {:.4g} to {:.4g}", estimate.value,
                      estimate.standard_error, estimate.t, estimate.p, estimate.low, estimate.high);
 }
 
 /// Prints bias and linearity of a station against reference units.
-void show_bias(const MetricKind& kind, const StationRecordsOptions& options) {
-  const auto references = references_of(options.references);
-  const auto known = known_runs(options);
-  check_output_of(options, *known);
-  const auto points = judged_values(known->records(), options.figure, comparable(options, *known));
+void print_bias(const MetricKind& kind, const StationRecordsOptions& options) {
+  const auto references = parse_references(options.references);
+  const auto known = open_runs(options);
+  check_output_option(options, *known);
+  const auto points =
+      load_judged_values(known->records(), options.metric, comparable_runs(options, *known));
   check_one_station(points, options);
-  const auto values = reference_values(points, references);
+  const auto values = select_reference_values(points, references);
   std::vector<std::string> units;
   units.reserve(references.size());
   for (const auto& [unit, reference] : references) units.push_back(unit);
-  const BiasStudy study = determined([&] {
-    check_repetitions(known->records(), points, study_values(points, units));
-    return bias_study(values);
+  const BiasStudy study = run_study([&] {
+    check_repetitions(known->records(), points, select_study_values(points, units));
+    return analyze_bias(values);
   });
   constexpr const char* head = "{:<20}{:>10}{:>6}{:>12}{:>12}{:>9}{:>9}   {}";
-  say_line(fmt::format("{}: bias against {} reference units, {}", options.figure,
-                       study.units.size(),
-                       std::string_view(kind.unit).empty() ? "a share" : kind.unit));
+  print_line(fmt::format("{}: bias against {} reference units, {}", options.metric,
+                         study.units.size(),
+                         std::string_view(kind.unit).empty() ? "a share" : kind.unit));
   fmt::print("\n");
-  say_line(fmt::format(head, "unit", "reference", "runs", "bias", "se", "t", "p", "95 % interval"));
+  print_line(
+      fmt::format(head, "unit", "reference", "runs", "bias", "se", "t", "p", "95 % interval"));
   for (const UnitBias& unit : study.units) {
-    say_line(fmt::format("{:<20}{:>10.4g}{:>6}{}{}", unit.unit, unit.reference, unit.count,
-                         words_of(unit.bias), unit.bias.shows() ? "   shows" : ""));
+    print_line(fmt::format("{:<20}{:>10.4g}{:>6}{}{}", unit.unit, unit.reference, unit.count,
+                           describe(unit.bias), unit.bias.is_significant() ? "   shows" : ""));
   }
-  const auto line = [](const char* name, const TestedEstimate& estimate) {
-    fmt::print("{:<36}{}{}\n", name, words_of(estimate), estimate.shows() ? "   shows" : "");
+  const auto line = [](const char* name, const EstimateTest& estimate) {
+    fmt::print("{:<36}{}{}\n", name, describe(estimate),
+               estimate.is_significant() ? "   shows" : "");
   };
   line("all", study.all);
   if (study.linearity) {
@@ -196,12 +199,12 @@ void show_bias(const MetricKind& kind, const StationRecordsOptions& options) {
                linearity.residual_sd, 100 * linearity.r_squared, "", "reference", "line");
     for (const UnitBias& unit : study.units) {
       const double at = linearity.bias_at(unit.reference), half = linearity.band_at(unit.reference);
-      say_line(fmt::format("{:<20}{:>10.4g}{:>18.4g}   {:.4g} to {:.4g}{}", unit.unit,
-                           unit.reference, at, at - half, at + half,
-                           std::abs(at) > half ? "   without 0" : ""));
+      print_line(fmt::format("{:<20}{:>10.4g}{:>18.4g}   {:.4g} to {:.4g}{}", unit.unit,
+                             unit.reference, at, at - half, at + half,
+                             std::abs(at) > half ? "   without 0" : ""));
     }
   }
-  if (!options.output.empty()) draw_bias(options.output, options.figure, values, study);
+  if (!options.output.empty()) draw_bias(options.output, options.metric, values, study);
 }
 
 /// Returns true if the filter keeps all runs of a camera, so that its first one is known.
@@ -212,18 +215,18 @@ bool has_all_runs(const RunFilter& filter) {
 
 }  // namespace
 
-void list_runs(const StationRecordsOptions& options) {
-  const auto known = known_runs(options);
+void print_runs(const StationRecordsOptions& options) {
+  const auto known = open_runs(options);
   const auto runs = known->list(requested_runs(options, *known));
   constexpr const char* line = "{:<34} {:<20} {:<8} {:<7} {:<12} {:<16} {}";
-  say_line(
+  print_line(
       fmt::format(line, "run", "ended (UTC)", "verdict", "kind", "station", "camera", "cause"));
   for (const RunSummary& run : runs) {
     const bool counts = run.voided.empty();
-    say_line(fmt::format(line, run.run, run.ended_utc, counts ? run.verdict : "VOID", run.kind,
-                         run.station, run.camera,
-                         counts ? run.causes.substr(0, run.causes.find('\n'))
-                                : "was " + run.verdict + ": " + run.voided));
+    print_line(fmt::format(line, run.run, run.ended_utc, counts ? run.verdict : "VOID", run.kind,
+                           run.station, run.camera,
+                           counts ? run.causes.substr(0, run.causes.find('\n'))
+                                  : "was " + run.verdict + ": " + run.voided));
   }
   const RunCounts counts = count_runs(runs);
   fmt::print("\n{} runs, {} passed, {} failed, {} invalid", runs.size(), counts.passed,
@@ -238,7 +241,7 @@ void list_runs(const StationRecordsOptions& options) {
     fmt::print("{} cameras, {} with more than one judged run: first-pass yield {:.1f} %\n",
                counts.cameras, counts.cameras_reworked, percent * *yield);
   }
-  const auto open = known->with_open_hook();
+  const auto open = known->find_open_hooks();
   const auto without = std::count_if(runs.begin(), runs.end(), [&](const RunSummary& run) {
     return std::binary_search(open.begin(), open.end(), run.run);
   });
@@ -249,53 +252,53 @@ void list_runs(const StationRecordsOptions& options) {
   known->records();  // throws if the records are unavailable, because the list is incomplete
 }
 
-void show_run(const StationRecordsOptions& options) {
-  const auto known = known_runs(options);
-  const RunRecord record = run_of(*known, options);
-  for (const ScreenLine& line : verdict_screen(record)) say_line(line.text);
+void print_run(const StationRecordsOptions& options) {
+  const auto known = open_runs(options);
+  const RunRecord record = load_archive_run(*known, options);
+  for (const ScreenLine& line : make_verdict_screen(record)) print_line(line.text);
   fmt::print("\nfigures without a gate\n");
-  for (const CheckedMetric& figure : record.figures) {
-    if (figure.limit || !figure.value) continue;
-    say_line(fmt::format("{:<24}{:>12.4g} {}", figure.name, *figure.value, figure.unit));
+  for (const CheckedMetric& metric : record.metrics) {
+    if (metric.limit || !metric.value) continue;
+    print_line(fmt::format("{:<24}{:>12.4g} {}", metric.name, *metric.value, metric.unit));
   }
   const auto used = std::count_if(record.images.begin(), record.images.end(),
                                   [](const auto& image) { return image.refused.empty(); });
   fmt::print("\n");
   for (const RunField& field : run_fields()) {
     if (field.label == nullptr || (record.*field.text).empty()) continue;
-    say_line(fmt::format("{:<11}{}", field.label, record.*field.text));
+    print_line(fmt::format("{:<11}{}", field.label, record.*field.text));
   }
   fmt::print("images     {}, {} used\n", record.images.size(), used);
   for (const RunEvent& event : record.events) {
     const std::string who = event.who.empty() ? "" : event.who + ": ";
-    say_line(fmt::format("{:<11} {} {}{}", event.what, event.utc(), who, event.text));
+    print_line(fmt::format("{:<11} {} {}{}", event.what, event.utc(), who, event.text));
   }
 }
 
 void restore_run(const StationRecordsOptions& options) {
-  const std::filesystem::path results = results_of(options);
-  const auto known = known_runs(options);
-  const RunRecord record = run_of(*known, options);
-  const std::string no_verdict = why_no_verdict(record);
+  const std::filesystem::path results = find_results_folder(options);
+  const auto known = open_runs(options);
+  const RunRecord record = load_archive_run(*known, options);
+  const std::string no_verdict = find_verdict_problem(record);
   if (!no_verdict.empty()) throw InputError(record.run, no_verdict);
-  say_line(publish_run(record, {}, results, ExistingReport::replace).string());
+  print_line(publish_run(record, {}, results, ExistingReport::replace).string());
 }
 
 void write_certificate(const StationRecordsOptions& options) {
-  const std::filesystem::path results = results_of(options);
-  const auto known = known_runs(options);
-  const RunRecord record = run_of(*known, options);
-  say_line(write_certificate(record, results).string());
+  const std::filesystem::path results = find_results_folder(options);
+  const auto known = open_runs(options);
+  const RunRecord record = load_archive_run(*known, options);
+  print_line(write_certificate(record, results).string());
 }
 
-void clean_up(const StationRecordsOptions& options) {
-  const auto known = known_runs(options);
+void clean_expired_folders(const StationRecordsOptions& options) {
+  const auto known = open_runs(options);
   const StationConfig& config = *known->station();
   if (!config.keep.images_days && !config.keep.results_days) {
     throw InputError(options.station, "keeps all for ever: add the key 'keep'");
   }
   check_clock(config, known->records());
-  const Retained found = look_for_expired(config, known->records());
+  const RetentionResult found = find_expired(config, known->records());
   constexpr double megabyte = 1e6;
   double all_mb = 0;
   std::size_t done = 0;
@@ -309,9 +312,9 @@ void clean_up(const StationRecordsOptions& options) {
     }
     ++done;
     all_mb += mb;
-    say_line(fmt::format("{:>10.1f} MB  {} of {}, {} {}", mb, expired.folder.string(),
-                         expired.run.ended_utc, expired.run.verdict,
-                         options.remove ? "(deleted)" : ""));
+    print_line(fmt::format("{:>10.1f} MB  {} of {}, {} {}", mb, expired.folder.string(),
+                           expired.run.ended_utc, expired.run.verdict,
+                           options.remove ? "(deleted)" : ""));
   }
   for (const auto& folder : found.without_record) {
     spdlog::warn("{}: is of no run of the records: left", folder.string());
@@ -329,20 +332,20 @@ void clean_up(const StationRecordsOptions& options) {
 }
 
 void void_run(const StationRecordsOptions& options) {
-  const auto known = known_runs(options);
+  const auto known = open_runs(options);
   const auto [record, problem, files_problem] =
       void_run(*known, options.run, options.operator_name, options.reason);
   if (!problem.empty()) spdlog::error("{}", printable(problem));
   if (!files_problem.empty()) spdlog::warn("{}", printable(files_problem));
-  warn_if_away(*known);
-  say_line(fmt::format("{} {} {}: voided", record.run, record.camera, record.verdict));
-  for (const ScreenLine& line : hook_lines(record)) say_line(line.text);
+  warn_if_unavailable(*known);
+  print_line(fmt::format("{} {} {}: voided", record.run, record.camera, record.verdict));
+  for (const ScreenLine& line : make_hook_lines(record)) print_line(line.text);
 }
 
 void verify_records(const StationRecordsOptions& options) {
-  const auto known = known_runs(options);
-  const TrailCheck found = known->records().check(options.noted);
-  for (const std::string& problem : found.problems) say_line(problem);
+  const auto known = open_runs(options);
+  const TrailCheck found = known->records().check(options.expected_digest);
+  for (const std::string& problem : found.problems) print_line(problem);
   fmt::print("{} runs, {} entries in the trail\n", found.runs, found.entries);
   if (!found.last_digest.empty()) fmt::print("last digest {}\n", found.last_digest);
   if (found.problems.empty()) return;
@@ -352,15 +355,15 @@ void verify_records(const StationRecordsOptions& options) {
 }
 
 void export_runs(const StationRecordsOptions& options) {
-  const auto known = known_runs(options);
-  check_output_of(options, *known);
-  const auto runs = known->whole(requested_runs(options, *known));
+  const auto known = open_runs(options);
+  check_output_option(options, *known);
+  const auto runs = known->load_all(requested_runs(options, *known));
   write_runs(options.output, runs);
   fmt::print("{} runs\n", runs.size());
 }
 
 void import_archive(const StationRecordsOptions& options) {
-  auto [sessions, undated, crashed, refused] = sessions_of_archive(options.archive);
+  auto [sessions, undated, crashed, refused] = read_archive_sessions(options.archive);
   if (undated > 0) {
     spdlog::warn(
         "{} sessions are left out: when they were taken stands neither in archive.csv "
@@ -382,7 +385,7 @@ void import_archive(const StationRecordsOptions& options) {
     } else {
       std::optional<RunRecord> read;
       try {
-        read = run_of(sessions[i]);
+        read = load_archive_run(sessions[i]);
       } catch (const InputError& error) {
         refused.emplace_back(error.what());
       }
@@ -392,8 +395,8 @@ void import_archive(const StationRecordsOptions& options) {
     progress.update(i + 1, sessions.size());
   }
   if (!sessions.empty()) {
-    say_line(fmt::format("station {}: {} runs taken, {} were there", sessions.front().run.station,
-                         taken, sessions.size() - taken - unread - other.size()));
+    print_line(fmt::format("station {}: {} runs taken, {} were there", sessions.front().run.station,
+                           taken, sessions.size() - taken - unread - other.size()));
   }
   if (!refused.empty()) {
     throw std::invalid_argument(fmt::format("{} sessions are not taken, the first because of {}",
@@ -405,54 +408,54 @@ void import_archive(const StationRecordsOptions& options) {
       other.size(), other.front()));
 }
 
-void show_trend(const StationRecordsOptions& options) {
-  const MetricKind kind = run_figure(options.figure);
-  const auto known = known_runs(options);
-  check_output_of(options, *known);
+void print_trend(const StationRecordsOptions& options) {
+  const MetricKind kind = find_run_metric(options.metric);
+  const auto known = open_runs(options);
+  check_output_option(options, *known);
   Records& records = known->records();
-  RunFilter filter = comparable(options, *known);
-  if (options.filter.verdict.empty()) filter.verdict = name_of(Verdict::pass);
-  const auto points = records.trend(options.figure, filter);
+  RunFilter filter = comparable_runs(options, *known);
+  if (options.filter.verdict.empty()) filter.verdict = to_string(Verdict::pass);
+  const auto points = records.trend(options.metric, filter);
   check_one_station(points, options);
-  constexpr std::size_t least = 2;
-  if (points.size() < least) {
+  constexpr std::size_t min_points = 2;
+  if (points.size() < min_points) {
     throw Undetermined(
-        fmt::format("{} of the runs have {}: a trend needs two", points.size(), options.figure));
+        fmt::format("{} of the runs have {}: a trend needs two", points.size(), options.metric));
   }
-  const std::vector<double> values = values_of(points);
-  const auto alarms = chart_alarms(values, options.rules);
-  const ControlChart chart = control_chart(values);
-  const auto gate = gate_of(options.figure, station_of(*known), records, points);
-  if (!options.output.empty()) draw_trend(options.output, options.figure, points, alarms, gate);
-  say_line(fmt::format("{} of {} runs, {} to {}", options.figure, points.size(),
-                       points.front().ended_utc, points.back().ended_utc));
+  const std::vector<double> values = extract_values(points);
+  const auto alarms = find_alarms(values, options.rules);
+  const ControlChart chart = compute_control_chart(values);
+  const auto gate = find_gate(options.metric, find_station(*known), records, points);
+  if (!options.output.empty()) draw_trend(options.output, options.metric, points, alarms, gate);
+  print_line(fmt::format("{} of {} runs, {} to {}", options.metric, points.size(),
+                         points.front().ended_utc, points.back().ended_utc));
   fmt::print("mean      {:.4g} {}\nlimits    {:.4g} to {:.4g}\n", chart.mean, kind.unit,
              chart.lower, chart.upper);
-  if (gate) fmt::print("gate      {} {:.4g}\n", words_of(kind.asked), *gate);
+  if (gate) fmt::print("gate      {} {:.4g}\n", describe(kind.direction), *gate);
   for (const ChartAlarm& alarm : alarms) {
     const TrendPoint& point = points[alarm.index];
-    say_line(fmt::format("{} {} {} {:.4g}  {}: {}", point.ended_utc, point.run, point.camera,
-                         point.value, alarm.rule, alarm.meaning));
+    print_line(fmt::format("{} {} {} {:.4g}  {}: {}", point.ended_utc, point.run, point.camera,
+                           point.value, alarm.rule, alarm.meaning));
   }
   if (alarms.empty()) return;
-  throw GateNotMet(fmt::format("{}: {} alarms, the last {} at {}", options.figure, alarms.size(),
+  throw GateNotMet(fmt::format("{}: {} alarms, the last {} at {}", options.metric, alarms.size(),
                                alarms.back().rule, points[alarms.back().index].run));
 }
 
-void show_capability(const StationRecordsOptions& options) {
-  std::vector<MetricKind> kinds = run_figures();
-  if (!options.figure.empty()) kinds = {run_figure(options.figure)};
-  const auto known = known_runs(options);
+void print_capability(const StationRecordsOptions& options) {
+  std::vector<MetricKind> kinds = list_run_metrics();
+  if (!options.metric.empty()) kinds = {find_run_metric(options.metric)};
+  const auto known = open_runs(options);
   Records& records = known->records();
-  const RunFilter filter = comparable(options, *known);
+  const RunFilter filter = comparable_runs(options, *known);
   constexpr const char* head = "{:<22}{:>5}{:>10}{:>10}{:>10}{:>10}   {:<25}{}";
   std::vector<std::string> rows;
   rows.reserve(kinds.size());
   for (const MetricKind& kind : kinds) {
-    const auto points = judged_values(records, kind.name, filter);
+    const auto points = load_judged_values(records, kind.name, filter);
     check_one_station(points, options);
-    const auto gate = gate_of(kind.name, station_of(*known), records, points);
-    const auto found = capability(values_of(points), limits_of(kind, gate));
+    const auto gate = find_gate(kind.name, find_station(*known), records, points);
+    const auto found = compute_capability(extract_values(points), make_limits(kind, gate));
     if (!found) continue;
     const auto index = [](const CapabilityIndex& of) {
       return fmt::format("{:.2f} ({:.2f} to {:.2f})", of.value, of.low, of.high);
@@ -460,39 +463,40 @@ void show_capability(const StationRecordsOptions& options) {
     rows.push_back(fmt::format(
         head, kind.name, found->count, fmt::format("{:.4g}", found->mean),
         fmt::format("{:.3g}", found->within_sd), fmt::format("{:.3g}", found->overall_sd),
-        fmt::format("{} {:.4g}", kind.asked == Direction::at_least ? ">=" : "<=", gate.value_or(0)),
+        fmt::format("{} {:.4g}",
+                    kind.direction == Direction::at_least ? ">=" : "<=", gate.value_or(0)),
         index(found->cpk), index(found->ppk)));
   }
   if (rows.empty()) {
     throw Undetermined(
         "no figure with a gate has two values that differ, of runs that were judged");
   }
-  say_line(fmt::format(head, "figure", "runs", "mean", "sd within", "overall", "gate", "Cpk (95 %)",
-                       "Ppk (95 %)"));
-  for (const std::string& row : rows) say_line(row);
+  print_line(fmt::format(head, "figure", "runs", "mean", "sd within", "overall", "gate",
+                         "Cpk (95 %)", "Ppk (95 %)"));
+  for (const std::string& row : rows) print_line(row);
 }
 
-void show_study(const StationRecordsOptions& options) {
-  const MetricKind kind = run_figure(options.figure);
-  if (!options.references.empty()) return show_bias(kind, options);
-  const auto known = known_runs(options);
+void print_study(const StationRecordsOptions& options) {
+  const MetricKind kind = find_run_metric(options.metric);
+  if (!options.references.empty()) return print_bias(kind, options);
+  const auto known = open_runs(options);
   Records& records = known->records();
   RunFilter filter = options.filter;
   if (filter.kind.empty()) filter.kind = "unit";
-  const auto points = judged_values(records, options.figure, replace_any(filter));
-  const auto values = study_values(points, options.units);
-  const MeasurementStudy study = determined([&] {
+  const auto points = load_judged_values(records, options.metric, replace_any(filter));
+  const auto values = select_study_values(points, options.units);
+  const MeasurementStudy study = run_study([&] {
     check_repetitions(records, points, values);
-    return measurement_study(values);
+    return analyze_measurements(values);
   });
-  const auto gate = gate_of(options.figure, station_of(*known), records, points);
-  say_line(fmt::format("{}: {} units, {} stations, {} runs each, mean {:.4g} {}", options.figure,
-                       study.units, study.stations, study.repeats, study.mean, kind.unit));
+  const auto gate = find_gate(options.metric, find_station(*known), records, points);
+  print_line(fmt::format("{}: {} units, {} stations, {} runs each, mean {:.4g} {}", options.metric,
+                         study.units, study.stations, study.repeats, study.mean, kind.unit));
   fmt::print("\n");
   fmt::print("{:<18}{:>5}{:>14}{:>14}\n", "", "dof", "squares", "mean square");
   for (const auto& [name, line] :
        {std::pair("units", study.unit), std::pair("stations", study.station),
-        std::pair("units x stations", study.both), std::pair("error", study.error)}) {
+        std::pair("units x stations", study.interaction), std::pair("error", study.error)}) {
     fmt::print("{:<18}{:>5}{:>14.5g}{:>14.5g}\n", name, line.dof, line.sum_of_squares,
                line.mean_square());
   }
@@ -509,18 +513,19 @@ void show_study(const StationRecordsOptions& options) {
   part("repeatability (EV)", study.repeatability);
   if (study.stations > 1) {
     part("stations (AV)", study.of_station);
-    part("units x stations (INT)", study.of_both);
+    part("units x stations (INT)", study.of_interaction);
   }
-  part("measuring, all of it (GRR)", study.measuring);
+  part("measuring, all of it (GRR)", study.grr);
   part("units (PV)", study.of_unit);
   part("total (TV)", study.total);
   if (const auto categories = study.distinct_categories()) {
     fmt::print("distinct categories (ndc){:>21}\n", *categories);
   }
-  if (const auto share = study.percent_of_tolerance(limits_of(kind, gate))) {
-    fmt::print("measuring / tolerance (P/T){:>19.1f} %\n", *share);
+  if (const auto percent_of_tolerance = study.percent_of_tolerance(make_limits(kind, gate))) {
+    fmt::print("measuring / tolerance (P/T){:>19.1f} %\n", *percent_of_tolerance);
   } else if (gate) {
-    fmt::print("no P/T: the mean is not within the gate, {} {:.4g}\n", words_of(kind.asked), *gate);
+    fmt::print("no P/T: the mean is not within the gate, {} {:.4g}\n", describe(kind.direction),
+               *gate);
   }
   if (study.stations == 1) {
     fmt::print("\nOne station: nothing is known of what stations differ by.\n");

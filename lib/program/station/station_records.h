@@ -14,11 +14,11 @@ struct StationRecordsOptions {
   /// File station.yaml, or a database; exactly one is not empty.
   std::string station, records;
   RunFilter filter;
-  std::string run, figure, output;
+  std::string run, metric, output;
   /// void: name of the operator, and the reason.
   std::string operator_name, reason;
   /// verify-records: last digest of an earlier check; may be empty.
-  std::string noted;
+  std::string expected_digest;
   /// import: results of reprocessing.
   std::string archive;
   /// clean: deletes expired folders; otherwise only lists them.
@@ -32,9 +32,9 @@ struct StationRecordsOptions {
 };
 
 /// Prints a line for each run (vlp-station list).
-void list_runs(const StationRecordsOptions& options);
+void print_runs(const StationRecordsOptions& options);
 /// Prints all data of a run: the named one, or the last that the filter accepts (vlp-station show).
-void show_run(const StationRecordsOptions& options);
+void print_run(const StationRecordsOptions& options);
 /// Writes the missing files of a run from its record (vlp-station restore). Replaces the report and
 /// keeps the old one as replaced-report.html.
 void restore_run(const StationRecordsOptions& options);
@@ -43,7 +43,7 @@ void restore_run(const StationRecordsOptions& options);
 void write_certificate(const StationRecordsOptions& options);
 /// Lists the folders of runs whose retention time has expired, or deletes them and adds an event to
 /// each run (vlp-station clean). Records are kept.
-void clean_up(const StationRecordsOptions& options);
+void clean_expired_folders(const StationRecordsOptions& options);
 /// Voids a run (vlp-station void): yield, trends and studies ignore it. Adds an event to the run.
 void void_run(const StationRecordsOptions& options);
 /// Verifies by the audit trail that all records are unchanged (vlp-station verify-records). Throws
@@ -57,13 +57,13 @@ void import_archive(const StationRecordsOptions& options);
 /// Prints a metric over the runs, with limits and alarms of a control chart, and optionally draws a
 /// plot (vlp-station trend). Default of the filter: units of the station that passed. Throws
 /// GateNotMet if there is an alarm.
-void show_trend(const StationRecordsOptions& options);
+void print_trend(const StationRecordsOptions& options);
 /// Prints the capability indices Cpk and Ppk of the metrics that have gates (vlp-station
 /// capability).
-void show_capability(const StationRecordsOptions& options);
+void print_capability(const StationRecordsOptions& options);
 /// Prints a gauge study of a metric (vlp-station study): contribution of the measurement to its
 /// variation, from units measured several times on each station, or bias and linearity, from
 /// reference units.
-void show_study(const StationRecordsOptions& options);
+void print_study(const StationRecordsOptions& options);
 
 }  // namespace vlp

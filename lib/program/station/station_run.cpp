@@ -32,9 +32,9 @@ namespace fs = std::filesystem;
 const ProgramVersion kProgram{"vlp-station", VLP_VERSION};
 
 /// Updates the state of the golden unit. Reports errors only: the verdict is valid without it.
-void note(const StationConfig& config, const RunRecord& record) {
+void update_golden_state(const StationConfig& config, const RunRecord& record) {
   try {
-    note_for_golden(config, record);
+    update_golden_note(config, record);
   } catch (const InputError& error) {
     spdlog::error("when the golden unit is due is not known: {}", error.what());
   }
@@ -51,19 +51,19 @@ std::string spool_notice(Spool& spool) {
 
 /// Stores the run in the spool, prints the verdict, writes the files, delivers to the records,
 /// which may be unavailable, and calls the hook.
-void conclude(RunRecord measured, const std::vector<ReportPicture>& pictures, Spool& spool,
-              const StationConfig& config, Terminal& terminal,
-              const std::function<void()>& mark_kept, const std::function<void()>& put_away) {
+void finish_run(RunRecord measured, const std::vector<ReportPlot>& pictures, Spool& spool,
+                const StationConfig& config, Terminal& terminal,
+                const std::function<void()>& mark_stored, const std::function<void()>& move_away) {
   RunRecord record = printable_run(std::move(measured));  // in the form of the records
-  auto lines = verdict_screen(record);
+  auto lines = make_verdict_screen(record);
   std::optional<HookLock> lock;
   if (config.hook) {
     lock.emplace(spool.folder(), record.run);
-    record.events.push_back(hook_wanted(*config.hook, record.operator_name));
+    record.events.push_back(make_hook_request(*config.hook, record.operator_name));
   }
   // After a kill in between, the golden unit is due too early, not too late.
   const bool golden_passed = record.kind == "golden" && record.passed();
-  if (!golden_passed) note(config, record);
+  if (!golden_passed) update_golden_state(config, record);
   try {
     spool.keep(record);
   } catch (const InputError&) {
@@ -71,30 +71,30 @@ void conclude(RunRecord measured, const std::vector<ReportPicture>& pictures, Sp
     terminal.print(lines);
     throw;
   }
-  mark_kept();
+  mark_stored();
   terminal.print(lines);
-  if (golden_passed) note(config, record);
-  std::string undone, mend;
+  if (golden_passed) update_golden_state(config, record);
+  std::string file_error, remedy;
   try {
-    mend = fmt::format("'vlp-station restore {} --station {}' writes the files", record.run,
-                       config.file.string());
+    remedy = fmt::format("'vlp-station restore {} --station {}' writes the files", record.run,
+                         config.file.string());
     const fs::path folder = publish_run(record, pictures, config.results);
     spdlog::info("run {}: {}", record.run, folder.string());
-    mend = "move the folder there before the next run";
-    put_away();
+    remedy = "move the folder there before the next run";
+    move_away();
   } catch (const InputError& error) {
-    undone = error.what();
+    file_error = error.what();
   }
   spool.deliver();
   if (config.hook) {
     const std::string problem = call_hook(*config.hook, record, *lock, spool);
     if (!problem.empty()) spdlog::error("{}", problem);
-    terminal.print(hook_lines(record));
+    terminal.print(make_hook_lines(record));
   }
-  terminal.print(spool_lines(spool_notice(spool)));
-  if (undone.empty()) return;
+  terminal.print(make_spool_lines(spool_notice(spool)));
+  if (file_error.empty()) return;
   throw std::runtime_error(
-      fmt::format("{}; the verdict {} is recorded: {}", undone, record.verdict, mend));
+      fmt::format("{}; the verdict {} is recorded: {}", file_error, record.verdict, remedy));
 }
 
 /// Checks the conditions that are known before the first image.
@@ -108,10 +108,10 @@ void prepare(Spool& spool, const StationConfig& config, const std::string& camer
 
 void prepare(Unit& unit, Spool& spool, const StationConfig& config) {
   prepare(spool, config, unit.camera_id());
-  unit.refuse_images_of_others([&spool, camera = unit.camera_id()](const std::string& sha256) {
-    return spool.owner_of(sha256, camera);
+  unit.reject_images_of_others([&spool, camera = unit.camera_id()](const std::string& sha256) {
+    return spool.find_owner(sha256, camera);
   });
-  unit.distrust(golden_problem(config));
+  unit.invalidate(golden_problem(config));
 }
 
 /// Throws GateNotMet if the run failed, Undetermined if it is invalid.
@@ -128,21 +128,21 @@ void throw_unless_passed(const RunRecord& record) {
 void add_folders(Unit& unit, const fs::path& folder) {
   bool any = false;
   for (const StationStep step : kStationSteps) {
-    if (!fs::is_directory(folder / name_of(step))) continue;
+    if (!fs::is_directory(folder / to_string(step))) continue;
     any = true;
-    unit.add(step, list_images(folder / name_of(step)));
+    unit.add(step, list_images(folder / to_string(step)));
   }
   if (!any) throw InputError(folder, "has none of the folders boards, rotation, dispersion, check");
 }
 
 /// Makes the record of a unit that ends now. The run is invalid if the golden unit failed in the
 /// meantime, but not if it only became due.
-RunRecord record_now(Unit& unit, const std::string& run, const StationRunOptions& options,
-                     Spool& spool) {
-  if (unit.distrusted().empty()) {
-    unit.distrust(golden_problem(unit.config(), GoldenAt::verdict));
+RunRecord make_final_record(Unit& unit, const std::string& run, const StationRunOptions& options,
+                            Spool& spool) {
+  if (unit.invalid_reason().empty()) {
+    unit.invalidate(golden_problem(unit.config(), GoldenCheckTime::verdict));
     const std::string due = golden_problem(unit.config());
-    if (unit.distrusted().empty() && !due.empty()) {
+    if (unit.invalid_reason().empty() && !due.empty()) {
       spdlog::warn("{} before the next unit; this one was begun before it was", due);
     }
   }
@@ -150,28 +150,28 @@ RunRecord record_now(Unit& unit, const std::string& run, const StationRunOptions
   record.operator_name = options.operator_name;
   record.shift = options.shift;
   if (record.invalid()) return record;  // images of an invalid run may be used again
-  const auto earlier = spool.repeated_run_of(record);
+  const auto earlier = spool.find_repeated_run(record);
   if (earlier && !earlier->empty()) {
     reject_repetition(record, *earlier, options.station);
   } else if (!earlier) {
     const std::string unchecked =
         "the records are offline: whether an earlier run used the same images was not checked";
-    record.events.push_back(new_event(kUnchecked, unchecked));
+    record.events.push_back(make_event(kUnchecked, unchecked));
     spdlog::warn("{}", unchecked);
   }
   return record;
 }
 
 RunRecord run_batch(const StationRunOptions& options, const StationConfig& config, Spool& spool) {
-  const std::string run = new_run();
+  const std::string run = make_run_id();
   Unit unit(config, options.camera_id, kProgram, options.threads);
   prepare(unit, spool, config);
-  if (!unit.distrusted().empty()) spdlog::warn("{}; no unit passes", unit.distrusted());
+  if (!unit.invalid_reason().empty()) spdlog::warn("{}; no unit passes", unit.invalid_reason());
   add_folders(unit, options.batch);
   unit.advance(true);
-  RunRecord record = record_now(unit, run, options, spool);
+  RunRecord record = make_final_record(unit, run, options, spool);
   Terminal terminal;
-  conclude(
+  finish_run(
       record, unit.pictures(), spool, config, terminal, [] {}, [] {});
   return record;
 }
@@ -183,22 +183,22 @@ RunRecord run_watched(const StationRunOptions& options, const StationConfig& con
   WatchedRun watched(unit, spool);
   Terminal terminal;
   if (const auto& finished = watched.finished()) {
-    terminal.print(verdict_screen(*finished));
-    terminal.print(hook_lines(*finished));
+    terminal.print(make_verdict_screen(*finished));
+    terminal.print(make_hook_lines(*finished));
     spdlog::info("run {} had its verdict before it was put away; the same command begins another",
                  finished->run);
     return *finished;
   }
   spdlog::info("run {}; images go to {}/STEP", watched.run(), watched.folder().string());
-  if (!unit.distrusted().empty() && !terminal.interactive()) {
-    spdlog::warn("{}; no unit passes", unit.distrusted());
+  if (!unit.invalid_reason().empty() && !terminal.interactive()) {
+    spdlog::warn("{}; no unit passes", unit.invalid_reason());
   }
   guide_unit(options, unit, watched, sources, spool, terminal);
   unit.advance(true);
-  RunRecord record = record_now(unit, watched.run(), options, spool);
-  conclude(
-      record, unit.pictures(), spool, config, terminal, [&] { watched.mark_kept(); },
-      [&] { watched.put_away(); });
+  RunRecord record = make_final_record(unit, watched.run(), options, spool);
+  finish_run(
+      record, unit.pictures(), spool, config, terminal, [&] { watched.mark_stored(); },
+      [&] { watched.move_away(); });
   return record;
 }
 
@@ -222,18 +222,18 @@ void run_verify(const StationRunOptions& options) {
   const fs::path arrived = config.captures / config.golden->camera_id;
   const bool batch = !options.batch.empty();
   auto [record, pictures] = verify_station(config, batch ? fs::path(options.batch) : arrived,
-                                           new_run(), kProgram, options.threads);
+                                           make_run_id(), kProgram, options.threads);
   if (config.verify_due) {
-    refuse_used_images(record,
-                       [&](const std::string& sha256) { return spool.golden_run_of(sha256); });
+    reject_used_images(record,
+                       [&](const std::string& sha256) { return spool.find_golden_run(sha256); });
   }
   record.operator_name = options.operator_name;
   record.shift = options.shift;
   Terminal terminal;
-  conclude(
+  finish_run(
       record, pictures, spool, config, terminal, [] {},
       [&, run = record.run] {
-        if (!batch) put_away(arrived, run);
+        if (!batch) move_away(arrived, run);
       });
   throw_unless_passed(record, "station " + record.station + " has moved");
 }
@@ -243,7 +243,7 @@ void run_hooks(const StationRunOptions& options) {
   if (!config.hook) throw InputError(options.station, "has no hook: add the key 'hook'");
   Spool spool(config.spool, config.records);
   spool.deliver();
-  const HooksRun hooks =
+  const HookCounts hooks =
       run_open_hooks(config, spool, [](const RunRecord& run, const std::string& outcome) {
         fmt::print("{}\n", printable_line(fmt::format("{} {} {}: {}", run.run, run.camera,
                                                       run.verdict, outcome)));

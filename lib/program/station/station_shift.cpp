@@ -30,29 +30,29 @@ namespace {
 constexpr const char* kQuit = "q";
 
 /// Reads a line in the form in which records store it; std::nullopt at the end of the input.
-std::optional<std::string> asked(const std::string& label, Terminal& terminal) {
+std::optional<std::string> read_word(const std::string& label, Terminal& terminal) {
   constexpr std::size_t longest = 64;
   const auto line = terminal.line({{label}});
-  return line ? std::optional(printable(first_characters(*line, longest))) : std::nullopt;
+  return line ? std::optional(printable(truncate_utf8(*line, longest))) : std::nullopt;
 }
 
 /// Reads the names of operator and shift if they are empty. Returns false if the input ended or the
 /// operator quit.
 bool begin_shift(std::string& operator_name, std::string& shift, Terminal& terminal) {
   while (operator_name.empty()) {
-    const auto name = asked("Operator ", terminal);
+    const auto name = read_word("Operator ", terminal);
     if (!name || *name == kQuit) return false;
     operator_name = *name;
   }
   if (!shift.empty()) return true;
-  const auto name = asked("Shift    ", terminal);
+  const auto name = read_word("Shift    ", terminal);
   if (name) shift = *name;
   return name.has_value() && shift != kQuit;
 }
 
 /// Reads the id of the next unit, or of the golden unit, until it is one that the station accepts.
 /// Returns std::nullopt for `q` and at the end of the input.
-std::optional<std::string> next_serial(const StationConfig& config, Terminal& terminal) {
+std::optional<std::string> read_serial(const StationConfig& config, Terminal& terminal) {
   const std::string golden = golden_problem(config);
   std::string problem;
   for (;;) {
@@ -73,7 +73,7 @@ std::optional<std::string> next_serial(const StationConfig& config, Terminal& te
 }
 
 /// Returns the command line of the process for a unit.
-std::vector<std::string> command_of(const StationRunOptions& options, bool golden) {
+std::vector<std::string> make_command(const StationRunOptions& options, bool golden) {
   std::vector<std::string> command{
       "vlp-station", golden ? "verify" : "run", "--station=" + options.station,
       "--threads=" + std::to_string(options.threads), "--operator=" + options.operator_name};
@@ -89,7 +89,7 @@ std::vector<std::string> command_of(const StationRunOptions& options, bool golde
 
 /// Runs this program with these arguments in a new process and returns its exit code. Reports an
 /// error and returns kBadInput if the process crashes.
-int exit_code_of(const std::vector<std::string>& command) {
+int run_process(const std::vector<std::string>& command) {
   std::vector<char*> arguments;
   arguments.reserve(command.size() + 1);
   for (const std::string& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
@@ -102,7 +102,7 @@ int exit_code_of(const std::vector<std::string>& command) {
                              std::generic_category().message(error));
   }
   int status = 0;
-  bool told = false;
+  bool is_signaled = false;
   for (;;) {
     const pid_t ended = ::waitpid(process, &status, WNOHANG);
     if (ended == process) break;
@@ -112,7 +112,7 @@ int exit_code_of(const std::vector<std::string>& command) {
       return kBadInput;
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
-    if (interrupted() && !told) told = ::kill(process, SIGTERM) == 0;
+    if (interrupted() && !is_signaled) is_signaled = ::kill(process, SIGTERM) == 0;
   }
   if (WIFEXITED(status)) return WEXITSTATUS(status);
   spdlog::error("the unit's process was ended by signal {}", WTERMSIG(status));
@@ -124,32 +124,32 @@ int exit_code_of(const std::vector<std::string>& command) {
 void run_shift(StationRunOptions options) {
   StationConfig config = read_station(options.station);
   Terminal terminal;
-  std::map<int, int> ends;  // number of units by exit code
+  std::map<int, int> exit_counts;  // number of units by exit code
   int units = 0;
-  const bool begun = begin_shift(options.operator_name, options.shift, terminal);
-  while (begun) {
+  const bool has_begun = begin_shift(options.operator_name, options.shift, terminal);
+  while (has_begun) {
     try {
       config = read_station(options.station);  // as the process of each unit does
     } catch (const InputError&) {              // the process of the unit reports the error
     }
-    const auto serial = next_serial(config, terminal);
+    const auto serial = read_serial(config, terminal);
     if (!serial) break;
     options.camera_id = *serial;
     const bool golden = config.golden && *serial == config.golden->camera_id;
-    const int code = exit_code_of(command_of(options, golden));
-    terminal.forget_keys();
+    const int code = run_process(make_command(options, golden));
+    terminal.discard_keys();
     if (!golden) {
       ++units;
-      ++ends[code];
+      ++exit_counts[code];
     }
     const bool judged = code == kDone || code == kGateNotMet || code == kUndetermined;
     if (interrupted() && !judged) {
       throw std::runtime_error("the shift was left in the middle of a unit");
     }
   }
-  const int judged = ends[kDone] + ends[kGateNotMet] + ends[kUndetermined];
-  fmt::print("{} units: {} passed, {} failed, {} invalid{}\n", units, ends[kDone],
-             ends[kGateNotMet], ends[kUndetermined],
+  const int judged = exit_counts[kDone] + exit_counts[kGateNotMet] + exit_counts[kUndetermined];
+  fmt::print("{} units: {} passed, {} failed, {} invalid{}\n", units, exit_counts[kDone],
+             exit_counts[kGateNotMet], exit_counts[kUndetermined],
              judged == units ? "" : fmt::format(", {} with an error", units - judged));
 }
 

@@ -36,7 +36,7 @@ class Terminal {
   /// one.
   std::optional<char> key(int wait_ms) const;
   /// Discards the keys typed so far on a terminal, up to a pause longer than a scanner's.
-  void forget_keys() const;
+  void discard_keys() const;
   /// Reads a line from the keyboard, a scanner or a file, without surrounding blanks. Longer lines
   /// are cut to 200 bytes, in whole UTF-8 characters.
   ///
@@ -52,12 +52,12 @@ class Terminal {
     bool operator==(const Size&) const = default;
   };
   static Size size();
-  void show(const std::string& text, std::size_t lines);
-  std::string toned(const std::string& text, Tone tone) const;
+  void replace_text(const std::string& text, std::size_t lines);
+  std::string colorize(const std::string& text, Tone tone) const;
 
-  bool interactive_, colour_;
-  std::size_t drawn_ = 0;
-  std::string last_;
+  bool interactive_, has_color_;
+  std::size_t num_drawn_lines_ = 0;
+  std::string last_text_;
   Size size_{};
   std::unique_ptr<Saved> saved_;
 };

@@ -25,9 +25,9 @@
 
 namespace vlp {
 
-FrontendOptions default_frontend() {
+FrontendOptions make_default_frontend() {
   FrontendOptions options;
-  options.threads = all_cores();
+  options.threads = count_cores();
   return options;
 }
 
@@ -44,7 +44,7 @@ void add_lens_option(CLI::App& app, std::string& lens) {
                  "Lens model (default: LENSMODEL_OPENCV8); auto: the one that the views call for, "
                  "by what each leaves of views that took no part")
       ->check([](const std::string& name) {
-        const bool known = name == kChosenLens || lens_model_from_name(name);
+        const bool known = name == kAutomaticLens || lens_model_from_name(name);
         return known ? std::string() : "the models are: auto, " + lens_model_names();
       });
 }
@@ -138,12 +138,12 @@ void add_yaw_rate_sd_option(CLI::App& app, std::optional<double>& yaw_rate_sd_de
       ->check(finite_not_negative());
 }
 
-std::vector<std::string> inputs_of(const CaptureOptions& options) {
+std::vector<std::string> list_inputs(const CaptureOptions& options) {
   return {options.images, options.lamps, options.calibration, options.frontend.classifier.string()};
 }
 
-LampImages lamp_images(const CaptureOptions& options, const LampMap& lamps,
-                       const std::optional<Calibration>& calibration) {
+LampImages make_lamp_images(const CaptureOptions& options, const LampMap& lamps,
+                            const std::optional<Calibration>& calibration) {
   return {options.images,          lamps,
           options.lamps,           calibration,
           options.calibration,     options.captures,
@@ -161,7 +161,8 @@ void check_image_outputs(const CaptureOptions& options) {
 void print_lights(const Observations& seen) {
   if (!spdlog::should_log(spdlog::level::debug)) return;
   for (const Observation& image : seen.images) {
-    for (const Light& light : image.lights) spdlog::debug("{}: {}", image.name(), line_of(light));
+    for (const Light& light : image.lights)
+      spdlog::debug("{}: {}", image.name(), describe_light(light));
   }
 }
 
@@ -181,7 +182,7 @@ void add_row_time_error(const CaptureOptions& options, const LampMap& lamps,
     error = describe_row_time_error(seen.images, lamps, calibration->camera, file.string(),
                                     result.ok());
   } else if (frontend.row_time_s) {
-    const StatedRowTime stated{*frontend.row_time_s, "--row-time-s"};
+    const GivenRowTime stated{*frontend.row_time_s, "--row-time-s"};
     error = check_row_time(seen.images, lamps, stated).error;
     if (error.empty()) error = find_row_time_error(seen.images, lamps, std::nullopt, stated);
   }
@@ -202,20 +203,20 @@ Observations observe_captures(const CaptureOptions& options, ImageUse use, const
   {
     Progress progress("images");
     seen =
-        observe_lamps(lamp_images(options, lamps, calibration), use, options.frontend,
+        observe_lamps(make_lamp_images(options, lamps, calibration), use, options.frontend,
                       [&](std::size_t done, std::size_t total) { progress.update(done, total); });
   }
   StepResult remarks;
   add_remarks(seen, remarks);
   add_row_time_error(options, lamps, calibration, seen, remarks);
-  tell(remarks);
+  print_remarks(remarks);
   print_lights(seen);
   if (!options.lights.empty()) write_lights(options.lights, seen.images);
-  require(remarks);
+  throw_if_failed(remarks);
   return seen;
 }
 
-LampCaptures read_captures_of(const CaptureOptions& options, ImageUse use) {
+LampCaptures read_lamp_captures(const CaptureOptions& options, ImageUse use) {
   LampCaptures captures{{},
                         read_lamps_of_room(options.lamps, options.frontend.room),
                         options.lamps,
@@ -224,12 +225,13 @@ LampCaptures read_captures_of(const CaptureOptions& options, ImageUse use) {
   if (readout) captures.calibration.camera.readout = readout;
   captures.frames =
       std::filesystem::is_directory(options.images)
-          ? kept_frames(observe_captures(options, use, captures.lamps, captures.calibration).images)
-          : read_detections_of(options);
+          ? collect_kept_frames(
+                observe_captures(options, use, captures.lamps, captures.calibration).images)
+          : read_detection_captures(options);
   return captures;
 }
 
-std::vector<Frame> read_detections_of(const CaptureOptions& options) {
+std::vector<Frame> read_detection_captures(const CaptureOptions& options) {
   if (is_video_name(options.images)) {
     throw std::invalid_argument(
         options.images +

@@ -15,7 +15,7 @@
 namespace vlp {
 
 /// Returns the default options of a program, with one thread per core.
-FrontendOptions default_frontend();
+FrontendOptions make_default_frontend();
 
 /// Captures of lamps as given on the command line. File names are also used in messages.
 struct CaptureOptions {
@@ -24,7 +24,7 @@ struct CaptureOptions {
   std::string lamps, calibration, output;
   /// File for lights.csv; empty: none.
   std::string lights;
-  FrontendOptions frontend = default_frontend();
+  FrontendOptions frontend = make_default_frontend();
   /// Table of the captures, and yaw of the camera on the robot (LampImages).
   std::optional<CapturesTable> captures;
   double yaw_in_robot_rad = 0;
@@ -44,7 +44,7 @@ void add_capture_options(CLI::App& app, CaptureOptions& options, const CaptureTe
 void add_readout_option(CLI::App& app, std::optional<Readout>& readout);
 
 /// Value of --lens for the model selected by cross-validation.
-inline constexpr const char* kChosenLens = "auto";
+inline constexpr const char* kAutomaticLens = "auto";
 
 /// Adds --lens MODEL|auto, for programs that estimate a lens.
 void add_lens_option(CLI::App& app, std::string& lens);
@@ -87,11 +87,11 @@ void add_yaw_rate_sd_option(CLI::App& app, std::optional<double>& yaw_rate_sd_de
 
 /// Returns the inputs of the result: captures, lamp map, calibration, classifier; an empty name is
 /// an input that was not given.
-std::vector<std::string> inputs_of(const CaptureOptions& options);
+std::vector<std::string> list_inputs(const CaptureOptions& options);
 
 /// Returns the images with lamp map and calibration for observe_lamps().
-LampImages lamp_images(const CaptureOptions& options, const LampMap& lamps,
-                       const std::optional<Calibration>& calibration);
+LampImages make_lamp_images(const CaptureOptions& options, const LampMap& lamps,
+                            const std::optional<Calibration>& calibration);
 
 /// Throws std::invalid_argument if `output` or `lights` is one of the images.
 void check_image_outputs(const CaptureOptions& options);
@@ -108,10 +108,10 @@ Observations observe_captures(const CaptureOptions& options, ImageUse use, const
 /// Reads lamp map, calibration, and the captures of a detections.csv or of a folder of images.
 /// Throws as observe_captures() and the readers of the files do, and std::invalid_argument if
 /// options for images are given with a table.
-LampCaptures read_captures_of(const CaptureOptions& options, ImageUse use);
+LampCaptures read_lamp_captures(const CaptureOptions& options, ImageUse use);
 
 /// Reads the captures of a detections.csv. Throws std::invalid_argument for a video, and if options
 /// for images are given.
-std::vector<Frame> read_detections_of(const CaptureOptions& options);
+std::vector<Frame> read_detection_captures(const CaptureOptions& options);
 
 }  // namespace vlp

@@ -28,6 +28,7 @@ std::span<const std::string_view> options_without_history();
 /// @param inputs  files and folders of images; an empty name is an input that was not given
 /// @throws InputError if an input cannot be read
 /// @pre `app` has parsed the command line
-HistoryEntry history_entry(const CLI::App& app, const std::vector<std::string>& inputs);
+HistoryEntry make_program_history_entry(const CLI::App& app,
+                                        const std::vector<std::string>& inputs);
 
 }  // namespace vlp

@@ -14,8 +14,8 @@ namespace vlp {
 void print_adjustment(const AdjustmentResult& found, const Calibration& before, bool lens_stated) {
   const RotationCenter& center = found.center;
   const double focal_px = std::sqrt(found.camera.focal_px().prod());
-  fmt::print("captures    {} used, {} left out\n", found.captures, found.captures_left_out);
-  fmt::print("detections  {} used, {} left out\n", found.detections, found.detections_left_out);
+  fmt::print("captures    {} used, {} left out\n", found.captures, found.rejected_captures);
+  fmt::print("detections  {} used, {} left out\n", found.detections, found.rejected_detections);
   const Eigen::Vector3d& up = center.zenith_in_camera;
   fmt::print("tilt        {:.4f} deg, sd {:.4f} deg\n",
              deg_from_rad(std::acos(std::min(1.0, up.z()))),
@@ -50,8 +50,8 @@ void print_adjustment(const AdjustmentResult& found, const Calibration& before, 
   fmt::print("residual    {:.4f} px per axis\n", found.residual_px);
   for (const auto& place : found.places) {
     fmt::print("place       {}: {:.3f} {:.3f} {:.3f} mm from where it is said to be{}\n",
-               place.name, 1e3 * place.misfit_m.x(), 1e3 * place.misfit_m.y(),
-               1e3 * place.misfit_m.z(), place.wrong ? ", left out" : "");
+               place.name, 1e3 * place.residual_m.x(), 1e3 * place.residual_m.y(),
+               1e3 * place.residual_m.z(), place.wrong ? ", left out" : "");
   }
   fmt::print("\n{:>10} {:>28} {:>28}\n", "lamp", "moved by x y z (mm)", "sd (mm)");
   for (const auto& [id, correction_m, sd_m, moved] : found.lamps) {

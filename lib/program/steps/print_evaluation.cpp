@@ -23,19 +23,19 @@ void print_figure(const char* name, double value_m, const Interval* interval_m) 
 }
 
 void print_horizontal(const Evaluation& evaluation) {
-  const ErrorFigures& figures = evaluation.horizontal_m;
+  const ErrorStatistics& statistics = evaluation.horizontal_m;
   const auto& intervals = evaluation.intervals_m;
   fmt::print("\nhorizontal {:>13}", "");
   if (intervals) {
-    fmt::print("   95 % interval, of {} {}\n", intervals->units, evaluation.drawn);
+    fmt::print("   95 % interval, of {} {}\n", intervals->clusters, evaluation.resampling_unit);
   } else {
-    fmt::print("   too few {} for an interval\n", evaluation.drawn);
+    fmt::print("   too few {} for an interval\n", evaluation.resampling_unit);
   }
-  print_figure("mean", figures.mean, intervals ? &intervals->mean : nullptr);
-  print_figure("median", figures.median, intervals ? &intervals->median : nullptr);
-  print_figure("p90", figures.p90, intervals && intervals->p90 ? &*intervals->p90 : nullptr);
-  print_figure("rms", figures.rms, intervals ? &intervals->rms : nullptr);
-  print_figure("max", figures.max, nullptr);
+  print_figure("mean", statistics.mean, intervals ? &intervals->mean : nullptr);
+  print_figure("median", statistics.median, intervals ? &intervals->median : nullptr);
+  print_figure("p90", statistics.p90, intervals && intervals->p90 ? &*intervals->p90 : nullptr);
+  print_figure("rms", statistics.rms, intervals ? &intervals->rms : nullptr);
+  print_figure("max", statistics.max, nullptr);
   fmt::print("\nshare of the fixes, and the error in mm that it does not exceed\n");
   const auto& distribution_m = evaluation.distribution_m;
   const std::initializer_list<std::size_t> percents{10, 25, 50, 68, 75, 90, 95, 99, 100};
@@ -59,8 +59,8 @@ void print_height_and_yaw(const Evaluation& evaluation) {
   }
 }
 
-void print_stations(const BiasAndScatter& figures) {
-  const auto& stations = figures.stations;
+void print_stations(const BiasAndScatter& statistics) {
+  const auto& stations = statistics.stations;
   const auto worst_bias = std::max_element(
       stations.begin(), stations.end(),
       [](const auto& a, const auto& b) { return a.bias_m.norm() < b.bias_m.norm(); });
@@ -68,7 +68,7 @@ void print_stations(const BiasAndScatter& figures) {
       std::max_element(stations.begin(), stations.end(),
                        [](const auto& a, const auto& b) { return a.sd_m < b.sd_m; });
   fmt::print("stations    {} with {} fixes: bias {:.3f} mm rms, scatter {:.3f} mm\n",
-             stations.size(), figures.fixes, mm(figures.bias_m), mm(figures.scatter_m));
+             stations.size(), statistics.fixes, mm(statistics.bias_m), mm(statistics.scatter_m));
   fmt::print(
       "  worst     bias {:.3f} mm at ({:.3f}, {:.3f}) m; sd {:.3f} mm at ({:.3f}, {:.3f}) m\n",
       mm(worst_bias->bias_m.norm()), worst_bias->xy_m.x(), worst_bias->xy_m.y(), mm(worst_sd->sd_m),
@@ -76,33 +76,35 @@ void print_stations(const BiasAndScatter& figures) {
 }
 
 void print_fit(const LineFit& fit) {
-  const ErrorFigures& figures = fit.distances_m;
+  const ErrorStatistics& statistics = fit.distances_m;
   fmt::print(
       "line fit    mean {:.3f} mm, median {:.3f}, p90 {:.3f}, rms {:.3f}, max {:.3f}\n"
       "  hides     jitter of {:.3f} mm rms across the fitted line, which is turned by {:+.4f} "
       "deg\n",
-      mm(figures.mean), mm(figures.median), mm(figures.p90), mm(figures.rms), mm(figures.max),
-      mm(fit.jitter_m), deg_from_rad(fit.angle_rad));
+      mm(statistics.mean), mm(statistics.median), mm(statistics.p90), mm(statistics.rms),
+      mm(statistics.max), mm(fit.jitter_m), deg_from_rad(fit.angle_rad));
 }
 
 void print_ratios(const Evaluation& evaluation) {
-  if (const auto& stated = evaluation.stated) {
-    fmt::print("error / sd  horizontal {:.3f}", stated->horizontal);
-    if (stated->height) fmt::print(", height {:.3f}", *stated->height);
-    if (stated->yaw) fmt::print(", yaw {:.3f}", *stated->yaw);
+  if (const auto& normalized_errors = evaluation.normalized_errors) {
+    fmt::print("error / sd  horizontal {:.3f}", normalized_errors->horizontal);
+    if (normalized_errors->height) fmt::print(", height {:.3f}", *normalized_errors->height);
+    if (normalized_errors->yaw) fmt::print(", yaw {:.3f}", *normalized_errors->yaw);
     fmt::print(" (rms; 1: the stated sd are right)\n");
     constexpr double percent = 100;
-    fmt::print("within 95 % horizontal {:.1f} %", percent * stated->within_95);
-    if (const auto& share = stated->height_within_95) {
-      fmt::print(", height {:.1f} %", percent * *share);
+    fmt::print("within 95 % horizontal {:.1f} %", percent * normalized_errors->within_95);
+    if (const auto& fraction = normalized_errors->height_within_95) {
+      fmt::print(", height {:.1f} %", percent * *fraction);
     }
-    if (const auto& share = stated->yaw_within_95) fmt::print(", yaw {:.1f} %", percent * *share);
+    if (const auto& fraction = normalized_errors->yaw_within_95)
+      fmt::print(", yaw {:.1f} %", percent * *fraction);
     fmt::print(" (errors within 1.96 sd; those of one calibration go together)\n");
   }
   if (const auto& limit = evaluation.limit) {
-    fmt::print("limit       {:.3f} mm rms, error / limit {:.3f} ({})\n", mm(limit->limit_m),
-               limit->horizontal,
-               limit->beaten() ? "beaten: see the warning" : "1: the best of one level image");
+    fmt::print(
+        "limit       {:.3f} mm rms, error / limit {:.3f} ({})\n", mm(limit->limit_m),
+        limit->horizontal,
+        limit->is_below_limit() ? "beaten: see the warning" : "1: the best of one level image");
   }
 }
 
@@ -125,7 +127,7 @@ void print_comparison(const Comparison& comparison) {
 
 void print_evaluation(const Evaluation& evaluation, const std::vector<CheckedMetric>& gates) {
   fmt::print("captures    {}\nfixes       {}\nmissing     {:.3g} %\n", evaluation.captures,
-             evaluation.fixes, 100 * evaluation.missing_share());
+             evaluation.fixes, 100 * evaluation.missing_fraction());
   for (const auto& [status, count] : evaluation.missing) {
     fmt::print("  no fix    {} {}\n", count, status);
   }
@@ -137,8 +139,9 @@ void print_evaluation(const Evaluation& evaluation, const std::vector<CheckedMet
   if (evaluation.comparison) print_comparison(*evaluation.comparison);
   if (!gates.empty()) fmt::print("\n");
   for (const CheckedMetric& gate : gates) {
-    fmt::print("{:6} gate {:16} {:>10.4g} {:3} {} {:.4g}\n", gate.met() ? "met" : "NOT MET",
-               gate.name, gate.value.value(), gate.unit, words_of(gate.asked), gate.limit.value());
+    fmt::print("{:6} gate {:16} {:>10.4g} {:3} {} {:.4g}\n", gate.passed() ? "met" : "NOT MET",
+               gate.name, gate.value.value(), gate.unit, describe(gate.direction),
+               gate.limit.value());
   }
 }
 

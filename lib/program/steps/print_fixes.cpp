@@ -14,8 +14,8 @@ void print_fixes(const FixSummary& summary) {
     fmt::print("  no fix    {} {}\n", count, status);
   }
   if (const auto& typical = summary.typical) {
-    fmt::print("lamps       {:.1f} a fix ({} to {})\n", typical->mean_lamps, typical->fewest_lamps,
-               typical->most_lamps);
+    fmt::print("lamps       {:.1f} a fix ({} to {})\n", typical->mean_lamps, typical->min_lamps,
+               typical->max_lamps);
     if (const auto& residual_px = typical->median_residual_px) {
       fmt::print("residual    {:.3f} px (median)\n", *residual_px);
     }

@@ -36,13 +36,13 @@ void print_summary(const IntrinsicsSolution& solution, const CalibrationReport& 
   fmt::print("centre        {:.2f}, {:.2f} px\n", parameters[2], parameters[3]);
   fmt::print("uncertainty   {:.3f} px mean, {:.3f} px worst\n", report.uncertainty_mean_px,
              report.uncertainty_worst_px);
-  if (report.region_share > 0.999) {
+  if (report.region_fraction > 0.999) {
     fmt::print("board seen    all over the image\n");
   } else {
     fmt::print(
         "board seen    in {:.0f} % of the image, for which the figures are; beyond, uncertainty "
         "is up to {:.3g} px\n",
-        100 * report.region_share, report.uncertainty_beyond_px);
+        100 * report.region_fraction, report.uncertainty_beyond_px);
   }
   fmt::print("true lens     {:.3f} px rms apart per axis, expected by noise, {:.3f} by views\n",
              report.expected_rms_px, report.expected_by_views_rms_px);
@@ -55,10 +55,10 @@ void print_summary(const IntrinsicsSolution& solution, const CalibrationReport& 
                held_out.corners, held_out.rms_px);
   }
   const auto& [left, right, upper, lower] = coverage.tilts_rad;
-  fmt::print("coverage      {:.0f} % of the image\n", 100 * coverage.share);
+  fmt::print("coverage      {:.0f} % of the image\n", 100 * coverage.covered_fraction);
   fmt::print("tilts         left {:.0f}, right {:.0f}, upper {:.0f}, lower {:.0f} degrees\n",
              deg_from_rad(left), deg_from_rad(right), deg_from_rad(upper), deg_from_rad(lower));
-  fmt::print("next view     {}\n", next_view(coverage));
+  fmt::print("next view     {}\n", recommend_next_view(coverage));
 }
 
 }  // namespace vlp

@@ -14,7 +14,7 @@ namespace vlp {
 namespace {
 
 /// Returns the remedy that reduces an error source.
-std::string_view remedy_of(std::string_view key) {
+std::string_view find_remedy(std::string_view key) {
   if (key == "motion") return "odometry, or a faster read-out";
   if (key == "lean") return "an inclination sensor, or a camera that is held level";
   if (key == "lens") return "more views of the board, or vlp-adjust, which corrects the lens";
@@ -50,7 +50,7 @@ void print_limits(const FloorSummary& summary, const FloorLimits& limits, bool i
 void print_advice(const FloorSummary& summary) {
   const auto& [name, key] = summary.largest().source;
   fmt::print("\nimprove     {} first, {:.0f} % of the horizontal variance: {}\n", name,
-             100 * summary.largest().share, remedy_of(key));
+             100 * summary.largest().fraction, find_remedy(key));
 }
 
 }  // namespace vlp

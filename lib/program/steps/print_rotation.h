@@ -12,7 +12,7 @@ void print_center(const RotationCenter& center, const Camera& camera);
 
 /// Prints the result of a rotation in place to stdout, and a note if the lever arm is not
 /// observable.
-void print_summary(const RotationFit& fit, const SpotCaptures& spot, const CircleCenters& circles,
-                   const Camera& camera);
+void print_summary(const RotationFit& fit, const RotationCaptures& spot,
+                   const CircleCenters& circles, const Camera& camera);
 
 }  // namespace vlp

@@ -16,7 +16,7 @@ namespace {
 
 std::optional<double> find(const SessionResult& result, const std::string& name) {
   for (const SessionStep& step : result.steps) {
-    if (const auto value = value_of(step.result.metrics, name)) return value;
+    if (const auto value = find_metric_value(step.result.metrics, name)) return value;
   }
   return std::nullopt;
 }
@@ -24,46 +24,47 @@ std::optional<double> find(const SessionResult& result, const std::string& name)
 }  // namespace
 
 SessionObserver SessionLog::observer() {
-  return {[this](const std::string&) { begin_ = Clock::now(); },
+  return {[this](const std::string&) { step_start_ = Clock::now(); },
           [this](std::size_t done, std::size_t total) {
             if (!progress_) progress_ = std::make_unique<Progress>("images");
             progress_->update(done, total);
           },
-          [this](const SessionStep& step) { ended(step); }};
+          [this](const SessionStep& step) { on_step_finished(step); }};
 }
 
-void SessionLog::ended(const SessionStep& step) {
+void SessionLog::on_step_finished(const SessionStep& step) {
   progress_.reset();
-  const double seconds = std::chrono::duration<double>(Clock::now() - begin_).count();
-  const bool missed = !words_of_missed(step.result.gates).empty();
+  const double seconds = std::chrono::duration<double>(Clock::now() - step_start_).count();
+  const bool missed = !describe_failed_gates(step.result.gates).empty();
   fmt::print("{:13} {}{}\n", step.name,
-             step.as_before ? "as before" : fmt::format("{:5.1f} s", seconds),
+             step.is_up_to_date ? "as before" : fmt::format("{:5.1f} s", seconds),
              step.result.ok() ? missed ? ", a gate is not met" : "" : ", failed");
   std::fflush(stdout);
-  tell(step.result);
+  print_remarks(step.result);
 }
 
 void print_session(const SessionResult& result, const std::string& results) {
-  struct Shown {
+  struct MetricRow {
     const char *label, *metric, *unit;
   };
-  constexpr std::array shown{Shown{"residuals", "rms_px", "px rms, of the board's corners"},
-                             Shown{"tilt", "tilt_deg", "degrees"},
-                             Shown{"lever arm", "lever_arm_mm", "mm"},
-                             Shown{"dispersion", "dispersion_mm", "mm, before it is taken off"},
-                             Shown{"mean error", "mean_mm", "mm, horizontal"},
-                             Shown{"p90", "p90_mm", "mm"},
-                             Shown{"max", "max_mm", "mm"},
-                             Shown{"height", "height_rms_mm", "mm rms"},
-                             Shown{"missing", "missing", "of the captures, as a share"}};
+  constexpr std::array metric_rows{
+      MetricRow{"residuals", "rms_px", "px rms, of the board's corners"},
+      MetricRow{"tilt", "tilt_deg", "degrees"},
+      MetricRow{"lever arm", "lever_arm_mm", "mm"},
+      MetricRow{"dispersion", "dispersion_mm", "mm, before it is taken off"},
+      MetricRow{"mean error", "mean_mm", "mm, horizontal"},
+      MetricRow{"p90", "p90_mm", "mm"},
+      MetricRow{"max", "max_mm", "mm"},
+      MetricRow{"height", "height_rms_mm", "mm rms"},
+      MetricRow{"missing", "missing", "of the captures, as a share"}};
   fmt::print("\n");
-  for (const auto& [label, name, unit] : shown) {
+  for (const auto& [label, name, unit] : metric_rows) {
     if (const auto value = find(result, name)) fmt::print("{:11} {:.4g} {}\n", label, *value, unit);
   }
   for (const CheckedMetric& gate : result.gates) {
-    if (!gate.met()) fmt::print("NOT MET     {}\n", words_of(gate));
+    if (!gate.passed()) fmt::print("NOT MET     {}\n", describe(gate));
   }
-  fmt::print("verdict     {}; results are in {}\n", name_of(result.verdict), results);
+  fmt::print("verdict     {}; results are in {}\n", to_string(result.verdict), results);
 }
 
 }  // namespace vlp

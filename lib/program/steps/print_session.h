@@ -21,9 +21,9 @@ class SessionLog {
  private:
   using Clock = std::chrono::steady_clock;
 
-  void ended(const SessionStep& step);
+  void on_step_finished(const SessionStep& step);
 
-  Clock::time_point begin_;
+  Clock::time_point step_start_;
   std::unique_ptr<Progress> progress_;
 };
 

@@ -7,7 +7,7 @@
 namespace vlp {
 namespace {
 
-void print_labelled(const Labelled& labelled, const LampClassifier& classifier) {
+void print_labelled(const LabelledLights& labelled, const LampClassifier& classifier) {
   int used = 0;
   for (const auto& lamp : classifier.lamps) used += lamp.examples;
   const auto lights = static_cast<int>(labelled.lights.size());

@@ -22,13 +22,13 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Returns the file captures.csv of the captures; empty if there is none.
-fs::path captures_file(const CaptureOptions& images, const LevelOptions& options) {
+fs::path captures_file(const CaptureOptions& images, const TiltOptions& options) {
   if (!options.captures.empty()) return options.captures;
   const fs::path beside = fs::path(images.images) / "captures.csv";
   return fs::is_directory(images.images) && fs::exists(beside) ? beside : fs::path();
 }
 
-void print_corrections(const Levelling& result) {
+void print_corrections(const TiltCalibration& result) {
   fmt::print("\n{:>10} {:>28} {:>28}\n", "lamp", "moved by x y z (mm)", "sd (mm)");
   for (const auto& [id, correction_m, sd_m] : result.corrections) {
     fmt::print("{:10} {:10.3f}{:9.3f}{:9.3f} {:10.3f}{:9.3f}{:9.3f}\n", id, 1e3 * correction_m.x(),
@@ -37,7 +37,7 @@ void print_corrections(const Levelling& result) {
   }
 }
 
-void report(const Levelling& result, const Camera& camera) {
+void report(const TiltCalibration& result, const Camera& camera) {
   fmt::print("captures    {} used, {} of fewer than three lamps, {} left out\n", result.captures,
              result.captures_of_few_lamps, result.captures_rejected);
   fmt::print("detections  {} used, {} left out\n", result.detections, result.detections_rejected);
@@ -51,24 +51,24 @@ void report(const Levelling& result, const Camera& camera) {
 
 }  // namespace
 
-void rotate_by_lamps(const CLI::App& app, CaptureOptions images, const LevelOptions& options) {
+void run_rotation_by_lamps(const CLI::App& app, CaptureOptions images, const TiltOptions& options) {
   const std::string& refined_map = options.refined_map;
   const fs::path captures = captures_file(images, options);
-  std::vector<std::string> inputs = inputs_of(images);
+  std::vector<std::string> inputs = list_inputs(images);
   inputs.push_back(captures.string());
   check_outputs({{"--output", images.output}, {"--refine-map", refined_map}}, inputs);
   images.captures.emplace();  // inclinations are ignored: the level direction is estimated
-  LampCaptures input = read_captures_of(images, ImageUse::fixes);
+  LampCaptures input = read_lamp_captures(images, ImageUse::fixes);
   check_lamps(input.frames, input.lamps, input.lamps_file);
-  input.motions =
-      motions_of(input.frames, captures.empty() ? CapturesTable() : read_captures(captures),
-                 options.motion.motion(), rad_from_deg(options.yaw_rate_sd_deg_per_s.value_or(0)));
+  input.motions = find_motions(
+      input.frames, captures.empty() ? CapturesTable() : read_captures(captures),
+      options.motion.motion(), rad_from_deg(options.yaw_rate_sd_deg_per_s.value_or(0)));
   // A table without motion does not affect the result and is not recorded.
   if (input.motions.empty()) inputs.pop_back();
   const LevellingResult result =
-      solve_levelling(input, !refined_map.empty(), history_entry(app, inputs));
-  tell(result);
-  require(result);
+      solve_levelling(input, !refined_map.empty(), make_program_history_entry(app, inputs));
+  print_remarks(result);
+  throw_if_failed(result);
   if (!refined_map.empty()) {
     write_refined_map(refined_map, result.levelling.map, images.frontend.room);
   }

@@ -10,7 +10,7 @@
 namespace vlp {
 
 /// Options of --method lamps besides the captures.
-struct LevelOptions {
+struct TiltOptions {
   /// File for the refined lamp map; empty: the map is not refined.
   std::string refined_map;
   /// File captures.csv; empty: the one in the folder, if it exists.
@@ -21,6 +21,6 @@ struct LevelOptions {
 
 /// Estimates the tilt of the camera from captures taken anywhere (calibration/levelling), for
 /// vlp-rotation --method lamps.
-void rotate_by_lamps(const CLI::App& app, CaptureOptions images, const LevelOptions& options);
+void run_rotation_by_lamps(const CLI::App& app, CaptureOptions images, const TiltOptions& options);
 
 }  // namespace vlp

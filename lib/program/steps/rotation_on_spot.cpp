@@ -20,16 +20,16 @@ const std::map<std::string, RotationMethod> kMethods{{"axis", RotationMethod::ax
 
 }  // namespace
 
-void rotate_on_spot(const CLI::App& app, CaptureOptions images, const std::string& method,
-                    const std::string& plot) {
-  const std::vector<std::string> inputs = inputs_of(images);
+void run_rotation_in_place(const CLI::App& app, CaptureOptions images, const std::string& method,
+                           const std::string& plot) {
+  const std::vector<std::string> inputs = list_inputs(images);
   check_outputs({{"--output", images.output}, {"--plot", plot}}, inputs);
   images.captures.emplace();  // inclinations are ignored: the axis defines the level direction
-  const LampCaptures input = read_captures_of(images, ImageUse::turn);
+  const LampCaptures input = read_lamp_captures(images, ImageUse::turn);
   const RotationResult found =
-      solve_rotation(input, kMethods.at(method), history_entry(app, inputs));
-  tell(found);
-  require(found);
+      solve_rotation(input, kMethods.at(method), make_program_history_entry(app, inputs));
+  print_remarks(found);
+  throw_if_failed(found);
   if (!plot.empty()) draw(plot, found.drawing());
   write_calibration(images.output, found.calibration);
   print_summary(found.fit, found.spot, found.circles, input.calibration.camera);

@@ -9,9 +9,9 @@
 namespace vlp {
 
 /// Estimates the rotation center from captures of a rotation in place
-/// (calibration/rotation/spot_captures.h), for vlp-rotation --method axis|joint|circle. `plot` is
-/// the file of the plot; empty: none.
-void rotate_on_spot(const CLI::App& app, CaptureOptions images, const std::string& method,
-                    const std::string& plot);
+/// (calibration/rotation/find_rotation_captures.h), for vlp-rotation --method axis|joint|circle.
+/// `plot` is the file of the plot; empty: none.
+void run_rotation_in_place(const CLI::App& app, CaptureOptions images, const std::string& method,
+                           const std::string& plot);
 
 }  // namespace vlp

@@ -10,7 +10,7 @@
 
 namespace vlp {
 
-void tell(const StepResult& result) {
+void print_remarks(const StepResult& result) {
   for (const std::string& note : result.notes) spdlog::info("{}", note);
   for (const auto& [image, reason] : result.skipped) {
     spdlog::warn("{}{}{}; skipped", image, image.empty() ? "" : ": ", reason);
@@ -19,7 +19,7 @@ void tell(const StepResult& result) {
   for (const std::string& detail : result.details) spdlog::debug("{}", detail);
 }
 
-void require(const StepResult& result) {
+void throw_if_failed(const StepResult& result) {
   if (result.ok()) return;
   if (result.failure == StepFailure::undetermined) throw Undetermined(message_of(result));
   throw std::invalid_argument(message_of(result));

@@ -7,10 +7,10 @@
 namespace vlp {
 
 /// Prints the remarks of a step to stderr: skipped images, warnings, notes, details.
-void tell(const StepResult& result);
+void print_remarks(const StepResult& result);
 
 /// Throws if the step failed: Undetermined for StepFailure::undetermined, std::invalid_argument for
 /// all other failures.
-void require(const StepResult& result);
+void throw_if_failed(const StepResult& result);
 
 }  // namespace vlp

@@ -15,21 +15,21 @@
 namespace vlp {
 namespace {
 
-constexpr std::size_t kMostColumns = 200;
+constexpr std::size_t kMaxColumns = 200;
 constexpr std::array<const char*, 5> kPartColors{plot_colors::grey, plot_colors::blue,
                                                  plot_colors::green, plot_colors::purple,
                                                  plot_colors::vermillion};
 
-double sum_of(const std::vector<double>& values) {
+double compute_sum(const std::vector<double>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0);
 }
 
 /// Returns one line per column: the variances in mm^2.
-std::string columns_of(const BudgetPlot& plot) {
+std::string format_columns(const BudgetPlot& plot) {
   auto fixes = plot.variances_m2;
   std::stable_sort(fixes.begin(), fixes.end(),
-                   [](const auto& a, const auto& b) { return sum_of(a) < sum_of(b); });
-  const std::size_t columns = std::min(fixes.size(), kMostColumns);
+                   [](const auto& a, const auto& b) { return compute_sum(a) < compute_sum(b); });
+  const std::size_t columns = std::min(fixes.size(), kMaxColumns);
   std::string rows;
   for (std::size_t i = 1; i <= columns; ++i) {
     for (const double variance_m2 : fixes[fixes.size() * i / columns - 1]) {
@@ -42,30 +42,30 @@ std::string columns_of(const BudgetPlot& plot) {
 
 }  // namespace
 
-std::vector<double> BudgetPlot::shares() const {
-  std::vector<double> shares(parts.size());
+std::vector<double> BudgetPlot::fractions() const {
+  std::vector<double> fractions(parts.size());
   double whole = 0;
   for (const auto& fix : variances_m2) {
-    for (std::size_t i = 0; i < fix.size(); ++i) shares[i] += fix[i];
-    whole += sum_of(fix);
+    for (std::size_t i = 0; i < fix.size(); ++i) fractions[i] += fix[i];
+    whole += compute_sum(fix);
   }
-  for (double& share : shares) share /= whole;
-  return shares;
+  for (double& fraction : fractions) fraction /= whole;
+  return fractions;
 }
 
-Drawing drawing_of(const BudgetPlot& plot) {
+Drawing make_drawing(const BudgetPlot& plot) {
   assert(!plot.variances_m2.empty() && plot.parts.size() <= kPartColors.size());
-  const std::vector<double> shares = plot.shares();
+  const std::vector<double> fractions = plot.fractions();
   std::string layers;
   for (std::size_t i = 0; i < plot.parts.size(); ++i) {
-    if (!(shares[i] > 0)) continue;
-    const std::string label = fmt::format("{}, {:.0f} %", plot.parts[i], 100 * shares[i]);
+    if (!(fractions[i] > 0)) continue;
+    const std::string label = fmt::format("{}, {:.0f} %", plot.parts[i], 100 * fractions[i]);
     layers +=
         fmt::format("{}$budget using {} linecolor rgb '{}' title {} noenhanced",
                     layers.empty() ? "plot " : ", ", i + 1, kPartColors[i], gnuplot_quoted(label));
   }
   return {"budget", 720, 520,
-          data_block("budget", columns_of(plot)) + plot_settings() + "set title " +
+          data_block("budget", format_columns(plot)) + plot_settings() + "set title " +
               gnuplot_quoted(plot.title) +
               " noenhanced\n"
               "set xlabel 'fixes, the most certain first'\n"

@@ -18,12 +18,12 @@ struct BudgetPlot {
   std::vector<std::vector<double>> variances_m2;
 
   /// Returns the fraction of each contribution in the sum over all fixes.
-  std::vector<double> shares() const;
+  std::vector<double> fractions() const;
 };
 
 /// Plots one column per fix with its contributions stacked, the smallest total first. If there are
 /// more than 200 fixes, 200 are plotted, the largest among them. Contributions that are zero for
 /// all fixes are omitted from the key.
-Drawing drawing_of(const BudgetPlot& plot);
+Drawing make_drawing(const BudgetPlot& plot);
 
 }  // namespace vlp

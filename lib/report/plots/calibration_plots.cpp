@@ -9,18 +9,19 @@
 
 namespace vlp {
 
-IntrinsicsPlot plot_of(const std::string& title, const IntrinsicsSolution& solution,
-                       const BoardLattice& lattice, const std::optional<LensSharpness>& sharpness) {
+IntrinsicsPlot make_plot(const std::string& title, const IntrinsicsSolution& solution,
+                         const BoardLattice& lattice,
+                         const std::optional<LensSharpness>& sharpness) {
   const BoardProblem& problem = solution.problem;
   IntrinsicsPlot plot{title, problem.imager_px, {}, 0, {}};
-  const auto residuals_px = residuals_of(problem);
+  const auto residuals_px = compute_residuals(problem);
   for (std::size_t i = 0; i < residuals_px.size(); ++i) {
     if (!residuals_px[i].allFinite()) continue;
     const Eigen::Vector3d& point = problem.points[i];
     plot.corners.push_back({point.head<2>(), residuals_px[i], point.z() <= 0});
   }
   const ProjectionUncertainty uncertainty(solution, lattice);
-  for (const Eigen::Vector2d& pixel : pixel_grid(problem.imager_px)) {
+  for (const Eigen::Vector2d& pixel : make_pixel_grid(problem.imager_px)) {
     if (pixel.y() == 0) ++plot.cols;
     plot.sd_px.push_back(uncertainty.worst_px(pixel));
   }
@@ -31,8 +32,8 @@ IntrinsicsPlot plot_of(const std::string& title, const IntrinsicsSolution& solut
   return plot;
 }
 
-RotationPlot plot_of(const std::string& title, const SpotCaptures& spot,
-                     const CircleCenters& circles, const RotationFit& fit, const Camera& camera) {
+RotationPlot make_plot(const std::string& title, const RotationCaptures& spot,
+                       const CircleCenters& circles, const RotationFit& fit, const Camera& camera) {
   RotationPlot plot{
       title, {}, fit.center.center_px, undistorted_pixel(camera, Eigen::Vector2d::Zero())};
   for (const auto& [lamp, height, circle] : circles.circles) {
@@ -41,15 +42,16 @@ RotationPlot plot_of(const std::string& title, const SpotCaptures& spot,
                            {},
                            undistorted_pixel(camera, circle.circle.center),
                            circle.circle.radius * radii_px});
-    for (const SpotObservation& sighting : spot.sightings) {
-      if (sighting.lamp != lamp || spot.captures[sighting.capture].height != height) continue;
-      plot.traces.back().places_px.push_back(undistorted_pixel(camera, sighting.ray.hnormalized()));
+    for (const RotationObservation& observation : spot.observations) {
+      if (observation.lamp != lamp || spot.captures[observation.capture].height != height) continue;
+      plot.traces.back().places_px.push_back(
+          undistorted_pixel(camera, observation.ray.hnormalized()));
     }
   }
   return plot;
 }
 
-DispersionPlot plot_of(const std::string& title, const DispersionFit& fit) {
+DispersionPlot make_plot(const std::string& title, const DispersionFit& fit) {
   DispersionPlot plot{title, {{}, fit.before}, {{}, fit.after}, {}};
   for (const auto& fix : fit.fixes) {
     if (fix.used) {

@@ -18,14 +18,15 @@ namespace vlp {
 /// Collects corners and residuals of a solution, and the uncertainty of its projection. Includes
 /// the sharpness if it was measured. `lattice` is that of the solution's boards.
 /// @pre solution.ok()
-IntrinsicsPlot plot_of(const std::string& title, const IntrinsicsSolution& solution,
-                       const BoardLattice& lattice, const std::optional<LensSharpness>& sharpness);
+IntrinsicsPlot make_plot(const std::string& title, const IntrinsicsSolution& solution,
+                         const BoardLattice& lattice,
+                         const std::optional<LensSharpness>& sharpness);
 
 /// Collects the lamps of a rotation in place with their circles, and the rotation center.
-RotationPlot plot_of(const std::string& title, const SpotCaptures& spot,
-                     const CircleCenters& circles, const RotationFit& fit, const Camera& camera);
+RotationPlot make_plot(const std::string& title, const RotationCaptures& spot,
+                       const CircleCenters& circles, const RotationFit& fit, const Camera& camera);
 
 /// Collects the fixes at a known reference point, before and after the correction.
-DispersionPlot plot_of(const std::string& title, const DispersionFit& fit);
+DispersionPlot make_plot(const std::string& title, const DispersionFit& fit);
 
 }  // namespace vlp

@@ -12,14 +12,14 @@
 namespace vlp {
 namespace {
 
-constexpr std::size_t kMostSteps = 500;
+constexpr std::size_t kMaxSteps = 500;
 constexpr std::array<const char*, 4> kColors = {plot_colors::blue, plot_colors::vermillion,
                                                 plot_colors::green, plot_colors::purple};
 
 /// Returns rows of error in mm and cumulative fraction in percent.
-std::string steps_of(std::vector<double> errors_m) {
+std::string format_steps(std::vector<double> errors_m) {
   std::sort(errors_m.begin(), errors_m.end());
-  const std::size_t count = errors_m.size(), steps = std::min(count, kMostSteps);
+  const std::size_t count = errors_m.size(), steps = std::min(count, kMaxSteps);
   std::string rows = data_row({0, 0});
   for (std::size_t i = 1; i <= steps; ++i) {
     const std::size_t rank = count * i / steps;
@@ -29,18 +29,18 @@ std::string steps_of(std::vector<double> errors_m) {
 }
 
 /// Returns the data blocks of a curve: its steps and its two marks.
-std::string blocks_of(const CdfPlot::Curve& curve, const std::string& number) {
-  return data_block("curve" + number, steps_of(curve.errors_m)) +
+std::string format_blocks(const CdfPlot::Curve& curve, const std::string& number) {
+  return data_block("curve" + number, format_steps(curve.errors_m)) +
          data_block("marks" + number,
                     data_row({1e3 * curve.p50_m, 50}) + data_row({1e3 * curve.p90_m, 90}));
 }
 
-std::string layer_of(const CdfPlot::Curve& curve, std::size_t i) {
+std::string format_layer(const CdfPlot::Curve& curve, std::size_t i) {
   const std::string number = std::to_string(i),
                     color = std::string(" linecolor rgb '") + kColors[i % kColors.size()] + "' ",
                     style = " dashtype " + std::to_string(i + 1) + color,
-                    label = curve.label + ": p50 " + readable_mm(curve.p50_m) + " mm, p90 " +
-                            readable_mm(curve.p90_m) + " mm";
+                    label = curve.label + ": p50 " + format_mm(curve.p50_m) + " mm, p90 " +
+                            format_mm(curve.p90_m) + " mm";
   return "$curve" + number + " using 1:2 with steps linewidth 2.5" + style + "title " +
          gnuplot_quoted(label) + " noenhanced, $marks" + number +
          " using 1:2 with points pointtype " + std::to_string(5 + 2 * (i % kColors.size())) +
@@ -49,7 +49,7 @@ std::string layer_of(const CdfPlot::Curve& curve, std::size_t i) {
 
 }  // namespace
 
-Drawing drawing_of(const CdfPlot& plot) {
+Drawing make_drawing(const CdfPlot& plot) {
   assert(!plot.curves.empty());
   constexpr double off_the_picture = 4, margin = 1.05;
   double largest_m = 0, largest_p90_m = 0;
@@ -63,11 +63,11 @@ Drawing drawing_of(const CdfPlot& plot) {
 
   std::string blocks, layers;
   for (std::size_t i = 0; i < plot.curves.size(); ++i) {
-    blocks += blocks_of(plot.curves[i], std::to_string(i));
-    layers.append(layers.empty() ? "plot " : ", ").append(layer_of(plot.curves[i], i));
+    blocks += format_blocks(plot.curves[i], std::to_string(i));
+    layers.append(layers.empty() ? "plot " : ", ").append(format_layer(plot.curves[i], i));
   }
   const std::string beyond =
-      cut ? "; the largest, " + readable_mm(largest_m) + " mm, is off the picture" : "";
+      cut ? "; the largest, " + format_mm(largest_m) + " mm, is off the picture" : "";
   return {"cdf", 720, 460 + 24 * static_cast<int>(plot.curves.size()),
           blocks + plot_settings() + "set title " + gnuplot_quoted(plot.title) +
               " noenhanced\n"

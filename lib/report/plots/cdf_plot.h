@@ -26,6 +26,6 @@ struct CdfPlot {
 /// Plots the distributions in millimeters. A curve of more than 500 errors passes through 500 of
 /// them, the largest included. Errors above four times the largest p90 are clipped, which the axis
 /// label mentions.
-Drawing drawing_of(const CdfPlot& plot);
+Drawing make_drawing(const CdfPlot& plot);
 
 }  // namespace vlp

@@ -36,7 +36,7 @@ std::string layer(const std::string& name, const std::string& color, const std::
 
 }  // namespace
 
-Drawing drawing_of(const DispersionPlot& plot) {
+Drawing make_drawing(const DispersionPlot& plot) {
   std::string commands =
       points("before", plot.before.errors_m) + circle("before_circle", plot.before.circle) +
       points("after", plot.after.errors_m) + circle("after_circle", plot.after.circle) +

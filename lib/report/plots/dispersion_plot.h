@@ -25,6 +25,6 @@ struct DispersionPlot {
 };
 
 /// Makes the plot, in millimeters, for draw().
-Drawing drawing_of(const DispersionPlot& plot);
+Drawing make_drawing(const DispersionPlot& plot);
 
 }  // namespace vlp

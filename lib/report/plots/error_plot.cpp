@@ -13,12 +13,12 @@
 namespace vlp {
 namespace {
 
-constexpr std::size_t kMostArrows = 500, kFurthest = 20, kMostMissing = 200;
+constexpr std::size_t kMaxArrows = 500, kFurthest = 20, kMaxMissing = 200;
 constexpr double kLongestShare = 0.25;
 
 double error_m(const ErrorPlot::Fix& fix) { return (fix.fix_m - fix.truth_m).norm(); }
 
-std::vector<double> errors_of(const ErrorPlot& plot) {
+std::vector<double> compute_lengths_m(const ErrorPlot& plot) {
   std::vector<double> errors_m;
   errors_m.reserve(plot.fixes.size());
   for (const auto& fix : plot.fixes) errors_m.push_back(error_m(fix));
@@ -53,7 +53,7 @@ std::vector<std::vector<std::string>> make_table(const ErrorPlot& plot) {
 }
 
 /// Returns the 90th percentile of the errors; 0 if there are none.
-double p90_of(std::vector<double> errors_m) {
+double compute_p90(std::vector<double> errors_m) {
   if (errors_m.empty()) return 0;
   const auto nth = errors_m.begin() + static_cast<std::ptrdiff_t>((errors_m.size() - 1) * 9 / 10);
   std::nth_element(errors_m.begin(), nth, errors_m.end());
@@ -62,19 +62,19 @@ double p90_of(std::vector<double> errors_m) {
 
 /// Width of the plan, magnification of the arrows, and the area that contains them all.
 struct Scale {
-  double width_m, p90_m, times;
-  Eigen::AlignedBox2d paper;
+  double width_m, p90_m, magnification;
+  Eigen::AlignedBox2d extent;
 
-  explicit Scale(const ErrorPlot& plot) : p90_m(p90_of(errors_of(plot))) {
-    for (const auto& fix : plot.fixes) paper.extend(fix.truth_m);
-    for (const auto& place_m : plot.missing_m) paper.extend(place_m);
-    for (const Lamp& lamp : plot.lamps.lamps) paper.extend(lamp.position_m.head<2>());
-    if (paper.isEmpty()) paper.extend(Eigen::Vector2d::Zero());
-    constexpr double least_m = 1e-3;
-    width_m = std::max(paper.sizes().maxCoeff(), least_m);
-    times = error_magnification(p90_m, width_m);
+  explicit Scale(const ErrorPlot& plot) : p90_m(compute_p90(compute_lengths_m(plot))) {
+    for (const auto& fix : plot.fixes) extent.extend(fix.truth_m);
+    for (const auto& place_m : plot.missing_m) extent.extend(place_m);
+    for (const Lamp& lamp : plot.lamps.lamps) extent.extend(lamp.position_m.head<2>());
+    if (extent.isEmpty()) extent.extend(Eigen::Vector2d::Zero());
+    constexpr double min_m = 1e-3;
+    width_m = std::max(extent.sizes().maxCoeff(), min_m);
+    magnification = error_magnification(p90_m, width_m);
   }
-  double longest_m() const { return kLongestShare * width_m / times; }
+  double longest_m() const { return kLongestShare * width_m / magnification; }
 };
 
 /// Data blocks of the plot. The constructor extends `scale.paper` by the arrows.
@@ -82,17 +82,18 @@ struct Blocks {
   std::string arrows, cut, places, missing, lamps;
 
   Blocks(const ErrorPlot& plot, std::size_t step, Scale& scale) {
-    for (const std::size_t i : thinned(errors_of(plot), step, step > 1 ? kFurthest : 0)) {
+    for (const std::size_t i :
+         select_thinned(compute_lengths_m(plot), step, step > 1 ? kFurthest : 0)) {
       const Eigen::Vector2d& from_m = plot.fixes[i].truth_m;
       const double length_m = error_m(plot.fixes[i]), longest_m = scale.longest_m();
-      Eigen::Vector2d arrow_m = scale.times * (plot.fixes[i].fix_m - from_m);
+      Eigen::Vector2d arrow_m = scale.magnification * (plot.fixes[i].fix_m - from_m);
       if (length_m > longest_m) arrow_m *= longest_m / length_m;
       (length_m > longest_m ? cut : arrows) +=
           data_row({from_m.x(), from_m.y(), arrow_m.x(), arrow_m.y()});
       places += data_row({from_m.x(), from_m.y()});
-      scale.paper.extend(from_m + arrow_m);
+      scale.extent.extend(from_m + arrow_m);
     }
-    const std::size_t missing_step = thinning_step(plot.missing_m.size(), kMostMissing);
+    const std::size_t missing_step = thinning_step(plot.missing_m.size(), kMaxMissing);
     for (std::size_t i = 0; i < plot.missing_m.size(); i += missing_step) {
       missing += data_row({plot.missing_m[i].x(), plot.missing_m[i].y()});
     }
@@ -107,16 +108,16 @@ struct Blocks {
 };
 
 /// Returns a scale bar at the lower left, in the space below the plan.
-std::string bar(const Scale& scale, const Eigen::Vector2d& from_m) {
+std::string make_scale_bar(const Scale& scale, const Eigen::Vector2d& from_m) {
   if (!(scale.p90_m > 0)) return "";
   const double length_m = round_below(1.5 * scale.p90_m);
   const auto at = [&](double x_m) {
     return significant(x_m, 7) + "," + significant(from_m.y(), 7);
   };
-  const double end_m = from_m.x() + scale.times * length_m;
+  const double end_m = from_m.x() + scale.magnification * length_m;
   return "set arrow from " + at(from_m.x()) + " to " + at(end_m) +
-         " heads size graph 0.01,90 linewidth 2 front\nset label '" + in_mm(length_m) + "' at " +
-         at(end_m) + " offset 1,0 front\n";
+         " heads size graph 0.01,90 linewidth 2 front\nset label '" +
+         format_mm_with_unit(length_m) + "' at " + at(end_m) + " offset 1,0 front\n";
 }
 
 std::string layers(const ErrorPlot& plot, const Blocks& blocks, const Scale& scale) {
@@ -137,11 +138,11 @@ std::string layers(const ErrorPlot& plot, const Blocks& blocks, const Scale& sca
   }
   if (cut > 0) {
     layers.push_back("$cut" + arrow + "1.5 dashtype 2" + color(plot_colors::vermillion) +
-                     "title '" + std::to_string(cut) + " beyond " + in_mm(scale.longest_m()) +
-                     ", cut short'");
+                     "title '" + std::to_string(cut) + " beyond " +
+                     format_mm_with_unit(scale.longest_m()) + ", cut short'");
   }
   if (!blocks.missing.empty()) {
-    const std::size_t count = plot.missing_m.size(), step = thinning_step(count, kMostMissing);
+    const std::size_t count = plot.missing_m.size(), step = thinning_step(count, kMaxMissing);
     layers.push_back(
         "$missing using 1:2 with points pointtype 2 linewidth 2" + color(plot_colors::vermillion) +
         "title 'no fix: " + (step == 1 ? std::to_string(count) : thinning_note(count, step)) + "'");
@@ -164,28 +165,29 @@ double error_magnification(double p90_m, double width_m) {
   return p90_m > 0 ? std::max(1.0, round_below(largest_share * width_m / p90_m)) : 1;
 }
 
-Drawing drawing_of(const ErrorPlot& plot) {
+Drawing make_drawing(const ErrorPlot& plot) {
   Scale scale(plot);
-  const std::size_t step = thinning_step(plot.fixes.size(), kMostArrows);
+  const std::size_t step = thinning_step(plot.fixes.size(), kMaxArrows);
   const Blocks blocks(plot, step, scale);
   const double margin_m = 0.06 * scale.width_m;
-  const Eigen::Vector2d least = scale.paper.min() - Eigen::Vector2d(margin_m, 2 * margin_m),
-                        most = scale.paper.max() + Eigen::Vector2d(margin_m, margin_m);
+  const Eigen::Vector2d lower = scale.extent.min() - Eigen::Vector2d(margin_m, 2 * margin_m),
+                        upper = scale.extent.max() + Eigen::Vector2d(margin_m, margin_m);
   std::string title =
-      plot.title + "\nerrors drawn " + significant(scale.times, 6) + " times as long";
+      plot.title + "\nerrors drawn " + significant(scale.magnification, 6) + " times as long";
   const std::string note = thinning_note(plot.fixes.size(), step);
   if (!note.empty()) title += "; " + note + ", and the 20 largest";
   constexpr int width_px = 720, beside_px = 90, around_px = 180, smallest_px = 400,
                 largest_px = 900;
-  const double plan_px = (width_px - beside_px) * (most.y() - least.y()) / (most.x() - least.x());
-  return {"errors", width_px,
-          static_cast<int>(std::clamp<double>(plan_px + around_px, smallest_px, largest_px)),
-          blocks.text() + plot_settings() + "set title " + gnuplot_quoted(title) + " noenhanced\n" +
-              bar(scale, {scale.paper.min().x(), scale.paper.min().y() - 1.2 * margin_m}) +
-              "set xlabel 'x (m)'\nset ylabel 'y (m)'\nset size ratio -1\nset xrange " +
-              plot_range(least.x(), most.x()) + "\nset yrange " + plot_range(least.y(), most.y()) +
-              "\n" + layers(plot, blocks, scale),
-          make_table(plot)};
+  const double plan_px = (width_px - beside_px) * (upper.y() - lower.y()) / (upper.x() - lower.x());
+  return {
+      "errors", width_px,
+      static_cast<int>(std::clamp<double>(plan_px + around_px, smallest_px, largest_px)),
+      blocks.text() + plot_settings() + "set title " + gnuplot_quoted(title) + " noenhanced\n" +
+          make_scale_bar(scale, {scale.extent.min().x(), scale.extent.min().y() - 1.2 * margin_m}) +
+          "set xlabel 'x (m)'\nset ylabel 'y (m)'\nset size ratio -1\nset xrange " +
+          plot_range(lower.x(), upper.x()) + "\nset yrange " + plot_range(lower.y(), upper.y()) +
+          "\n" + layers(plot, blocks, scale),
+      make_table(plot)};
 }
 
 }  // namespace vlp

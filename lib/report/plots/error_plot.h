@@ -40,6 +40,6 @@ double error_magnification(double p90_m, double width_m);
 /// plotted. Arrows longer than a quarter of the floor are cut short, dashed and counted. If there
 /// are more than 200 captures without a fix, a subset is plotted. The table lists the ten largest
 /// errors.
-Drawing drawing_of(const ErrorPlot& plot);
+Drawing make_drawing(const ErrorPlot& plot);
 
 }  // namespace vlp

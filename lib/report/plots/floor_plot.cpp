@@ -9,12 +9,12 @@
 
 namespace vlp {
 
-FloorPlot plot_of(const FloorLimits& limits, const std::string& title, double step_m) {
+FloorPlot make_plot(const FloorLimits& limits, const std::string& title, double step_m) {
   FloorPlot plot{title, "horizontal standard deviation (mm)", step_m, {}};
   for (const FloorLimits::Place& place : limits.places) {
     plot.places.push_back({place.camera.position_m.head<2>(), {}});
     if (place.parts.empty()) continue;
-    plot.places.back().value = 1e3 * spread_of(place.total()).horizontal_m;
+    plot.places.back().value = 1e3 * compute_fix_sds(place.total()).horizontal_m;
   }
   return plot;
 }

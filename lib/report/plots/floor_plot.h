@@ -30,7 +30,7 @@ struct FloorPlot {
 
 /// Collects the horizontal standard deviation from all sources, in mm; blank where no fix is
 /// possible.
-FloorPlot plot_of(const FloorLimits& limits, const std::string& title, double step_m);
+FloorPlot make_plot(const FloorLimits& limits, const std::string& title, double step_m);
 
 /// Writes the plot as .png or .svg, by the extension of `picture`.
 /// @throws InputError as draw()

@@ -95,7 +95,7 @@ bool has_succeeded(pid_t process) {
 }
 
 /// Renders a drawing with a gnuplot terminal. `picture` appears in messages only.
-std::string drawn(const std::string& terminal, const Drawing& drawing, const fs::path& picture) {
+std::string render(const std::string& terminal, const Drawing& drawing, const fs::path& picture) {
   const Descriptor script(::memfd_create("vlp-plot", MFD_CLOEXEC));
   int ends[2] = {-1, -1};
   if (script.number() < 0 || ::pipe2(ends, O_CLOEXEC) != 0) fail_without_script(picture);
@@ -125,16 +125,16 @@ std::string svg_terminal(const Drawing& drawing) {
 
 void draw(const fs::path& picture, const Drawing& drawing) {
   if (picture.extension() == ".png") {
-    write_file(picture, drawn("pngcairo font 'DejaVu Sans,13'", drawing, picture));
+    write_file(picture, render("pngcairo font 'DejaVu Sans,13'", drawing, picture));
   } else if (picture.extension() == ".svg") {
-    write_file(picture, drawn(svg_terminal(drawing), drawing, picture));
+    write_file(picture, render(svg_terminal(drawing), drawing, picture));
   } else {
     throw InputError(picture, "a picture's name should end in .png or .svg");
   }
 }
 
-std::string svg_of(const Drawing& drawing) {
-  return drawn(svg_terminal(drawing), drawing, drawing.name);
+std::string render_svg(const Drawing& drawing) {
+  return render(svg_terminal(drawing), drawing, drawing.name);
 }
 
 }  // namespace vlp

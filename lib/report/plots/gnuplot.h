@@ -27,6 +27,6 @@ void draw(const std::filesystem::path& picture, const Drawing& drawing);
 
 /// Renders as SVG text.
 /// @throws InputError if gnuplot is missing or fails
-std::string svg_of(const Drawing& drawing);
+std::string render_svg(const Drawing& drawing);
 
 }  // namespace vlp

@@ -14,7 +14,7 @@ namespace vlp {
 namespace {
 
 /// Returns the data blocks: corners and outliers as u v du dv, and the map as u v sd.
-std::string data_of(const IntrinsicsPlot& plot) {
+std::string format_data(const IntrinsicsPlot& plot) {
   std::string corners, outliers, map;
   for (const auto& [seen_px, residual_px, outlier] : plot.corners) {
     (outlier ? outliers : corners) +=
@@ -37,7 +37,7 @@ std::string data_of(const IntrinsicsPlot& plot) {
 }
 
 /// Returns, for example, "12 corners, 3 outliers (crosses)".
-std::string counts(const IntrinsicsPlot& plot, const std::string& outliers) {
+std::string describe_counts(const IntrinsicsPlot& plot, const std::string& outliers) {
   const auto left_out = std::count_if(plot.corners.begin(), plot.corners.end(),
                                       [](const auto& corner) { return corner.outlier; });
   const auto used = static_cast<std::ptrdiff_t>(plot.corners.size()) - left_out;
@@ -47,14 +47,14 @@ std::string counts(const IntrinsicsPlot& plot, const std::string& outliers) {
 }
 
 /// Returns the plot commands of the corners, and of the outliers if there are any.
-std::string layers(const IntrinsicsPlot& plot, const std::string& of_corners,
-                   const std::string& of_outliers) {
+std::string layers(const IntrinsicsPlot& plot, const std::string& corner_style,
+                   const std::string& outlier_style) {
   std::string layers =
-      "plot $corners " + of_corners + " linecolor rgb '" + plot_colors::blue + "' notitle";
+      "plot $corners " + corner_style + " linecolor rgb '" + plot_colors::blue + "' notitle";
   if (std::any_of(plot.corners.begin(), plot.corners.end(),
                   [](const auto& corner) { return corner.outlier; })) {
     layers +=
-        ", $outliers " + of_outliers + " linecolor rgb '" + plot_colors::vermillion + "' notitle";
+        ", $outliers " + outlier_style + " linecolor rgb '" + plot_colors::vermillion + "' notitle";
   }
   return layers + "\n";
 }
@@ -71,20 +71,20 @@ double rms_px(const IntrinsicsPlot& plot) {
 
 /// Returns the map of the standard deviations, with logarithmic colors and contour lines at round
 /// numbers.
-std::string map_of(const IntrinsicsPlot& plot) {
-  double least = INFINITY, most = 0;
+std::string format_sd_map(const IntrinsicsPlot& plot) {
+  double min_sd_px = INFINITY, max_sd_px = 0;
   for (const double sd_px : plot.sd_px) {
     if (!std::isfinite(sd_px) || !(sd_px > 0)) continue;
-    least = std::min(least, sd_px);
-    most = std::max(most, sd_px);
+    min_sd_px = std::min(min_sd_px, sd_px);
+    max_sd_px = std::max(max_sd_px, sd_px);
   }
-  if (most == 0) return "plot NaN title 'not determined'\n";
-  const auto levels = round_numbers(least, most);
+  if (max_sd_px == 0) return "plot NaN title 'not determined'\n";
+  const auto levels = round_numbers(min_sd_px, max_sd_px);
   std::string tics, lines;
   for (const double level : levels) {
     const std::string text = significant(level, kPlotDigits);
     tics.append(tics.empty() ? "" : ",").append(text);
-    if (level > least && level < most) lines.append(lines.empty() ? "" : ",").append(text);
+    if (level > min_sd_px && level < max_sd_px) lines.append(lines.empty() ? "" : ",").append(text);
   }
   std::string commands;
   if (!lines.empty()) {
@@ -118,7 +118,7 @@ std::string map_of(const IntrinsicsPlot& plot) {
 }
 
 /// Returns the commands that draw the map of the MTF50; empty if it was not measured.
-std::string draw_mtf50(const IntrinsicsPlot& plot) {
+std::string format_mtf50_map(const IntrinsicsPlot& plot) {
   const bool is_measured = std::any_of(plot.mtf50.begin(), plot.mtf50.end(),
                                        [](double value) { return std::isfinite(value); });
   if (!is_measured) return "";
@@ -146,7 +146,7 @@ double residual_magnification(double rms_px, int width_px) {
   return rms_px > 0 ? round_below(width_px / 40.0 / rms_px) : 1;
 }
 
-Drawing drawing_of(const IntrinsicsPlot& plot) {
+Drawing make_drawing(const IntrinsicsPlot& plot) {
   assert(plot.cols >= 2 && plot.sd_px.size() >= 2 * static_cast<std::size_t>(plot.cols));
   const auto [width, height] = plot.imager_px;
   const std::string times = significant(residual_magnification(rms_px(plot), width), kPlotDigits);
@@ -154,7 +154,7 @@ Drawing drawing_of(const IntrinsicsPlot& plot) {
       "using 1:2:($3 * " + times + "):($4 * " + times + ") with vectors nohead ";
   const std::string dots = "using 1:2 with points pointtype 7 pointsize 0.18";
   const std::string commands =
-      data_of(plot) + plot_settings() +
+      format_data(plot) + plot_settings() +
       "set size ratio -1\n"
       "set xrange [-0.5:" +
       significant(width - 0.5, kPlotDigits) +
@@ -168,15 +168,15 @@ Drawing drawing_of(const IntrinsicsPlot& plot) {
       gnuplot_quoted(plot.title) +
       " noenhanced\n"
       "set title " +
-      gnuplot_quoted("corners of all views\n" + counts(plot, " (crosses)")) + "\n" +
+      gnuplot_quoted("corners of all views\n" + describe_counts(plot, " (crosses)")) + "\n" +
       layers(plot, dots, "using 1:2 with points pointtype 2 pointsize 1.2 linewidth 2") +
       "set title " +
       gnuplot_quoted("residuals, seen minus projected, " + times + " times as long\n" +
-                     counts(plot, " (thick)")) +
+                     describe_counts(plot, " (thick)")) +
       "\n" +
       layers(plot, dots + " linecolor rgb '#0072b2' notitle, $corners " + arrows + "linewidth 0.5",
              arrows + "linewidth 2") +
-      "set title 'uncertainty of the projection'\n" + map_of(plot) + draw_mtf50(plot) +
+      "set title 'uncertainty of the projection'\n" + format_sd_map(plot) + format_mtf50_map(plot) +
       "unset multiplot\n";
   return {"intrinsics", 900, 280 + 720 * height / width, commands};
 }

@@ -43,6 +43,6 @@ double residual_magnification(double rms_px, int width_px);
 
 /// Makes the plot for draw(): maps of the corners, of their enlarged residuals, of the standard
 /// deviation of the projection, and of the MTF50 if it was measured.
-Drawing drawing_of(const IntrinsicsPlot& plot);
+Drawing make_drawing(const IntrinsicsPlot& plot);
 
 }  // namespace vlp

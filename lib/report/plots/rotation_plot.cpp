@@ -12,17 +12,17 @@ namespace vlp {
 namespace {
 
 /// Returns axis ranges of equal length that contain the box, with v downwards as in the image.
-std::string square_around(const Eigen::AlignedBox2d& box) {
-  constexpr double margin = 0.1, least_px = 1e-3;
+std::string format_square_range(const Eigen::AlignedBox2d& box) {
+  constexpr double margin = 0.1, min_px = 1e-3;
   const Eigen::Vector2d center = box.center();
-  const double half = (0.5 + margin) * std::max(box.sizes().maxCoeff(), least_px);
+  const double half = (0.5 + margin) * std::max(box.sizes().maxCoeff(), min_px);
   return "set xrange " + plot_range(center.x() - half, center.x() + half) + "\nset yrange " +
          plot_range(center.y() + half, center.y() - half) + "\n";
 }
 
 }  // namespace
 
-Drawing drawing_of(const RotationPlot& plot) {
+Drawing make_drawing(const RotationPlot& plot) {
   std::string places, ellipses, labels;
   std::set<int> labelled;
   Eigen::AlignedBox2d image, centers(plot.rotation_center_px);
@@ -57,10 +57,10 @@ Drawing drawing_of(const RotationPlot& plot) {
       gnuplot_quoted(plot.title) +
       " noenhanced\n"
       "set title 'lamps while turning, undistorted image'\n" +
-      square_around(image.extend(centers)) +
+      format_square_range(image.extend(centers)) +
       "plot $ellipses using 1:2:3:4 with ellipses linecolor rgb '#999999' notitle, "
       "$places using 1:2:3 with points pointtype 7 pointsize 0.6 linecolor palette notitle, " +
-      marks + "set title 'centres of the ellipses'\n" + square_around(centers) +
+      marks + "set title 'centres of the ellipses'\n" + format_square_range(centers) +
       "plot $ellipses using 1:2:5 with points pointtype 6 pointsize 1.2 linewidth 2 linecolor "
       "palette notitle, "
       "$labels using 1:2:(sprintf('%d', int($3))) with labels left offset 0.8,0 notitle, " +

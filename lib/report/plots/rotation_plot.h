@@ -28,6 +28,6 @@ struct RotationPlot {
 
 /// Makes the plot for draw(): the traces, and next to them, enlarged, the centers of the ellipses,
 /// the rotation center and the principal point.
-Drawing drawing_of(const RotationPlot& plot);
+Drawing make_drawing(const RotationPlot& plot);
 
 }  // namespace vlp

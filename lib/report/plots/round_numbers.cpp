@@ -16,9 +16,9 @@ double round_below(double value) {
   return power;
 }
 
-std::vector<double> round_numbers(double least, double most) {
-  std::vector<double> numbers{round_below(least)};
-  while (numbers.back() < most * (1 - 1e-9)) {
+std::vector<double> round_numbers(double lowest, double highest) {
+  std::vector<double> numbers{round_below(lowest)};
+  while (numbers.back() < highest * (1 - 1e-9)) {
     numbers.push_back(round_below(numbers.back() * 2.5));
   }
   if (numbers.size() == 1) numbers.push_back(round_below(numbers.back() * 2.5));
@@ -29,8 +29,8 @@ std::string readable(double value, int digits) {
   return std::abs(value) >= std::pow(10, digits) ? fixed(value, 0) : significant(value, digits);
 }
 
-std::string readable_mm(double length_m) { return readable(1e3 * length_m, 3); }
+std::string format_mm(double length_m) { return readable(1e3 * length_m, 3); }
 
-std::string in_mm(double length_m) { return significant(1e3 * length_m, 3) + " mm"; }
+std::string format_mm_with_unit(double length_m) { return significant(1e3 * length_m, 3) + " mm"; }
 
 }  // namespace vlp

@@ -15,15 +15,16 @@ double round_below(double value);
 /// Returns consecutive numbers of that series, at least two. The first is the last one that does
 /// not exceed `least`, the last is the first one that is not below `most`.
 /// @pre 0 < least <= most
-std::vector<double> round_numbers(double least, double most);
+std::vector<double> round_numbers(double lowest, double highest);
 
 /// Formats a number for humans with `digits` significant digits. Integer digits are all kept, so
 /// that large numbers have no exponent.
 std::string readable(double value, int digits);
 
-/// Format a length in millimeters with three significant digits. readable_mm() has no unit and
-/// keeps all integer digits, as readable(). in_mm() appends the unit and is for columns.
-std::string readable_mm(double length_m);
-std::string in_mm(double length_m);
+/// Format a length in millimeters with three significant digits. format_mm() has no unit and
+/// keeps all integer digits, as readable(). format_mm_with_unit() appends the unit and is for
+/// columns.
+std::string format_mm(double length_m);
+std::string format_mm_with_unit(double length_m);
 
 }  // namespace vlp

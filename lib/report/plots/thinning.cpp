@@ -18,9 +18,9 @@ std::string ordinal(std::size_t number) {
 
 }  // namespace
 
-std::size_t thinning_step(std::size_t count, std::size_t most) {
-  assert(most > 0);
-  return count <= most ? 1 : (count + most - 1) / most;
+std::size_t thinning_step(std::size_t count, std::size_t max_count) {
+  assert(max_count > 0);
+  return count <= max_count ? 1 : (count + max_count - 1) / max_count;
 }
 
 std::string thinning_note(std::size_t count, std::size_t step) {
@@ -28,8 +28,8 @@ std::string thinning_note(std::size_t count, std::size_t step) {
   return "every " + ordinal(step) + " of " + std::to_string(count) + " drawn";
 }
 
-std::vector<std::size_t> thinned(std::span<const double> values, std::size_t step,
-                                 std::size_t largest) {
+std::vector<std::size_t> select_thinned(std::span<const double> values, std::size_t step,
+                                        std::size_t largest) {
   std::vector<std::size_t> all(values.size()), chosen;
   std::iota(all.begin(), all.end(), 0);
   for (std::size_t i = 0; i < values.size(); i += step) chosen.push_back(i);

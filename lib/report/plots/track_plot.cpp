@@ -14,7 +14,7 @@
 namespace vlp {
 namespace {
 
-constexpr std::size_t kMostFixes = 2000;
+constexpr std::size_t kMaxFixes = 2000;
 
 /// Coordinate frame of the commanded line: x from its start along it, y to its left.
 struct LineFrame {
@@ -23,15 +23,15 @@ struct LineFrame {
   explicit LineFrame(const std::array<Eigen::Vector2d, 2>& line_m)
       : start_m(line_m[0]), along((line_m[1] - line_m[0]).normalized()) {}
 
-  Eigen::Vector2d of(const Eigen::Vector2d& in_world_m) const {
+  Eigen::Vector2d to_line_frame(const Eigen::Vector2d& in_world_m) const {
     const Eigen::Vector2d from_start_m = in_world_m - start_m;
     return {along.dot(from_start_m), along.x() * from_start_m.y() - along.y() * from_start_m.x()};
   }
 };
 
 /// Returns x and y in the world, meters along the commanded line, and millimeters to its left.
-std::string row_of(const LineFrame& frame, const Eigen::Vector2d& point_m) {
-  const Eigen::Vector2d in_line_m = frame.of(point_m);
+std::string format_row(const LineFrame& frame, const Eigen::Vector2d& point_m) {
+  const Eigen::Vector2d in_line_m = frame.to_line_frame(point_m);
   return data_row({point_m.x(), point_m.y(), in_line_m.x(), 1e3 * in_line_m.y()});
 }
 
@@ -53,39 +53,39 @@ struct TrackData {
   explicit TrackData(const TrackPlot& plot, std::size_t step) {
     const LineFrame frame(plot.commanded_m);
     for (const auto& point_m : plot.commanded_m) {
-      commanded += row_of(frame, point_m);
+      commanded += format_row(frame, point_m);
       floor.extend(point_m);
-      along.extend(frame.of(point_m));
+      along.extend(frame.to_line_frame(point_m));
     }
     for (std::size_t i = 0; i < plot.fixes_m.size(); i += step) {
-      fixes += row_of(frame, plot.fixes_m[i]);
+      fixes += format_row(frame, plot.fixes_m[i]);
       floor.extend(plot.fixes_m[i]);
-      along.extend(frame.of(plot.fixes_m[i]));
+      along.extend(frame.to_line_frame(plot.fixes_m[i]));
     }
     // The fitted line extends as far as the fixes, whatever its two points are. So a drive that
     // ends early is visible.
     const LineFrame fitted_frame(plot.fitted_m);
     const auto along_fitted_m = [&](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
-      return fitted_frame.of(a).x() < fitted_frame.of(b).x();
+      return fitted_frame.to_line_frame(a).x() < fitted_frame.to_line_frame(b).x();
     };
     const auto [first, last] =
         std::minmax_element(plot.fixes_m.begin(), plot.fixes_m.end(), along_fitted_m);
     for (const auto& end_m : {*first, *last}) {
       const Eigen::Vector2d foot_m =
-          fitted_frame.start_m + fitted_frame.of(end_m).x() * fitted_frame.along;
-      fitted += row_of(frame, foot_m);
+          fitted_frame.start_m + fitted_frame.to_line_frame(end_m).x() * fitted_frame.along;
+      fitted += format_row(frame, foot_m);
       floor.extend(foot_m);
-      along.extend(frame.of(foot_m));
+      along.extend(frame.to_line_frame(foot_m));
     }
   }
 };
 
 }  // namespace
 
-Drawing drawing_of(const TrackPlot& plot) {
+Drawing make_drawing(const TrackPlot& plot) {
   assert(plot.commanded_m[0] != plot.commanded_m[1] && plot.fitted_m[0] != plot.fitted_m[1]);
   assert(!plot.fixes_m.empty());
-  const std::size_t step = thinning_step(plot.fixes_m.size(), kMostFixes);
+  const std::size_t step = thinning_step(plot.fixes_m.size(), kMaxFixes);
   const auto [commanded, fixes, fitted, floor, along] = TrackData(plot, step);
   constexpr double margin = 0.1;
   const double around_m = margin * floor.sizes().maxCoeff();

@@ -26,6 +26,6 @@ struct TrackPlot {
 /// Plots the lines and fixes on the floor. A second plot shows the distances of fixes and fitted
 /// line to the left of the commanded line, in mm, along it. If there are more than 2,000 fixes, a
 /// regular subset in their order is plotted.
-Drawing drawing_of(const TrackPlot& plot);
+Drawing make_drawing(const TrackPlot& plot);
 
 }  // namespace vlp

@@ -24,42 +24,42 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMostBytes = 1 << 26;
+constexpr std::size_t kMaxSessionFileBytes = 1 << 26;
 
 /// Converts 2026-03-14 or 2026-03-14T09:30:00.25 to 2026-03-14T09:30:00Z.
-std::string utc_of_date(const std::string& date) {
+std::string parse_date(const std::string& date) {
   constexpr std::size_t day = 10, whole = 19;
   return date.size() == day ? date + "T00:00:00Z" : date.substr(0, whole) + "Z";
 }
 
-/// Makes a run id in the form of new_run().
-std::string run_name(std::string utc, const std::string& text) {
+/// Makes a run id in the form of make_run_id().
+std::string make_session_run_id(std::string utc, const std::string& text) {
   constexpr std::size_t digits = 16;
   std::erase_if(utc, [](char c) { return c == '-' || c == ':'; });
   return utc + "-" + sha256_of_text(text).substr(0, digits);
 }
 
-std::optional<double> number_in(const nlohmann::json& object, const char* key) {
+std::optional<double> find_number(const nlohmann::json& object, const char* key) {
   const auto found = object.find(key);
   if (found == object.end() || !found->is_number()) return std::nullopt;
   return found->get<double>();
 }
 
 /// Adds the entries of `metrics` or `gates` of session.json. Existing metrics are not replaced.
-void add_figures(const nlohmann::json& metrics, std::vector<CheckedMetric>& figures) {
+void add_metrics(const nlohmann::json& entries, std::vector<CheckedMetric>& metrics) {
   std::set<std::string> names;
-  for (const CheckedMetric& figure : figures) names.insert(figure.name);
-  figures.reserve(figures.size() + metrics.size());
-  for (const nlohmann::json& metric : metrics) {
-    CheckedMetric figure;
-    figure.name = metric.at("name");
-    if (!names.insert(figure.name).second) continue;
-    figure.unit = metric.value("unit", "");
-    figure.value = number_in(metric, "value");
-    figure.limit = number_in(metric, "limit");
-    const auto kind = metric_kind(figure.name);
-    figure.asked = kind ? kind->asked : Direction::at_most;
-    figures.push_back(std::move(figure));
+  for (const CheckedMetric& metric : metrics) names.insert(metric.name);
+  metrics.reserve(metrics.size() + entries.size());
+  for (const nlohmann::json& entry : entries) {
+    CheckedMetric metric;
+    metric.name = entry.at("name");
+    if (!names.insert(metric.name).second) continue;
+    metric.unit = entry.value("unit", "");
+    metric.value = find_number(entry, "value");
+    metric.limit = find_number(entry, "limit");
+    const auto kind = metric_kind(metric.name);
+    metric.direction = kind ? kind->direction : Direction::at_most;
+    metrics.push_back(std::move(metric));
   }
 }
 
@@ -76,7 +76,7 @@ std::optional<SharedFolder> open_session(const fs::path& folder) {
 
 }  // namespace
 
-ReprocessedArchive sessions_of_archive(const fs::path& results) {
+ReprocessedArchive read_archive_sessions(const fs::path& results) {
   const CsvTable summary(results / "summary.csv");
   const auto text = [&](std::size_t row, const char* column) {
     return std::string(summary.text(row, summary.required(column)));
@@ -104,12 +104,12 @@ ReprocessedArchive sessions_of_archive(const fs::path& results) {
       archive.refused.emplace_back(error.what());
       continue;
     }
-    run.begun_utc = run.ended_utc = utc_of_date(date);
-    run.run = run_name(run.ended_utc, run.station + "/" + session);
+    run.begun_utc = run.ended_utc = parse_date(date);
+    run.run = make_session_run_id(run.ended_utc, run.station + "/" + session);
     run.program = "vlp-calibrate " + text(row, "version");
     run.config_sha256 = text(row, "key");
     const bool passed = verdict == "pass" || verdict == "look", failed = verdict == "gate";
-    run.verdict = name_of(passed ? Verdict::pass : failed ? Verdict::fail : Verdict::invalid);
+    run.verdict = to_string(passed ? Verdict::pass : failed ? Verdict::fail : Verdict::invalid);
     if (!passed) run.causes = text(row, "reason") + "\n";
     archive.sessions.push_back(
         {std::move(run), results / (passed || failed ? "sessions" : "failed") / session});
@@ -119,22 +119,22 @@ ReprocessedArchive sessions_of_archive(const fs::path& results) {
   return archive;
 }
 
-RunRecord run_of(const ReprocessedSession& session) {
+RunRecord load_archive_run(const ReprocessedSession& session) {
   RunRecord run = session.run;
   const fs::path file = session.folder / "session.json";
   const auto folder = open_session(session.folder);
-  const auto text = folder ? folder->read("session.json", kMostBytes) : std::nullopt;
+  const auto text = folder ? folder->read("session.json", kMaxSessionFileBytes) : std::nullopt;
   if (!text) throw InputError(file, "cannot be opened: there is none");
   try {
     check_json_bounds(*text);
     const auto document = nlohmann::json::parse(*text);
     for (const char* part : {"metrics", "gates"}) {
-      if (document.contains(part)) add_figures(document[part], run.figures);
+      if (document.contains(part)) add_metrics(document[part], run.metrics);
     }
   } catch (const std::exception& error) {
     throw InputError(file, fmt::format("is not as vlp-calibrate writes it: {}", error.what()));
   }
-  run.calibration = folder->read("calibration.yaml", kMostBytes).value_or("");
+  run.calibration = folder->read("calibration.yaml", kMaxSessionFileBytes).value_or("");
   return run;
 }
 

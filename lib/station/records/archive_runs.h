@@ -36,10 +36,10 @@ struct ReprocessedArchive {
 ///   verdict        PASS for "pass" and "look", FAIL for "gate", INVALID without a result
 ///   config_sha256  key of the session: digest of its inputs, the toolbox and the options
 ///   run            date, and a digest of station, camera and session: the same each time
-ReprocessedArchive sessions_of_archive(const std::filesystem::path& results);
+ReprocessedArchive read_archive_sessions(const std::filesystem::path& results);
 
 /// Loads the complete run of a session, with metrics and gates of its session.json. Throws
 /// InputError if vlp-calibrate did not write the file.
-RunRecord run_of(const ReprocessedSession& session);
+RunRecord load_archive_run(const ReprocessedSession& session);
 
 }  // namespace vlp

@@ -73,10 +73,10 @@ std::string subject_part(const RunRecord& record, const Calibration& calibration
 /// Describes the inputs that the uncertainty includes, and those that are assumed exact.
 std::string describe_inputs(const RunRecord& record, const Calibration& calibration) {
   const auto print = std::find_if(
-      record.figures.begin(), record.figures.end(),
-      [](const auto& figure) { return figure.name == "board_print_px" && figure.value; });
+      record.metrics.begin(), record.metrics.end(),
+      [](const auto& metric) { return metric.name == "board_print_px" && metric.value; });
   const auto& report = calibration.intrinsics_report;
-  if (print == record.figures.end() || !report || !report->covariance) {
+  if (print == record.metrics.end() || !report || !report->covariance) {
     return "The board and the known points are taken as exact.";
   }
   return fmt::format(
@@ -88,10 +88,10 @@ std::string describe_inputs(const RunRecord& record, const Calibration& calibrat
 
 std::string results_part(const RunRecord& record, const Calibration& calibration) {
   HtmlTable table{"", {"quantity", "value and expanded uncertainty"}, {}};
-  for (const CertifiedValue& value : certified_values(calibration)) {
-    table.rows.push_back({value.name, words_of(value)});
+  for (const CertifiedValue& value : collect_certified_values(calibration)) {
+    table.rows.push_back({value.name, describe(value)});
   }
-  const std::string lens(name_of(calibration.camera.lens_model));
+  const std::string lens(to_string(calibration.camera.lens_model));
   return html_table(table) +
          html_element(
              "p", "Lens model " + lens +
@@ -110,30 +110,31 @@ std::string describe_requirement(const std::string& metric) {
 }
 
 /// Makes the table of the gates: metric, limit, and conformity with its decision rule.
-std::string conformity_part(const RunRecord& record) {
+std::string make_conformity_table(const RunRecord& record) {
   HtmlTable table{"", {"requirement", "figure", "limit", "accepted", "conforms", "rule"}, {}};
-  constexpr int digits = 4, of_probability = 3;
-  for (const CheckedMetric& figure : record.figures) {
-    if (!figure.limit) continue;
-    std::string measured = figure.value ? significant(*figure.value, digits) : "none";
-    std::string rule = "simple", outcome = figure.met() ? "yes" : "no";
-    if (const auto& guard = figure.guard) {
-      if (figure.value) {
+  constexpr int digits = 4, probability_digits = 3;
+  for (const CheckedMetric& metric : record.metrics) {
+    if (!metric.limit) continue;
+    std::string measured = metric.value ? significant(*metric.value, digits) : "none";
+    std::string rule = "simple", outcome = metric.passed() ? "yes" : "no";
+    if (const auto& guard = metric.guard) {
+      if (metric.value) {
         measured =
-            words_of(CertifiedValue{"", figure.unit, *figure.value, guard->standard_uncertainty});
+            describe(CertifiedValue{"", metric.unit, *metric.value, guard->standard_uncertainty});
       }
       rule = fmt::format("guard band of {:.4g} u", guard->k);
-      if (const auto sure = figure.conformance_probability()) {
-        outcome += ", p = " + significant(*sure, of_probability);
+      if (const auto sure = metric.conformance_probability()) {
+        outcome += ", p = " + significant(*sure, probability_digits);
       }
-    } else if (figure.value) {
-      measured = with_unit(measured, figure.unit);
+    } else if (metric.value) {
+      measured = with_unit(measured, metric.unit);
     }
-    if (!figure.met()) table.marked.push_back(table.rows.size());
-    table.rows.push_back(
-        {describe_requirement(figure.name), measured,
-         words_of(figure.asked) + " " + with_unit(significant(*figure.limit, digits), figure.unit),
-         with_unit(significant(figure.acceptance_limit(), digits), figure.unit), outcome, rule});
+    if (!metric.passed()) table.marked.push_back(table.rows.size());
+    table.rows.push_back({describe_requirement(metric.name), measured,
+                          describe(metric.direction) + " " +
+                              with_unit(significant(*metric.limit, digits), metric.unit),
+                          with_unit(significant(metric.acceptance_limit(), digits), metric.unit),
+                          outcome, rule});
   }
   return html_table(table) +
          html_element(
@@ -169,7 +170,7 @@ std::string traceability_part(const RunRecord& record, const Calibration& calibr
 }
 
 /// Makes the part with the data that a record does not contain.
-std::string part_to_fill_in() {
+std::string make_blank_part() {
   HtmlTable table{"", {}, {}};
   for (const char* line : {"laboratory, address", "customer", "temperature, humidity",
                            "certificates of board and lamp map", "issued by, date"}) {
@@ -181,19 +182,19 @@ std::string part_to_fill_in() {
 
 }  // namespace
 
-std::vector<CertifiedValue> certified_values(const Calibration& calibration) {
+std::vector<CertifiedValue> collect_certified_values(const Calibration& calibration) {
   constexpr double millimetres = 1e3, degrees = 180 / std::numbers::pi;
   const std::vector<double>& k = calibration.camera.intrinsics;
   const auto& lens = calibration.intrinsics_report;
-  const std::optional<MatrixX> of_lens = lens ? lens->covariance : std::nullopt;
+  const std::optional<MatrixX> lens_covariance = lens ? lens->covariance : std::nullopt;
   Values values;
-  add_pair(values, "focal length", "px", {k[0], k[1]}, of_lens);
-  add_pair(values, "principal point", "px", {k[2], k[3]}, of_lens, 1, 2);
+  add_pair(values, "focal length", "px", {k[0], k[1]}, lens_covariance);
+  add_pair(values, "principal point", "px", {k[2], k[3]}, lens_covariance, 1, 2);
   if (const auto& center = calibration.rotation_center) {
     add_pair(values, "rotation centre, undistorted image", "px", center->center_px,
              center->covariance);
     add_pair(values, "zenith from the optical axis, 180/pi times its normalized point", "deg",
-             zenith_point(*center), whole_zenith_covariance(calibration), degrees);
+             zenith_point(*center), compute_zenith_covariance(calibration), degrees);
     if (center->lever_arm_m) {
       add_pair(values, "lever arm", "mm", *center->lever_arm_m, center->lever_arm_covariance,
                millimetres);
@@ -201,22 +202,22 @@ std::vector<CertifiedValue> certified_values(const Calibration& calibration) {
   }
   if (const auto& dispersion = calibration.dispersion) {
     add_pair(values, "dispersion offset", "px", dispersion->offset_px,
-             whole_offset_covariance(calibration));
+             compute_offset_covariance(calibration));
   }
   return values;
 }
 
-std::string words_of(const CertifiedValue& value) {
+std::string describe(const CertifiedValue& value) {
   const double expanded = kCoverage * value.standard_uncertainty.value_or(0);
   if (!(expanded > 0) || !std::isfinite(expanded)) {
     return with_unit(significant(value.value, kSixDigits), value.unit) + ", uncertainty not stated";
   }
   constexpr double ten = 10, two_digits = 100;
-  constexpr int most = 12;
+  constexpr int max_places = 12;
   int exponent = static_cast<int>(std::floor(std::log10(expanded)));
   // 0.0996 is 0.10.
   if (std::round(expanded * std::pow(ten, 1 - exponent)) >= two_digits) ++exponent;
-  const int places = std::clamp(1 - exponent, 0, most);
+  const int places = std::clamp(1 - exponent, 0, max_places);
   return with_unit(fixed(value.value, places) + " \u00b1 " + fixed(expanded, places), value.unit);
 }
 
@@ -225,21 +226,21 @@ void check_certifiable(const RunRecord& record) {
     return InputError(record.run, why + ": it has no certificate");
   };
   if (record.kind != "unit") throw none("is of the golden unit, by which a station is measured");
-  const std::string no_verdict = why_no_verdict(record);
+  const std::string no_verdict = find_verdict_problem(record);
   if (!no_verdict.empty()) throw none(no_verdict);
   if (record.invalid()) throw none("was not judged (" + record.first_cause() + ")");
   if (record.calibration.empty()) throw none("came to no calibration");
 }
 
-std::string certificate(const RunRecord& record, const Calibration& calibration) {
+std::string make_certificate(const RunRecord& record, const Calibration& calibration) {
   check_certifiable(record);
   return html_page("Calibration certificate: camera " + record.camera,
                    verdict_part(record) +
                        html_section("Unit and calibration", subject_part(record, calibration)) +
                        html_section("Results", results_part(record, calibration)) +
-                       html_section("Statement of conformity", conformity_part(record)) +
+                       html_section("Statement of conformity", make_conformity_table(record)) +
                        html_section("Traceability", traceability_part(record, calibration)) +
-                       html_section("To be filled in by who issues it", part_to_fill_in()));
+                       html_section("To be filled in by who issues it", make_blank_part()));
 }
 
 std::filesystem::path write_certificate(const RunRecord& record,
@@ -249,7 +250,7 @@ std::filesystem::path write_certificate(const RunRecord& record,
       publish_run(record, {}, results) / calibration_name(record);
   const SharedFolder folder = open_run_folder(record, results);
   constexpr const char* name = "certificate.html";
-  folder.replace(name, certificate(record, read_calibration(calibration)));
+  folder.replace(name, make_certificate(record, read_calibration(calibration)));
   return folder.path() / name;
 }
 

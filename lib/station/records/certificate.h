@@ -24,12 +24,12 @@ struct CertifiedValue {
 /// The uncertainties are estimated from the scatter of the captures. Those of zenith and dispersion
 /// include the contributions of the earlier steps. The board is assumed exact unless it has
 /// print_sd, the lamp map unless it has sd_m. Known points are always assumed exact.
-std::vector<CertifiedValue> certified_values(const Calibration& calibration);
+std::vector<CertifiedValue> collect_certified_values(const Calibration& calibration);
 
 /// Formats a value as "12.346 +- 0.012 px". The expanded uncertainty U = 2 u has two significant
 /// digits (JCGM 100:2008, 7.2.6), and the value ends at the same digit. Without an uncertainty the
 /// value has six digits and a note that none is stated.
-std::string words_of(const CertifiedValue& value);
+std::string describe(const CertifiedValue& value);
 
 /// Throws InputError for a run that cannot have a certificate:
 /// - a run of a golden unit,
@@ -48,7 +48,7 @@ void check_certifiable(const RunRecord& record);
 /// - digests of all inputs.
 ///
 /// Issuer and conditions are not recorded; the page has blanks for them.
-std::string certificate(const RunRecord& record, const Calibration& calibration);
+std::string make_certificate(const RunRecord& record, const Calibration& calibration);
 
 /// Writes the certificate to certificate.html next to the files of the run, and returns its path.
 /// Writes missing files of the run, too (publish_run()). Throws InputError.

@@ -18,33 +18,33 @@ namespace {
 
 constexpr int kDigits = 9;
 
-std::string one_line(std::string text) {
+std::string join_lines(std::string text) {
   while (text.ends_with('\n')) text.pop_back();
   std::string joined;
   for (const char c : text) joined += c == '\n' ? std::string("; ") : std::string(1, c);
   return joined;
 }
 
-const CheckedMetric* figure_of(const RunRecord& run, const MetricKind& kind) {
-  const auto figure = std::find_if(run.figures.begin(), run.figures.end(),
+const CheckedMetric* find_metric(const RunRecord& run, const MetricKind& kind) {
+  const auto metric = std::find_if(run.metrics.begin(), run.metrics.end(),
                                    [&](const auto& each) { return each.name == kind.name; });
-  return figure == run.figures.end() ? nullptr : &*figure;
+  return metric == run.metrics.end() ? nullptr : &*metric;
 }
 
 /// Returns unit_metrics() and the other metrics of these runs.
-std::vector<MetricKind> columns_of(const std::vector<RunRecord>& runs) {
+std::vector<MetricKind> list_columns(const std::vector<RunRecord>& runs) {
   auto kinds = unit_metrics();
   for (const MetricKind& kind : metric_kinds({MetricSource::evaluation})) {
-    const bool there = std::any_of(runs.begin(), runs.end(), [&](const RunRecord& run) {
-      return figure_of(run, kind) != nullptr;
+    const bool has_value = std::any_of(runs.begin(), runs.end(), [&](const RunRecord& run) {
+      return find_metric(run, kind) != nullptr;
     });
-    if (there) kinds.push_back(kind);
+    if (has_value) kinds.push_back(kind);
   }
   return kinds;
 }
 
 void write_csv(const std::filesystem::path& file, const std::vector<RunRecord>& runs) {
-  const auto kinds = columns_of(runs);
+  const auto kinds = list_columns(runs);
   std::vector<std::string> header;
   for (const RunField& field : run_fields()) {
     if (field.in_csv) header.emplace_back(field.name);
@@ -54,31 +54,31 @@ void write_csv(const std::filesystem::path& file, const std::vector<RunRecord>& 
   for (const RunRecord& run : runs) {
     std::vector<std::string> row;
     for (const RunField& field : run_fields()) {
-      if (field.in_csv) row.push_back(one_line(run.*field.text));
+      if (field.in_csv) row.push_back(join_lines(run.*field.text));
     }
     for (const MetricKind& kind : kinds) {
-      const CheckedMetric* figure = figure_of(run, kind);
-      const bool there = figure != nullptr && figure->value;
-      row.push_back(there ? significant(*figure->value, kDigits) : "");
+      const CheckedMetric* metric = find_metric(run, kind);
+      const bool has_value = metric != nullptr && metric->value;
+      row.push_back(has_value ? significant(*metric->value, kDigits) : "");
     }
     csv.row(row);
   }
   csv.save();
 }
 
-nlohmann::ordered_json json_of(const RunRecord& run) {
-  nlohmann::ordered_json figures = nlohmann::ordered_json::object();
-  for (const CheckedMetric& figure : run.figures) {
-    figures[figure.name] = {{"value", number_or_null(figure.value)},
-                            {"unit", figure.unit},
-                            {"gate", number_or_null(figure.limit)},
-                            {"at_least", figure.asked == Direction::at_least},
-                            {"met", figure.met()}};
-    if (!figure.guard) continue;
-    figures[figure.name]["uncertainty"] = figure.guard->standard_uncertainty;
-    figures[figure.name]["guard_k"] = figure.guard->k;
-    figures[figure.name]["conformance_probability"] =
-        number_or_null(figure.conformance_probability());
+nlohmann::ordered_json to_json(const RunRecord& run) {
+  nlohmann::ordered_json metrics = nlohmann::ordered_json::object();
+  for (const CheckedMetric& metric : run.metrics) {
+    metrics[metric.name] = {{"value", number_or_null(metric.value)},
+                            {"unit", metric.unit},
+                            {"gate", number_or_null(metric.limit)},
+                            {"at_least", metric.direction == Direction::at_least},
+                            {"met", metric.passed()}};
+    if (!metric.guard) continue;
+    metrics[metric.name]["uncertainty"] = metric.guard->standard_uncertainty;
+    metrics[metric.name]["guard_k"] = metric.guard->k;
+    metrics[metric.name]["conformance_probability"] =
+        number_or_null(metric.conformance_probability());
   }
   nlohmann::ordered_json images = nlohmann::ordered_json::array();
   for (const auto& [step, name, sha256, refused] : run.images) {
@@ -86,9 +86,9 @@ nlohmann::ordered_json json_of(const RunRecord& run) {
   }
   nlohmann::ordered_json json;
   for (const RunField& field : run_fields()) {
-    json[field.name] = field.in_csv ? one_line(run.*field.text) : run.*field.text;
+    json[field.name] = field.in_csv ? join_lines(run.*field.text) : run.*field.text;
   }
-  json["figures"] = std::move(figures);
+  json["figures"] = std::move(metrics);
   json["images"] = std::move(images);
   json["events"] = nlohmann::ordered_json::array();
   for (const RunEvent& event : run.events) {
@@ -99,26 +99,26 @@ nlohmann::ordered_json json_of(const RunRecord& run) {
 }
 
 /// Serializes JSON; replaces bytes that are no UTF-8.
-std::string text_of(const nlohmann::ordered_json& json) {
+std::string serialize(const nlohmann::ordered_json& json) {
   constexpr int indent = 1;
   return json.dump(indent, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace
 
-std::string hook_json(const RunRecord& run) {
+std::string make_hook_json(const RunRecord& run) {
   nlohmann::ordered_json json;
   json["event"] = voided(run) != nullptr ? "voided" : "verdict";
-  json.update(json_of(run));
-  return text_of(json);
+  json.update(to_json(run));
+  return serialize(json);
 }
 
 void write_runs(const std::filesystem::path& file, const std::vector<RunRecord>& runs) {
   if (file.extension() == ".csv") return write_csv(file, runs);
   if (file.extension() != ".json") throw InputError(file, "should end in .csv or .json");
   nlohmann::ordered_json all = nlohmann::ordered_json::array();
-  for (const RunRecord& run : runs) all.push_back(json_of(run));
-  write_file(file, text_of(all));
+  for (const RunRecord& run : runs) all.push_back(to_json(run));
+  write_file(file, serialize(all));
 }
 
 }  // namespace vlp

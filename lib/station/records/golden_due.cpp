@@ -26,21 +26,21 @@ constexpr const char* kUnitLine = "unit\n";
 
 constexpr std::size_t kMaxBytes = 1 << 24;
 
-std::string name_of_note(const StationConfig& config) {
+std::string make_note_name(const StationConfig& config) {
   constexpr std::size_t digits = 16;
   return ".golden-" + sha256_of_text(config.station).substr(0, digits);
 }
 
 /// Returns the message about an incomplete note.
-std::string damaged(const std::string& why) {
+std::string describe_damaged_note(const std::string& why) {
   return fmt::format("what the golden unit said is not known ({}): 'vlp-station verify' is due",
                      why);
 }
 
 /// Deletes the note, so that an earlier PASS is not valid after a run that could not be noted.
-void forget(const StationConfig& config) {
+void delete_note(const StationConfig& config) {
   std::error_code ignored;
-  fs::remove(config.spool / name_of_note(config), ignored);
+  fs::remove(config.spool / make_note_name(config), ignored);
 }
 
 /// Adds a line to the note if it exists. Throws InputError if it cannot be written.
@@ -55,27 +55,28 @@ void append(const SharedFolder& spool, const std::string& note, std::string_view
 
 }  // namespace
 
-std::string golden_problem(const StationConfig& config, GoldenAt at) {
+std::string golden_problem(const StationConfig& config, GoldenCheckTime at) {
   constexpr const char* verify = "'vlp-station verify' is due";
   if (!config.verify_due) return "";
-  const fs::path file = config.spool / name_of_note(config);
+  const fs::path file = config.spool / make_note_name(config);
   std::error_code none;
   if (fs::symlink_status(file, none).type() == fs::file_type::not_found) {
     return fmt::format("the golden unit was not measured here yet: {}", verify);
   }
   std::string text;
   try {
-    text = SharedFolder(config.spool).read(name_of_note(config), kMaxBytes).value_or("");
+    text = SharedFolder(config.spool).read(make_note_name(config), kMaxBytes).value_or("");
   } catch (const InputError& error) {
-    return damaged(error.what());
+    return describe_damaged_note(error.what());
   }
-  if (!text.ends_with('\n')) return damaged(file.string() + ": is the file cut short?");
+  if (!text.ends_with('\n'))
+    return describe_damaged_note(file.string() + ": is the file cut short?");
   std::istringstream words(text.substr(0, text.find('\n')));
   std::string run, verdict, ended_utc, measured_with;
   words >> run >> verdict >> ended_utc >> measured_with;
-  const bool failed = verdict == name_of(Verdict::fail);
-  if ((!failed && verdict != name_of(Verdict::pass)) || ended_utc.empty()) {
-    return damaged(file.string() + " is damaged");
+  const bool failed = verdict == to_string(Verdict::fail);
+  if ((!failed && verdict != to_string(Verdict::pass)) || ended_utc.empty()) {
+    return describe_damaged_note(file.string() + " is damaged");
   }
   if (failed) {
     return fmt::format("the golden unit failed (run {}): mend the station, then {}", run, verify);
@@ -90,7 +91,7 @@ std::string golden_problem(const StationConfig& config, GoldenAt at) {
         "was measured (run {}): {}",
         run, verify);
   }
-  if (at == GoldenAt::verdict) return "";
+  if (at == GoldenCheckTime::verdict) return "";
   constexpr double second_per_hour = 3600;
   const double age_h = seconds_since(ended_utc) / second_per_hour;
   const auto& due = *config.verify_due;
@@ -106,11 +107,11 @@ std::string golden_problem(const StationConfig& config, GoldenAt at) {
   return "";
 }
 
-void note_for_golden(const StationConfig& config, const RunRecord& record) {
+void update_golden_note(const StationConfig& config, const RunRecord& record) {
   if (!config.verify_due || record.invalid()) return;
   make_folder(config.spool);
   const SharedFolder spool(config.spool);
-  const std::string note = name_of_note(config);
+  const std::string note = make_note_name(config);
   try {
     if (record.kind == "golden") {
       spool.replace(note, fmt::format("{} {} {} {}\n", record.run, record.verdict, record.ended_utc,
@@ -119,19 +120,19 @@ void note_for_golden(const StationConfig& config, const RunRecord& record) {
       append(spool, note, kUnitLine);  // never measured: nothing to count from
     }
   } catch (const InputError&) {
-    forget(config);
+    delete_note(config);
     throw;
   }
 }
 
-bool forget_golden(const StationConfig& config, const std::string& run) {
+bool invalidate_golden_note(const StationConfig& config, const std::string& run) {
   try {
-    const auto note = SharedFolder(config.spool).read(name_of_note(config), kMaxBytes);
+    const auto note = SharedFolder(config.spool).read(make_note_name(config), kMaxBytes);
     if (!note || note->substr(0, note->find(' ')) != run) return false;
   } catch (const InputError&) {  // no spool, or no valid note (golden_problem())
     return false;
   }
-  forget(config);
+  delete_note(config);
   return true;
 }
 

@@ -10,7 +10,7 @@
 namespace vlp {
 
 /// Time at which golden_problem() is called.
-enum class GoldenAt { first_image, verdict };
+enum class GoldenCheckTime { first_image, verdict };
 
 /// Returns the human-readable reason why no unit may pass now; empty if units may. Always empty
 /// without `verify_due`.
@@ -21,13 +21,15 @@ enum class GoldenAt { first_image, verdict };
 /// - was measured with another measuring setup (measuring_digest()),
 /// - was never measured here.
 ///
-/// The function uses only the note of note_for_golden() in the station's spool, because the records
-/// may be offline. The golden unit is due, too, if the clock was set back or the note is damaged.
+/// The function uses only the note of update_golden_note() in the station's spool, because the
+/// records may be offline. The golden unit is due, too, if the clock was set back or the note is
+/// damaged.
 ///
-/// GoldenAt::verdict ignores limits of hours and units that expired after the unit was started. At
-/// its start the golden unit met `verify_due`, and a repetition would give no further information.
-/// A failed golden unit and a changed setup count at both times.
-std::string golden_problem(const StationConfig& config, GoldenAt at = GoldenAt::first_image);
+/// GoldenCheckTime::verdict ignores limits of hours and units that expired after the unit was
+/// started. At its start the golden unit met `verify_due`, and a repetition would give no further
+/// information. A failed golden unit and a changed setup count at both times.
+std::string golden_problem(const StationConfig& config,
+                           GoldenCheckTime at = GoldenCheckTime::first_image);
 
 /// Notes a run in the spool: the result of a golden unit, or one more judged unit. Ignores INVALID
 /// runs, and all runs without `verify_due`.
@@ -35,10 +37,10 @@ std::string golden_problem(const StationConfig& config, GoldenAt at = GoldenAt::
 /// File .golden-DIGEST, with a digest of the station's name: run, verdict and end of the golden run
 /// and the measuring_digest(), then a line for each later unit. Throws InputError if the file
 /// cannot be written. The note is then deleted, so that the golden unit is due.
-void note_for_golden(const StationConfig& config, const RunRecord& record);
+void update_golden_note(const StationConfig& config, const RunRecord& record);
 
 /// Deletes the note if it is of the golden run `run`, which is no longer valid; the golden unit is
 /// then due. Returns true if it was.
-bool forget_golden(const StationConfig& config, const std::string& run);
+bool invalidate_golden_note(const StationConfig& config, const std::string& run);
 
 }  // namespace vlp

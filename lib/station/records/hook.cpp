@@ -56,7 +56,7 @@ class Descriptor {
 };
 
 /// Returns the child processes of this process; empty if /proc is not readable.
-std::vector<pid_t> children() {
+std::vector<pid_t> find_children() {
   std::vector<pid_t> found;
   std::error_code none;
   for (const auto& entry : std::filesystem::directory_iterator("/proc", none)) {
@@ -75,19 +75,19 @@ std::vector<pid_t> children() {
 
 /// Adopts orphaned descendants of this process in place of init while it exists. A hook's processes
 /// therefore cannot evade the time limit by an own group or session.
-class Adoption {
+class Subreaper {
  public:
-  Adoption() : before_(children()) { ::prctl(PR_SET_CHILD_SUBREAPER, 1); }
-  ~Adoption() { ::prctl(PR_SET_CHILD_SUBREAPER, 0); }
-  Adoption(const Adoption&) = delete;
-  Adoption& operator=(const Adoption&) = delete;
+  Subreaper() : before_(find_children()) { ::prctl(PR_SET_CHILD_SUBREAPER, 1); }
+  ~Subreaper() { ::prctl(PR_SET_CHILD_SUBREAPER, 0); }
+  Subreaper(const Subreaper&) = delete;
+  Subreaper& operator=(const Subreaper&) = delete;
 
   /// Kills the new children, and the orphans that they leave.
   void kill_all() const {
     constexpr int tries = 100;
     for (int i = 0; i < tries; ++i) {
       bool any = false;
-      for (const pid_t child : children()) {
+      for (const pid_t child : find_children()) {
         if (std::find(before_.begin(), before_.end(), child) != before_.end()) continue;
         any = true;
         ::kill(child, SIGKILL);
@@ -113,28 +113,28 @@ struct Process {
   /// Reads at most the capacity of a pipe, so that a permanently full pipe does not delay the time
   /// limit.
   void read() {
-    constexpr std::size_t most = 4096;
+    constexpr std::size_t max_bytes = 4096;
     constexpr int parts = 16;
-    std::array<char, most> part{};
+    std::array<char, max_bytes> part{};
     for (int i = 0; i < parts; ++i) {
       const ssize_t count = ::read(output, part.data(), part.size());
       closed = closed || count == 0;
       if (count <= 0) return;
       written.append(part.data(), static_cast<std::size_t>(count));
-      if (written.size() > most) written.erase(0, written.size() - most);
+      if (written.size() > max_bytes) written.erase(0, written.size() - max_bytes);
     }
   }
   /// Waits for the process. Returns its status; std::nullopt if it was killed at the time limit.
   /// Throws std::system_error if the status is not available.
   std::optional<int> wait(double time_limit_s) {
-    constexpr int often_ms = 10;
-    const auto begun = Clock::now();
+    constexpr int interval_ms = 10;
+    const auto start = Clock::now();
     int status = 0;
     for (;;) {
       const pid_t ended = ::waitpid(id, &status, WNOHANG);
       if (ended == id) break;
       if (ended < 0 && errno != EINTR) throw std::system_error(errno, std::generic_category());
-      if (std::chrono::duration<double>(Clock::now() - begun).count() > time_limit_s) {
+      if (std::chrono::duration<double>(Clock::now() - start).count() > time_limit_s) {
         ::kill(-id, SIGKILL);
         ::kill(id, SIGKILL);  // it can have left its group
         while (::waitpid(id, &status, 0) < 0 && errno == EINTR) continue;
@@ -142,8 +142,8 @@ struct Process {
       }
       pollfd ready{output, POLLIN, 0};
       if (closed) {
-        std::this_thread::sleep_for(std::chrono::milliseconds(often_ms));
-      } else if (::poll(&ready, 1, often_ms) > 0) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(interval_ms));
+      } else if (::poll(&ready, 1, interval_ms) > 0) {
         read();
       }
     }
@@ -154,7 +154,7 @@ struct Process {
 
 /// Returns an anonymous file with the text, open at its beginning; negative, with errno, on
 /// failure.
-int file_with(const std::string& text) {
+int make_memory_file(const std::string& text) {
   const int file = ::memfd_create("run", MFD_CLOEXEC);
   for (std::size_t at = 0; file >= 0 && at < text.size();) {
     const ssize_t count = ::write(file, text.data() + at, text.size() - at);
@@ -173,7 +173,7 @@ int file_with(const std::string& text) {
 
 /// Starts the hook in its own group, with no other descriptor than the lock's and default signal
 /// handling. Returns an errno on failure, otherwise 0.
-int start(const Hook& hook, int input, int output, int lock, pid_t& id) {
+int start_process(const Hook& hook, int input, int output, int lock, pid_t& id) {
   posix_spawn_file_actions_t actions;
   posix_spawnattr_t attributes;
   ::posix_spawn_file_actions_init(&actions);
@@ -204,21 +204,21 @@ int start(const Hook& hook, int input, int output, int lock, pid_t& id) {
 }
 
 /// Returns the last non-empty line, shortened.
-std::string last_line(std::string text) {
-  constexpr std::size_t most = 200;
+std::string find_last_line(std::string text) {
+  constexpr std::size_t max_bytes = 200;
   while (!text.empty() && std::isspace(static_cast<unsigned char>(text.back())) != 0) {
     text.pop_back();
   }
   text.erase(0, text.rfind('\n') + 1);  // npos + 1 is 0
   text = printable(text);
   std::replace(text.begin(), text.end(), '\t', ' ');
-  return printable(text.substr(0, most));
+  return printable(text.substr(0, max_bytes));
 }
 
-RunEvent failed(const std::string& why) { return new_event(kHookFailed, why); }
+RunEvent failed(const std::string& why) { return make_event(kHookFailed, why); }
 
 /// Returns the number of events after the last one of a kind; std::nullopt if there is none.
-std::optional<std::ptrdiff_t> from_end(const RunRecord& record, const char* what) {
+std::optional<std::ptrdiff_t> count_events_since(const RunRecord& record, const char* what) {
   const auto last = std::find_if(record.events.rbegin(), record.events.rend(),
                                  [&](const RunEvent& event) { return event.what == what; });
   if (last == record.events.rend()) return std::nullopt;
@@ -226,7 +226,7 @@ std::optional<std::ptrdiff_t> from_end(const RunRecord& record, const char* what
 }
 
 /// Returns true if the open file is still the one of this name.
-bool is_that(int descriptor, const std::filesystem::path& file) {
+bool is_same_file(int descriptor, const std::filesystem::path& file) {
   struct stat open {
   }, named{};
   return ::fstat(descriptor, &open) == 0 && ::stat(file.c_str(), &named) == 0 &&
@@ -235,14 +235,14 @@ bool is_that(int descriptor, const std::filesystem::path& file) {
 
 }  // namespace
 
-RunEvent hook_wanted(const Hook& hook, const std::string& operator_name) {
-  return new_event(kHookWanted, printable_line(fmt::format("{}", fmt::join(hook.command, " "))),
-                   operator_name);
+RunEvent make_hook_request(const Hook& hook, const std::string& operator_name) {
+  return make_event(kHookRequested, printable_line(fmt::format("{}", fmt::join(hook.command, " "))),
+                    operator_name);
 }
 
 RunEvent run_hook(const Hook& hook, const RunRecord& record, const HookLock& lock) {
   std::array<int, 2> pipe{};
-  const Descriptor input(file_with(hook_json(record)));
+  const Descriptor input(make_memory_file(make_hook_json(record)));
   if (input.get() < 0 || ::pipe2(pipe.data(), O_CLOEXEC) != 0) {
     return failed("cannot be started: " + std::generic_category().message(errno));
   }
@@ -251,8 +251,8 @@ RunEvent run_hook(const Hook& hook, const RunRecord& record, const HookLock& loc
   ::fcntl(from.get(), F_SETFL, O_NONBLOCK);
   Process process{0, from.get()};
   std::signal(SIGCHLD, SIG_DFL);  // if SIGCHLD is ignored, no status is available
-  const Adoption adoption;
-  if (const int error = start(hook, input.get(), to.get(), lock.descriptor(), process.id);
+  const Subreaper subreaper;
+  if (const int error = start_process(hook, input.get(), to.get(), lock.descriptor(), process.id);
       error != 0) {
     return failed(hook.command.front() +
                   " cannot be started: " + std::generic_category().message(error));
@@ -264,9 +264,9 @@ RunEvent run_hook(const Hook& hook, const RunRecord& record, const HookLock& loc
   } catch (const std::system_error& error) {
     return failed("how it ended is not known: " + error.code().message());
   }
-  if (!status) adoption.kill_all();
-  const std::string line = last_line(process.written);
-  if (status && WIFEXITED(*status) && WEXITSTATUS(*status) == 0) return new_event(kHookDone, line);
+  if (!status) subreaper.kill_all();
+  const std::string line = find_last_line(process.written);
+  if (status && WIFEXITED(*status) && WEXITSTATUS(*status) == 0) return make_event(kHookDone, line);
   std::string why;
   if (!status) {
     why = fmt::format("no end within {:g} s, killed", hook.time_limit_s);
@@ -278,14 +278,16 @@ RunEvent run_hook(const Hook& hook, const RunRecord& record, const HookLock& loc
   return failed(line.empty() ? why : why.append(": ").append(line));
 }
 
-bool hook_is_open(const RunRecord& record) {
-  const auto wanted = from_end(record, kHookWanted), done = from_end(record, kHookDone);
+bool is_hook_open(const RunRecord& record) {
+  const auto wanted = count_events_since(record, kHookRequested),
+             done = count_events_since(record, kHookDone);
   return wanted && (!done || *wanted < *done);
 }
 
 std::string hook_problem(const RunRecord& record) {
-  if (!hook_is_open(record)) return "";
-  const auto wanted = from_end(record, kHookWanted), failed = from_end(record, kHookFailed);
+  if (!is_hook_open(record)) return "";
+  const auto wanted = count_events_since(record, kHookRequested),
+             failed = count_events_since(record, kHookFailed);
   if (!failed || *wanted < *failed) return "was not run to its end";
   return "failed: " + record.events[record.events.size() - 1 - std::size_t(*failed)].text;
 }
@@ -302,7 +304,7 @@ HookLock::HookLock(const std::filesystem::path& spool, const std::string& run)
     // On a file system without locks no other program holds one.
     held_ = ::flock(descriptor_, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK;
     // The previous holder can have removed the file.
-    if (!held_ || is_that(descriptor_, file_)) return;
+    if (!held_ || is_same_file(descriptor_, file_)) return;
     ::close(descriptor_);
   }
 }

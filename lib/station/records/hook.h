@@ -12,11 +12,11 @@ namespace vlp {
 
 /// Makes the event that a hook is to run, which is recorded together with the run. It identifies
 /// hooks that did not finish.
-RunEvent hook_wanted(const Hook& hook, const std::string& operator_name);
+RunEvent make_hook_request(const Hook& hook, const std::string& operator_name);
 
 /// Returns true if a hook was requested for a run, at its verdict or when it was voided, and has
 /// not succeeded since.
-bool hook_is_open(const RunRecord& record);
+bool is_hook_open(const RunRecord& record);
 /// Returns the human-readable reason why a hook is open, in one line; empty if it is not open.
 std::string hook_problem(const RunRecord& record);
 
@@ -41,8 +41,8 @@ class HookLock {
   bool held_ = true;
 };
 
-/// Runs the hook with hook_json() of the run on its stdin, and returns the event of its result.
-/// Sets SIGCHLD to its default.
+/// Runs the hook with make_hook_json() of the run on its stdin, and returns the event of its
+/// result. Sets SIGCHLD to its default.
 ///
 ///   kHookDone    the last line of its output
 ///   kHookFailed  exit code, signal or time limit, then the last line of its output; or the reason

@@ -22,7 +22,7 @@
 namespace vlp {
 namespace {
 
-bool passes(const RunRecord& run, const RunFilter& filter) {
+bool matches_filter(const RunRecord& run, const RunFilter& filter) {
   const auto is = [](const std::string& text, const std::string& wanted) {
     return wanted.empty() || text == wanted;
   };
@@ -32,7 +32,7 @@ bool passes(const RunRecord& run, const RunFilter& filter) {
          run.ended_utc >= filter.since && (filter.until.empty() || run.ended_utc < filter.until);
 }
 
-void check_may_void(const StationConfig& station, const std::string& operator_name) {
+void check_void_permission(const StationConfig& station, const std::string& operator_name) {
   const auto& operators = station.void_operators;
   if (operators.empty() ||
       std::find(operators.begin(), operators.end(), operator_name) != operators.end()) {
@@ -49,33 +49,33 @@ void check_may_void(const StationConfig& station, const std::string& operator_na
 KnownRuns::KnownRuns(StationConfig station) : station_(std::move(station)) {
   spool_.emplace(station_->spool, station_->records);
   spool_->deliver();
-  away_ = spool_->away();  // not waited for twice
-  if (away_.empty()) open(station_->records);
-  if (!away_.empty() && waiting().empty()) throw_unavailable();
+  offline_reason_ = spool_->offline_reason();  // not waited for twice
+  if (offline_reason_.empty()) open(station_->records);
+  if (!offline_reason_.empty() && waiting().empty()) throw_unavailable();
 }
 
 KnownRuns::KnownRuns(const std::string& records) {
   open(records);
-  if (!away_.empty()) throw_unavailable();
+  if (!offline_reason_.empty()) throw_unavailable();
 }
 
 void KnownRuns::open(const std::string& where) {
   try {
-    if (!is_server(where) && !std::filesystem::exists(where)) {
-      throw InputError(name_of_database(where), "there are no records");
+    if (!is_server_address(where) && !std::filesystem::exists(where)) {
+      throw InputError(describe_database(where), "there are no records");
     }
     records_.emplace(where);
-  } catch (const RecordsAway& error) {
-    away_ = error.what();
-    if (spool_) spool_->put_off(error);
+  } catch (const RecordsOffline& error) {
+    offline_reason_ = error.what();
+    if (spool_) spool_->suspend_access(error);
   } catch (const InputError& error) {
-    away_ = error.what();
+    offline_reason_ = error.what();
   }
 }
 
 void KnownRuns::throw_unavailable() {
-  const bool has_notice = spool_ && !spool_->away().empty();
-  throw RecordsUnavailable(has_notice ? spool_->notice() : away_, away_);
+  const bool has_notice = spool_ && !spool_->offline_reason().empty();
+  throw RecordsUnavailable(has_notice ? spool_->notice() : offline_reason_, offline_reason_);
 }
 
 std::vector<RunRecord> KnownRuns::waiting() {
@@ -94,17 +94,17 @@ std::vector<RunSummary> KnownRuns::list(const RunFilter& filter) {
   if (records_) runs = records_->list(filter);
   for (const RunRecord& run : waiting) {
     const RunEvent* event = voided(run);
-    const auto there = std::find_if(runs.begin(), runs.end(),
-                                    [&](const RunSummary& other) { return other.run == run.run; });
-    if (there != runs.end() && event != nullptr) there->voided = event->text;
-    if (there != runs.end() || !passes(run, filter)) continue;
+    const auto existing = std::find_if(
+        runs.begin(), runs.end(), [&](const RunSummary& other) { return other.run == run.run; });
+    if (existing != runs.end() && event != nullptr) existing->voided = event->text;
+    if (existing != runs.end() || !matches_filter(run, filter)) continue;
     runs.push_back({run.run, run.kind, run.station, run.camera, run.ended_utc, run.verdict,
                     "(waits here) " + run.causes, event == nullptr ? "" : event->text});
   }
   std::stable_sort(runs.begin(), runs.end(), [](const RunSummary& a, const RunSummary& b) {
     return std::tie(a.ended_utc, a.run) < std::tie(b.ended_utc, b.run);
   });
-  return last_of(std::move(runs), filter.last);
+  return keep_last(std::move(runs), filter.last);
 }
 
 RunRecord KnownRuns::find(const std::string& run) {
@@ -122,7 +122,7 @@ RunRecord KnownRuns::last(const RunFilter& filter) {
   return find(runs.back().run);
 }
 
-std::vector<RunRecord> KnownRuns::whole(const RunFilter& filter) {
+std::vector<RunRecord> KnownRuns::load_all(const RunFilter& filter) {
   std::vector<RunRecord> runs;
   for (const RunSummary& run : records().list(filter)) {
     if (auto record = records().find(run.run)) runs.push_back(std::move(*record));
@@ -130,9 +130,9 @@ std::vector<RunRecord> KnownRuns::whole(const RunFilter& filter) {
   return runs;
 }
 
-std::vector<std::string> KnownRuns::with_open_hook() {
-  if (spool_) return spool_->with_open_hook(station_->station);
-  return records().with_open_hook("");
+std::vector<std::string> KnownRuns::find_open_hooks() {
+  if (spool_) return spool_->find_open_hooks(station_->station);
+  return records().find_open_hooks("");
 }
 
 std::optional<double> RunCounts::yield() const {
@@ -153,11 +153,11 @@ RunCounts count_runs(std::span<const RunSummary> runs) {
       ++counts.voided;
       continue;
     }
-    const bool passed = run.verdict == name_of(Verdict::pass);
-    const bool failed = run.verdict == name_of(Verdict::fail);
+    const bool passed = run.verdict == to_string(Verdict::pass);
+    const bool failed = run.verdict == to_string(Verdict::fail);
     if (passed) ++counts.passed;
     if (failed) ++counts.failed;
-    if (run.verdict == name_of(Verdict::invalid)) ++counts.invalid;
+    if (run.verdict == to_string(Verdict::invalid)) ++counts.invalid;
     if (run.kind != "unit") continue;
     if (passed) ++counts.units_passed;
     if (!passed && !failed) continue;
@@ -192,19 +192,19 @@ std::string rename_files(const StationConfig* own_station, const RunRecord& reco
 }
 
 /// Returns true if a hook was called since a run was voided.
-bool is_hook_told(const RunRecord& record) {
+bool is_hook_informed(const RunRecord& record) {
   const auto begin = std::find_if(record.events.begin(), record.events.end(),
                                   [](const RunEvent& event) { return event.what == kVoided; });
   return std::any_of(begin, record.events.end(),
-                     [](const RunEvent& event) { return event.what == kHookWanted; });
+                     [](const RunEvent& event) { return event.what == kHookRequested; });
 }
 
 /// Completes at the station of a run a voiding by the records alone (--records): golden unit, files
 /// and hook. Returns false if no step was missing.
-bool finish_voiding(KnownRuns& known, RunRecord& record, const std::string& who,
-                    const std::optional<HookLock>& lock, Voided& result) {
+bool complete_voiding(KnownRuns& known, RunRecord& record, const std::string& who,
+                      const std::optional<HookLock>& lock, VoidedRun& result) {
   const StationConfig& station = *known.station();
-  bool is_any_done = record.kind == "golden" && forget_golden(station, record.run);
+  bool is_any_done = record.kind == "golden" && invalidate_golden_note(station, record.run);
   try {
     is_any_done = mark_files_voided(record, station.results) || is_any_done;
   } catch (const InputError& error) {
@@ -212,9 +212,9 @@ bool finish_voiding(KnownRuns& known, RunRecord& record, const std::string& who,
         fmt::format("the run is voided, but its files keep their names: {}", error.what());
     is_any_done = true;
   }
-  if (!lock || is_hook_told(record)) return is_any_done;
+  if (!lock || is_hook_informed(record)) return is_any_done;
   Spool& spool = *known.spool();
-  record.events.push_back(hook_wanted(*station.hook, who));
+  record.events.push_back(make_hook_request(*station.hook, who));
   spool.keep(record);
   spool.deliver();
   result.problem = call_hook(*station.hook, record, *lock, spool);
@@ -223,15 +223,15 @@ bool finish_voiding(KnownRuns& known, RunRecord& record, const std::string& who,
 
 }  // namespace
 
-Voided void_run(KnownRuns& known, const std::string& run, const std::string& operator_name,
-                const std::string& reason) {
-  Voided result{known.find(run)};
+VoidedRun void_run(KnownRuns& known, const std::string& run, const std::string& operator_name,
+                   const std::string& reason) {
+  VoidedRun result{known.find(run)};
   RunRecord& record = result.run;
   const std::string who = printable_line(operator_name);
   const auto& station = known.station();
-  const bool own = station && record.station == station->station;
+  const bool is_own_station = station && record.station == station->station;
   std::optional<HookLock> lock;
-  if (own && station->hook) {
+  if (is_own_station && station->hook) {
     lock.emplace(known.spool()->folder(), record.run);
     // The result of that hook would be mistaken for that of the hook about the voiding.
     if (!lock->held()) {
@@ -239,23 +239,23 @@ Voided void_run(KnownRuns& known, const std::string& run, const std::string& ope
     }
     record = known.find(run);  // it can have been voided before the lock was acquired
   }
-  const StationConfig* own_station = own ? &*station : nullptr;
-  if (own) check_may_void(*station, operator_name);
+  const StationConfig* own_station = is_own_station ? &*station : nullptr;
+  if (is_own_station) check_void_permission(*station, operator_name);
   if (const RunEvent* event = voided(record)) {
-    if (own && finish_voiding(known, record, who, lock, result)) return result;
+    if (is_own_station && complete_voiding(known, record, who, lock, result)) return result;
     throw std::invalid_argument(
         fmt::format("run {} was voided before, by {}: {}", record.run, event->who, event->text));
   }
-  record.events.push_back(new_event(kVoided, printable_line(reason), who));
+  record.events.push_back(make_event(kVoided, printable_line(reason), who));
   if (!station) {
     known.records().keep(record);
     result.files_problem = rename_files(own_station, record);
     return result;
   }
   Spool& spool = *known.spool();
-  if (lock) record.events.push_back(hook_wanted(*station->hook, who));
+  if (lock) record.events.push_back(make_hook_request(*station->hook, who));
   spool.keep(record);
-  if (own && record.kind == "golden") forget_golden(*station, record.run);
+  if (is_own_station && record.kind == "golden") invalidate_golden_note(*station, record.run);
   result.files_problem = rename_files(own_station, record);
   spool.deliver();
   if (lock) result.problem = call_hook(*station->hook, record, *lock, spool);

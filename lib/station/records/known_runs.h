@@ -42,7 +42,7 @@ class KnownRuns {
   /// Returns the records. Throws RecordsUnavailable if they are offline.
   Records& records();
   /// Returns true if the records are offline. Only the waiting runs are known then.
-  bool are_away() const { return !records_; }
+  bool are_offline() const { return !records_; }
 
   /// Returns the runs of the records, if online, and the waiting runs, in chronological order. The
   /// causes of waiting runs contain a note that they wait.
@@ -53,10 +53,10 @@ class KnownRuns {
   /// Returns the last run that matches the filter. Throws as find().
   RunRecord last(const RunFilter& filter);
   /// Returns the complete runs that the records contain.
-  std::vector<RunRecord> whole(const RunFilter& filter);
-  /// Returns the ids of the station's runs with an open hook (hook_is_open()), which 'vlp-station
+  std::vector<RunRecord> load_all(const RunFilter& filter);
+  /// Returns the ids of the station's runs with an open hook (is_hook_open()), which 'vlp-station
   /// hook' runs.
-  std::vector<std::string> with_open_hook();
+  std::vector<std::string> find_open_hooks();
 
  private:
   void open(const std::string& where);
@@ -67,7 +67,7 @@ class KnownRuns {
   std::optional<Spool> spool_ = {};
   std::optional<Records> records_ = {};
   /// Reason why the records are offline.
-  std::string away_ = {};
+  std::string offline_reason_ = {};
 };
 
 /// Numbers of runs by result; voided runs are counted separately.
@@ -88,7 +88,7 @@ struct RunCounts {
 /// Counts runs. `runs` are in chronological order.
 RunCounts count_runs(std::span<const RunSummary> runs);
 
-struct Voided {
+struct VoidedRun {
   RunRecord run;
   /// Reason why the result of the hook is not recorded; empty if it is.
   std::string problem = {};
@@ -105,7 +105,7 @@ struct Voided {
 /// Throws std::invalid_argument if the operator is not among StationConfig::void_operators of that
 /// station. Throws it, too, if the run was voided before and no step is missing. Throws InputError
 /// if the event cannot be recorded or the hook is running.
-Voided void_run(KnownRuns& known, const std::string& run, const std::string& operator_name,
-                const std::string& reason);
+VoidedRun void_run(KnownRuns& known, const std::string& run, const std::string& operator_name,
+                   const std::string& reason);
 
 }  // namespace vlp

@@ -36,7 +36,7 @@ class Lines {
 
 void add_board(const Board& board, Lines& lines) {
   lines.add("board", board.family);
-  lines.add("id_order", name_of(board.id_order));
+  lines.add("id_order", to_string(board.id_order));
   lines.add({{"kind", static_cast<double>(board.kind)},
              {"cols", board.cols},
              {"rows", board.rows},
@@ -92,19 +92,19 @@ std::string measuring_digest(const StationConfig& config) {
   if (const auto& place_m = config.dispersion_station_m) {
     lines.add({{"station_x_m", place_m->x()}, {"station_y_m", place_m->y()}});
   }
-  const StationEnough& enough = config.enough;
-  lines.add({{"board_views", enough.board_views},
-             {"board_coverage", enough.board_coverage},
-             {"turn_captures", enough.turn_captures},
-             {"turn_heights", enough.turn_heights},
-             {"turn_arc_rad", enough.turn_arc_rad},
-             {"dispersion_captures", enough.dispersion_captures},
-             {"check_captures", enough.check_captures}});
+  const CompletionCriteria& sufficient = config.sufficient;
+  lines.add({{"board_views", sufficient.board_views},
+             {"board_coverage", sufficient.board_coverage},
+             {"turn_captures", sufficient.turn_captures},
+             {"turn_heights", sufficient.turn_heights},
+             {"turn_arc_rad", sufficient.turn_arc_rad},
+             {"dispersion_captures", sufficient.dispersion_captures},
+             {"check_captures", sufficient.check_captures}});
   const FrontendOptions& limits = config.frontend;
   lines.add({{"blur_px", limits.max_blur_px},
              {"dark_share", limits.min_bright_fraction},
              {"same_pose_share", limits.same_view_fraction},
-             {"in_a_row", config.max_rejected_in_a_row}});
+             {"in_a_row", config.max_consecutive_rejections}});
   // Stations without the key keep their digest.
   if (limits.max_white_fraction != FrontendOptions().max_white_fraction) {
     lines.add("white_share", limits.max_white_fraction);

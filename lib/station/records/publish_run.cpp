@@ -18,8 +18,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-Id camera_of(const RunRecord& record) { return {record.camera, "the record of a run", "camera"}; }
-Id run_of(const RunRecord& record) { return {record.run, "the record of a run", "run"}; }
+Id describe_camera(const RunRecord& record) {
+  return {record.camera, "the record of a run", "camera"};
+}
+Id describe_run(const RunRecord& record) { return {record.run, "the record of a run", "run"}; }
 
 /// Returns true if a file has this content. A longer one, a link and a pipe do not.
 bool holds(const SharedFolder& folder, const std::string& name, const std::string& content) {
@@ -47,7 +49,7 @@ fs::path write_calibration(const RunRecord& record, const SharedFolder& folder) 
 void check_results(const fs::path& results, const std::string& camera) {
   constexpr std::uintmax_t room_bytes = 8'000'000;
   make_folder(results);
-  check_room(SharedFolder(results).make_folder({camera, results, "camera"}), room_bytes);
+  check_free_space(SharedFolder(results).make_folder({camera, results, "camera"}), room_bytes);
 }
 
 const char* calibration_name(const RunRecord& record) {
@@ -65,8 +67,8 @@ bool mark_files_voided(const RunRecord& record, const fs::path& results) {
                              std::pair("replaced-report.html", "voided-replaced-report.html")};
   std::error_code missing;
   if (!fs::is_directory(results, missing)) return false;
-  const auto camera = SharedFolder(results).find_folder(camera_of(record));
-  const auto folder = camera ? camera->find_folder(run_of(record)) : std::nullopt;
+  const auto camera = SharedFolder(results).find_folder(describe_camera(record));
+  const auto folder = camera ? camera->find_folder(describe_run(record)) : std::nullopt;
   if (!folder) return false;
   bool is_any_renamed = false;
   for (const auto& [name, voided_name] : names) {
@@ -76,12 +78,12 @@ bool mark_files_voided(const RunRecord& record, const fs::path& results) {
 }
 
 SharedFolder open_run_folder(const RunRecord& record, const fs::path& results) {
-  const Id camera = camera_of(record), run = run_of(record);
+  const Id camera = describe_camera(record), run = describe_run(record);
   make_folder(results);
   return SharedFolder(results).make_folder(camera).make_folder(run);
 }
 
-fs::path publish_run(const RunRecord& record, const std::vector<ReportPicture>& pictures,
+fs::path publish_run(const RunRecord& record, const std::vector<ReportPlot>& pictures,
                      const fs::path& results, ExistingReport existing) {
   const SharedFolder folder = open_run_folder(record, results);
   fs::path calibration;
@@ -89,7 +91,7 @@ fs::path publish_run(const RunRecord& record, const std::vector<ReportPicture>& 
   const std::string name = voided(record) ? "voided-report.html" : "report.html";
   const bool is_there = folder.has(name);
   if (is_there && existing == ExistingReport::keep) return folder.path();
-  const std::string report = unit_report(record, calibration, pictures);
+  const std::string report = make_unit_report(record, calibration, pictures);
   if (is_there && holds(folder, name, report)) return folder.path();
   // The first one is kept: those that a restoring has drawn can be drawn again.
   const std::string replaced = "replaced-" + name;

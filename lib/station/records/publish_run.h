@@ -37,8 +37,7 @@ SharedFolder open_run_folder(const RunRecord& record, const std::filesystem::pat
 /// calibration, if the run has one, as calibration_name(), and then report.html with `pictures`.
 /// Can be repeated at any time. Throws InputError, also if the existing calibration differs from
 /// the record's.
-std::filesystem::path publish_run(const RunRecord& record,
-                                  const std::vector<ReportPicture>& pictures,
+std::filesystem::path publish_run(const RunRecord& record, const std::vector<ReportPlot>& pictures,
                                   const std::filesystem::path& results,
                                   ExistingReport existing = ExistingReport::keep);
 

@@ -113,16 +113,16 @@ bool is_sqlite(soci::session& sql) { return sql.get_backend_name() == "sqlite3";
 
 /// Returns the version of the tables; 0 without tables. Throws for a later version than this
 /// program's.
-int version_of(soci::session& sql) {
+int load_table_version(soci::session& sql) {
   // Not to_regclass(): an earlier result of a connection can be cached, and be wrong after waiting
   // for the lock.
-  const char* const look =
+  const char* const query =
       is_sqlite(sql)
           ? "SELECT COUNT(*) FROM sqlite_master WHERE type = 'table' AND name = 'vlp_schema'"
           : "SELECT COUNT(*) FROM pg_tables WHERE tablename = 'vlp_schema' AND "
             "schemaname = ANY (current_schemas(false))";
   int tables_there = 0, version = 0;
-  sql << look, soci::into(tables_there);
+  sql << query, soci::into(tables_there);
   if (tables_there == 0) return 0;
   sql << "SELECT COALESCE(MAX(version), 0) FROM vlp_schema", soci::into(version);
   if (version <= kSchemaVersion) return version;
@@ -137,7 +137,7 @@ const int kSchemaVersion = static_cast<int>(kMigrations.size()) + 1;
 
 bool has_record_tables(soci::session& sql) {
   // Versions only increase. Takes no lock, so that read-only users can call it.
-  return version_of(sql) == kSchemaVersion;
+  return load_table_version(sql) == kSchemaVersion;
 }
 
 void make_record_tables(soci::session& sql) {
@@ -150,9 +150,9 @@ void make_record_tables(soci::session& sql) {
   } else {
     // CREATE TABLE IF NOT EXISTS alone fails, in several ways, concurrently with another of the
     // same table.
-    sql << "SELECT pg_advisory_xact_lock(" + std::to_string(kLockOfTables) + ")";
+    sql << "SELECT pg_advisory_xact_lock(" + std::to_string(kTableLockId) + ")";
   }
-  if (version_of(sql) == 0) {
+  if (load_table_version(sql) == 0) {
     for (const std::string& table : tables()) sql << table;
     sql << "INSERT INTO vlp_schema (version) SELECT CAST(:version AS INTEGER) WHERE NOT EXISTS "
            "(SELECT 1 FROM vlp_schema)",
@@ -160,12 +160,12 @@ void make_record_tables(soci::session& sql) {
   }
   // Waits for current writers.
   lock_trail(sql);
-  const int found = version_of(sql);
+  const int found = load_table_version(sql);
   for (int version = found; version < kSchemaVersion; ++version) {
     kMigrations.at(static_cast<std::size_t>(version) - 1)(sql);
   }
   // Requires all columns.
-  if (found < kFirstWithTrail) append_all(sql);
+  if (found < kFirstWithTrail) append_all_runs(sql);
   if (found < kSchemaVersion) {
     sql << "UPDATE vlp_schema SET version = :version", soci::use(kSchemaVersion);
   }

@@ -16,7 +16,7 @@ bool has_record_tables(soci::session& sql);
 /// Advisory lock of PostgreSQL for creating and migrating tables ("vlp"). Older programs do not
 /// take it. If two programs start with an empty database at the same time, one of them can
 /// therefore fail; a second start then succeeds.
-inline constexpr int kLockOfTables = 0x766c70;
+inline constexpr int kTableLockId = 0x766c70;
 
 /// Creates the tables of the records, identical in SQLite and PostgreSQL, or migrates tables of an
 /// earlier version. Runs in one transaction and in one program at a time. Throws soci::soci_error,

@@ -28,15 +28,15 @@ namespace vlp {
 namespace {
 
 /// Configures a new connection.
-void set_up(soci::session& sql, int patience_s) {
+void configure_connection(soci::session& sql, int timeout_s) {
   if (sql.get_backend_name() == "postgresql") {
     sql << "SET client_min_messages TO warning";
     // Ends before this program's time limit, so that the server reports what it waits for.
-    constexpr int of_patience_ms = 900;
-    sql << "SET lock_timeout TO " + std::to_string(patience_s * of_patience_ms);
+    constexpr int ms_per_timeout_s = 900;
+    sql << "SET lock_timeout TO " + std::to_string(timeout_s * ms_per_timeout_s);
     // An idle transaction holds the trail for no longer than others wait for it.
     sql << "SET idle_in_transaction_session_timeout TO " +
-               std::to_string(patience_s * of_patience_ms);
+               std::to_string(timeout_s * ms_per_timeout_s);
     // A program that waited for a lock sees the changes of the other.
     sql << "SET SESSION CHARACTERISTICS AS TRANSACTION ISOLATION LEVEL READ COMMITTED";
     // Committed data is on the disk, regardless of the server's settings.
@@ -50,20 +50,19 @@ void set_up(soci::session& sql, int patience_s) {
 }
 
 void open(soci::session& sql, const std::string& where) {
-  if (is_server(where)) {
-    sql.open(soci::postgresql, connection_of(where));
+  if (is_server_address(where)) {
+    sql.open(soci::postgresql, make_connection_string(where));
   } else {
     if (where.find('"') != std::string::npos) {
       throw InputError(where, "the name of a database cannot have a quote (\"): rename its folder");
     }
-    sql.open(soci::sqlite3,
-             "dbname=\"" + where + "\" timeout=" + std::to_string(patience_s(where)));
+    sql.open(soci::sqlite3, "dbname=\"" + where + "\" timeout=" + std::to_string(timeout_s(where)));
   }
 }
 
 /// Returns true if a later attempt can succeed: another program holds a lock, or the file cannot be
 /// opened or read.
-bool may_pass(const soci::soci_error& error) {
+bool is_transient(const soci::soci_error& error) {
   if (const auto* file = dynamic_cast<const soci::sqlite3_soci_error*>(&error)) {
     constexpr int without_extension = 0xff;
     const int result = file->result() & without_extension;
@@ -77,45 +76,45 @@ bool may_pass(const soci::soci_error& error) {
 }
 
 /// Returns true if the server's user lacks the right for the statement.
-bool lacks_rights(const soci::soci_error& error) {
+bool lacks_privilege(const soci::soci_error& error) {
   const auto* server = dynamic_cast<const soci::postgresql_soci_error*>(&error);
   constexpr const char* insufficient_privilege = "42501";
   return server != nullptr && server->sqlstate() == insufficient_privilege;
 }
 
-/// Closes a connection without progress for patience_s(). libpq waits forever for a frozen server,
+/// Closes a connection without progress for timeout_s(). libpq waits forever for a frozen server,
 /// which does not apply its own limits either.
-class Watch {
+class ConnectionWatchdog {
  public:
-  Watch(soci::session& sql, int patience_s) : patience_(patience_s) {
-    if (patience_s <= 0 || sql.get_backend_name() != "postgresql") return;
+  ConnectionWatchdog(soci::session& sql, int timeout_s) : timeout_(timeout_s) {
+    if (timeout_s <= 0 || sql.get_backend_name() != "postgresql") return;
     const auto* server = static_cast<soci::postgresql_session_backend*>(sql.get_backend());
     // Own descriptor: libpq closes its socket when the connection is lost, and its number can be
     // reused.
     socket_ = ::fcntl(PQsocket(server->conn_), F_DUPFD_CLOEXEC, 0);
     if (socket_ >= 0) thread_ = std::thread([this] { wait(); });
   }
-  ~Watch() {
+  ~ConnectionWatchdog() {
     if (socket_ < 0) return;
     {
       const std::lock_guard lock(mutex_);
-      over_ = true;
+      is_finished_ = true;
     }
     changed_.notify_one();
     thread_.join();
     ::close(socket_);
   }
-  Watch(const Watch&) = delete;
-  Watch& operator=(const Watch&) = delete;
+  ConnectionWatchdog(const ConnectionWatchdog&) = delete;
+  ConnectionWatchdog& operator=(const ConnectionWatchdog&) = delete;
 
   /// Restarts the time limit.
-  void heard() {
+  void on_progress() {
     const std::lock_guard lock(mutex_);
     last_ = Clock::now();
   }
-  bool ended_it() {
+  bool has_timed_out() {
     const std::lock_guard lock(mutex_);
-    return ended_it_;
+    return has_timed_out_;
   }
 
  private:
@@ -123,10 +122,10 @@ class Watch {
 
   void wait() {
     std::unique_lock lock(mutex_);
-    while (!over_) {
-      const auto until = last_ + patience_;
+    while (!is_finished_) {
+      const auto until = last_ + timeout_;
       if (Clock::now() >= until) {
-        ended_it_ = true;
+        has_timed_out_ = true;
         ::shutdown(socket_, SHUT_RDWR);
         return;
       }
@@ -134,9 +133,9 @@ class Watch {
     }
   }
 
-  std::chrono::seconds patience_;
+  std::chrono::seconds timeout_;
   Clock::time_point last_ = Clock::now();
-  bool over_ = false, ended_it_ = false;
+  bool is_finished_ = false, has_timed_out_ = false;
   int socket_ = -1;
   std::mutex mutex_;
   std::condition_variable changed_;
@@ -148,7 +147,7 @@ class Watch {
 struct Records::Database {
   /// `name` is for messages.
   std::string where, name;
-  int patience_s = 0;
+  int timeout_s = 0;
   soci::session sql;
 
   /// True if the tables exist; from then on a lost connection is opened again.
@@ -161,15 +160,17 @@ struct Records::Database {
     const std::string soci = "Cannot establish connection to the database. ";
     if (what.starts_with(soci)) what.erase(0, soci.size());
     constexpr std::chrono::seconds soon(2);
-    const bool refused = std::chrono::steady_clock::now() - begun < soon && answers(where);
-    if (!refused) throw RecordsAway(name, "the server of the records cannot be reached: " + what);
+    const bool refused =
+        std::chrono::steady_clock::now() - begun < soon && is_server_responding(where);
+    if (!refused)
+      throw RecordsOffline(name, "the server of the records cannot be reached: " + what);
     throw RecordsRefused(
         name, "the server of the records answers, but refuses 'records' as it is: " + what);
   }
 
   /// Runs an action; its errors name the database.
   template <typename Action>
-  auto named(const Action& action) {
+  auto with_database_name(const Action& action) {
     const auto begun = std::chrono::steady_clock::now();
     try {
       return action();
@@ -181,10 +182,10 @@ struct Records::Database {
           what.begin(), what.end(), [](char c) { return c == '\n' || c == '\t'; }, ' ');
       if (name.starts_with("postgresql://") && !sql.is_connected())
         throw_not_connected(what, begun);
-      if (lacks_rights(error)) {
+      if (lacks_privilege(error)) {
         throw RecordsRefused(name, "the user of the records lacks a right: " + what);
       }
-      if (may_pass(error)) throw RecordsAway(name, "the records: " + what);
+      if (is_transient(error)) throw RecordsOffline(name, "the records: " + what);
       throw InputError(name, "the records: " + what);
     } catch (const std::exception& error) {
       throw InputError(name, error.what());
@@ -194,35 +195,35 @@ struct Records::Database {
   /// Runs an action, a second time after a lost connection. The action reports its progress to the
   /// watch.
   template <typename Action>
-  auto run(const Action& action, int times_the_patience = 1) {
-    return named([&] {
+  auto run(const Action& action, int timeout_factor = 1) {
+    return with_database_name([&] {
       try {
-        return watched(action, times_the_patience);
+        return run_watched(action, timeout_factor);
       } catch (const soci::soci_error&) {
         if (!ready || sql.is_connected()) throw;
       }
       // A unit takes minutes, in which the server can restart or the network can fail.
       sql.reconnect();
-      return watched(
-          [&](Watch& watch) {
-            set_up(sql, patience_s);
-            watch.heard();
+      return run_watched(
+          [&](ConnectionWatchdog& watch) {
+            configure_connection(sql, timeout_s);
+            watch.on_progress();
             return action(watch);
           },
-          times_the_patience);
+          timeout_factor);
     });
   }
 
  private:
   template <typename Action>
-  auto watched(const Action& action, int times_the_patience) {
-    Watch watch(sql, times_the_patience * patience_s);
+  auto run_watched(const Action& action, int timeout_factor) {
+    ConnectionWatchdog watch(sql, timeout_factor * timeout_s);
     try {
       return action(watch);
     } catch (const soci::soci_error&) {
-      if (!watch.ended_it()) throw;
-      throw RecordsAway(name, "the server of the records has not answered for " +
-                                  std::to_string(times_the_patience * patience_s) + " s");
+      if (!watch.has_timed_out()) throw;
+      throw RecordsOffline(name, "the server of the records has not answered for " +
+                                     std::to_string(timeout_factor * timeout_s) + " s");
     }
   }
 };
@@ -230,9 +231,9 @@ struct Records::Database {
 namespace {
 
 /// Factor of the time limit for many rows: the server collects them before it sends the first one.
-constexpr int kManyRows = 10;
+constexpr int kManyRowsTimeoutFactor = 10;
 /// Factor of the time limit for tables: an hour by default, for an index of all images.
-constexpr int kAllTables = 360;
+constexpr int kMigrationTimeoutFactor = 360;
 
 bool same_texts(const RunRecord& a, const RunRecord& b) {
   const auto fields = run_fields();
@@ -240,38 +241,41 @@ bool same_texts(const RunRecord& a, const RunRecord& b) {
                      [&](const RunField& field) { return a.*field.text == b.*field.text; });
 }
 
-void put_figures(soci::session& sql, const RunRecord& record, Watch& watch) {
+void insert_metrics(soci::session& sql, const RunRecord& record, ConnectionWatchdog& watch) {
   int place = 0;
-  for (const CheckedMetric& figure : record.figures) {
-    const double value = figure.value.value_or(0), gate = figure.limit.value_or(0);
-    soci::indicator has_value = figure.value ? soci::i_ok : soci::i_null;
-    soci::indicator has_gate = figure.limit ? soci::i_ok : soci::i_null;
-    const auto [uncertainty, guard_k] = figure.guard.value_or(GuardBand{});
-    soci::indicator has_guard = figure.guard ? soci::i_ok : soci::i_null;
-    const int at_least = figure.asked == Direction::at_least ? 1 : 0, met = figure.met() ? 1 : 0;
+  for (const CheckedMetric& metric : record.metrics) {
+    const double value = metric.value.value_or(0), gate = metric.limit.value_or(0);
+    soci::indicator has_value = metric.value ? soci::i_ok : soci::i_null;
+    soci::indicator has_gate = metric.limit ? soci::i_ok : soci::i_null;
+    const auto [uncertainty, guard_k] = metric.guard.value_or(GuardBand{});
+    soci::indicator has_guard = metric.guard ? soci::i_ok : soci::i_null;
+    const int at_least = metric.direction == Direction::at_least ? 1 : 0,
+              passed = metric.passed() ? 1 : 0;
     ++place;
     sql << "INSERT INTO figures (run, place, name, value, gate, at_least, met, unit, uncertainty, "
            "guard_k) VALUES (:run, :place, :name, :value, :gate, :at_least, :met, :unit, "
            ":uncertainty, :guard_k)",
-        soci::use(record.run), soci::use(place), soci::use(figure.name),
-        soci::use(value, has_value), soci::use(gate, has_gate), soci::use(at_least), soci::use(met),
-        soci::use(figure.unit), soci::use(uncertainty, has_guard), soci::use(guard_k, has_guard);
-    watch.heard();
+        soci::use(record.run), soci::use(place), soci::use(metric.name),
+        soci::use(value, has_value), soci::use(gate, has_gate), soci::use(at_least),
+        soci::use(passed), soci::use(metric.unit), soci::use(uncertainty, has_guard),
+        soci::use(guard_k, has_guard);
+    watch.on_progress();
   }
 }
 
-void put_images(soci::session& sql, const RunRecord& record, Watch& watch) {
+void insert_images(soci::session& sql, const RunRecord& record, ConnectionWatchdog& watch) {
   for (const auto& [step, name, sha256, refused] : record.images) {
     sql << "INSERT INTO images (run, step, image, sha256, refused) VALUES (:run, :step, :image, "
            ":sha256, :refused)",
         soci::use(record.run), soci::use(step), soci::use(name), soci::use(sha256),
         soci::use(refused);
-    watch.heard();
+    watch.on_progress();
   }
 }
 
 /// Stores the new events. Returns their contents for the trail.
-std::vector<TrailContent> put_events(soci::session& sql, const RunRecord& record, Watch& watch) {
+std::vector<TrailContent> insert_events(soci::session& sql, const RunRecord& record,
+                                        ConnectionWatchdog& watch) {
   std::vector<TrailContent> added;
   for (const RunEvent& event : record.events) {
     soci::statement insert =
@@ -280,8 +284,8 @@ std::vector<TrailContent> put_events(soci::session& sql, const RunRecord& record
          soci::use(event.event), soci::use(record.run), soci::use(event.what),
          soci::use(event.text), soci::use(event.who));
     insert.execute(true);
-    if (insert.get_affected_rows() > 0) added.push_back(content_of_event(record.run, event));
-    watch.heard();
+    if (insert.get_affected_rows() > 0) added.push_back(make_event_content(record.run, event));
+    watch.on_progress();
   }
   return added;
 }
@@ -290,7 +294,7 @@ std::vector<TrailContent> put_events(soci::session& sql, const RunRecord& record
 const std::string kNotVoided =
     "NOT EXISTS (SELECT 1 FROM events WHERE events.run = runs.run AND events.what = 'voided')";
 
-std::string condition(const RunFilter& filter) {
+std::string make_condition(const RunFilter& filter) {
   std::string text = "WHERE 1 = 1";
   if (!filter.camera.empty()) text += " AND runs.camera = :camera";
   if (!filter.station.empty()) text += " AND runs.station = :station";
@@ -303,7 +307,7 @@ std::string condition(const RunFilter& filter) {
   return text;
 }
 
-void bind(soci::statement& statement, const RunFilter& filter) {
+void bind_filter(soci::statement& statement, const RunFilter& filter) {
   for (const std::string* value :
        {&filter.camera, &filter.station, &filter.verdict, &filter.kind, &filter.operator_name,
         &filter.shift, &filter.since, &filter.until}) {
@@ -314,22 +318,23 @@ void bind(soci::statement& statement, const RunFilter& filter) {
 /// Returns the rows of a query, with its columns in the members of `Row`; a non-empty `figure` is
 /// bound after the filter.
 template <typename Row>
-std::vector<Row> rows_of(soci::session& sql, const std::string& query, const RunFilter& filter,
-                         const std::string& figure, std::initializer_list<std::string Row::*> texts,
-                         double Row::*value = nullptr) {
+std::vector<Row> query_rows(soci::session& sql, const std::string& query, const RunFilter& filter,
+                            const std::string& metric,
+                            std::initializer_list<std::string Row::*> texts,
+                            double Row::*value = nullptr) {
   Row row;
   std::vector<Row> rows;
   soci::statement statement(sql);
   for (std::string Row::*text : texts) statement.exchange(soci::into(row.*text));
   if (value != nullptr) statement.exchange(soci::into(row.*value));
-  bind(statement, filter);
-  if (!figure.empty()) statement.exchange(soci::use(figure));
+  bind_filter(statement, filter);
+  if (!metric.empty()) statement.exchange(soci::use(metric));
   statement.alloc();
   statement.prepare(query);
   statement.define_and_bind();
   statement.execute();
   while (statement.fetch()) rows.push_back(row);
-  return last_of(std::move(rows), filter.last);
+  return keep_last(std::move(rows), filter.last);
 }
 
 }  // namespace
@@ -337,11 +342,11 @@ std::vector<Row> rows_of(soci::session& sql, const std::string& query, const Run
 std::string utc_problem(const std::string& text) {
   const std::string form = "0000-00-00T00:00:00Z";
   constexpr std::array<std::size_t, 4> lengths{10, 16, 19, 20};
-  bool good = std::find(lengths.begin(), lengths.end(), text.size()) != lengths.end();
-  for (std::size_t i = 0; good && i < text.size(); ++i) {
-    good = form[i] == '0' ? text[i] >= '0' && text[i] <= '9' : text[i] == form[i];
+  bool is_valid = std::find(lengths.begin(), lengths.end(), text.size()) != lengths.end();
+  for (std::size_t i = 0; is_valid && i < text.size(); ++i) {
+    is_valid = form[i] == '0' ? text[i] >= '0' && text[i] <= '9' : text[i] == form[i];
   }
-  if (good) {
+  if (is_valid) {
     const auto at = [&](std::size_t begin) {
       return static_cast<unsigned>(std::stoul(text.substr(begin, 2)));
     };
@@ -350,13 +355,13 @@ std::string utc_problem(const std::string& text) {
     const auto below = [&](std::size_t begin, unsigned end) {
       return text.size() < begin + 2 || at(begin) < end;
     };
-    good = (year / std::chrono::month(at(month)) / std::chrono::day(at(day))).ok() &&
-           below(hour, 24) && below(minute, 60) && below(second, 60);
+    is_valid = (year / std::chrono::month(at(month)) / std::chrono::day(at(day))).ok() &&
+               below(hour, 24) && below(minute, 60) && below(second, 60);
   }
-  return good ? "" : "should be a UTC as 2026-11-21 or 2026-11-21T13:45, not " + text;
+  return is_valid ? "" : "should be a UTC as 2026-11-21 or 2026-11-21T13:45, not " + text;
 }
 
-std::vector<double> values_of(std::span<const TrendPoint> points) {
+std::vector<double> extract_values(std::span<const TrendPoint> points) {
   std::vector<double> values;
   values.reserve(points.size());
   for (const TrendPoint& point : points) values.push_back(point.value);
@@ -365,22 +370,24 @@ std::vector<double> values_of(std::span<const TrendPoint> points) {
 
 Records::Records(const std::string& where) : database_(std::make_unique<Database>()) {
   database_->where = where;
-  database_->name = name_of_database(where);
-  database_->patience_s = patience_s(where);
-  database_->named([&] { open(database_->sql, where); });
-  const bool are_there = database_->run([&](Watch& watch) {
-    set_up(database_->sql, database_->patience_s);
-    watch.heard();
+  database_->name = describe_database(where);
+  database_->timeout_s = timeout_s(where);
+  database_->with_database_name([&] { open(database_->sql, where); });
+  const bool are_there = database_->run([&](ConnectionWatchdog& watch) {
+    configure_connection(database_->sql, database_->timeout_s);
+    watch.on_progress();
     return has_record_tables(database_->sql);
   });
-  if (!are_there) database_->run([&](Watch&) { make_record_tables(database_->sql); }, kAllTables);
+  if (!are_there)
+    database_->run([&](ConnectionWatchdog&) { make_record_tables(database_->sql); },
+                   kMigrationTimeoutFactor);
   database_->ready = true;
 }
 
 Records::~Records() = default;
 
 void Records::keep(const RunRecord& record) {
-  database_->run([&](Watch& watch) {
+  database_->run([&](ConnectionWatchdog& watch) {
     soci::session& sql = database_->sql;
     soci::transaction transaction(sql);
     // Writes first, so that the transaction waits for others before it reads.
@@ -396,17 +403,17 @@ void Records::keep(const RunRecord& record) {
                    ") ON CONFLICT (run) DO NOTHING");
     insert.define_and_bind();
     insert.execute(true);
-    watch.heard();
+    watch.on_progress();
     std::vector<TrailContent> added;
     if (insert.get_affected_rows() > 0) {
-      put_figures(sql, record, watch);
-      put_images(sql, record, watch);
-      added.push_back(content_of_run(sql, record.run));
-    } else if (const auto kept = texts_of_run(sql, record.run);
+      insert_metrics(sql, record, watch);
+      insert_images(sql, record, watch);
+      added.push_back(make_run_content(sql, record.run));
+    } else if (const auto kept = load_run_header(sql, record.run);
                !kept || !same_texts(*kept, record)) {
       throw InputError(database_->name, "has another run " + record.run);
     }
-    for (TrailContent& event : put_events(sql, record, watch)) added.push_back(std::move(event));
+    for (TrailContent& event : insert_events(sql, record, watch)) added.push_back(std::move(event));
     // Last, because all stations that share the records wait for it.
     append_to_trail(sql, added);
     transaction.commit();
@@ -414,15 +421,15 @@ void Records::keep(const RunRecord& record) {
 }
 
 void Records::check_writable() {
-  database_->run([&](Watch&) {
+  database_->run([&](ConnectionWatchdog&) {
     soci::transaction transaction(database_->sql);
     lock_trail(database_->sql);
     transaction.rollback();
   });
 }
 
-ImageOwner Records::owner_of(const std::string& sha256, const std::string& other_than_camera) {
-  return database_->run([&](Watch&) {
+ImageOwner Records::find_owner(const std::string& sha256, const std::string& other_than_camera) {
+  return database_->run([&](ConnectionWatchdog&) {
     std::string camera, run;
     database_->sql << "SELECT runs.camera, runs.run FROM images JOIN runs ON runs.run = images.run "
                       "WHERE images.sha256 = :sha256 AND images.refused = '' AND runs.camera <> "
@@ -433,13 +440,13 @@ ImageOwner Records::owner_of(const std::string& sha256, const std::string& other
   });
 }
 
-std::vector<std::string> Records::judged_runs_with(const std::string& sha256,
+std::vector<std::string> Records::find_judged_runs(const std::string& sha256,
                                                    const std::string& camera) {
   return database_->run(
-      [&](Watch&) {
+      [&](ConnectionWatchdog&) {
         std::string run;
         std::vector<std::string> runs;
-        const std::string invalid = name_of(Verdict::invalid);
+        const std::string invalid = to_string(Verdict::invalid);
         soci::statement judged =
             (database_->sql.prepare
                  << "SELECT DISTINCT runs.run FROM images JOIN runs ON runs.run = images.run WHERE "
@@ -453,10 +460,10 @@ std::vector<std::string> Records::judged_runs_with(const std::string& sha256,
       });
 }
 
-std::string Records::golden_run_of(const std::string& sha256) {
-  return database_->run([&](Watch&) {
+std::string Records::find_golden_run(const std::string& sha256) {
+  return database_->run([&](ConnectionWatchdog&) {
     std::string run;
-    const std::string invalid = name_of(Verdict::invalid);
+    const std::string invalid = to_string(Verdict::invalid);
     database_->sql << "SELECT runs.run FROM images JOIN runs ON runs.run = images.run WHERE "
                       "images.sha256 = :sha256 AND images.refused = '' AND runs.kind = 'golden' "
                       "AND runs.verdict <> :invalid ORDER BY runs.run LIMIT 1",
@@ -465,12 +472,12 @@ std::string Records::golden_run_of(const std::string& sha256) {
   });
 }
 
-std::vector<std::string> Records::with_open_hook(const std::string& station) {
+std::vector<std::string> Records::find_open_hooks(const std::string& station) {
   return database_->run(
-      [&](Watch&) {
+      [&](ConnectionWatchdog&) {
         std::string run;
         std::vector<std::string> runs;
-        const std::string wanted = kHookWanted, done = kHookDone;
+        const std::string wanted = kHookRequested, done = kHookDone;
         soci::statement open =
             (database_->sql.prepare
                  << "SELECT DISTINCT events.run FROM events JOIN runs ON runs.run = events.run "
@@ -483,7 +490,7 @@ std::vector<std::string> Records::with_open_hook(const std::string& station) {
         while (open.fetch()) runs.push_back(run);
         return runs;
       },
-      kManyRows);
+      kManyRowsTimeoutFactor);
 }
 
 std::vector<RunSummary> Records::list(const RunFilter& filter) {
@@ -492,51 +499,51 @@ std::vector<RunSummary> Records::list(const RunFilter& filter) {
       "SELECT run, kind, station, camera, ended_utc, verdict, causes, COALESCE((SELECT "
       "MIN(events.text) FROM events WHERE events.run = runs.run AND events.what = 'voided'), '') "
       "FROM runs " +
-      condition(filter) + " ORDER BY ended_utc, run";
+      make_condition(filter) + " ORDER BY ended_utc, run";
   return database_->run(
-      [&](Watch&) {
-        return rows_of<Line>(database_->sql, query, filter, "",
-                             {&Line::run, &Line::kind, &Line::station, &Line::camera,
-                              &Line::ended_utc, &Line::verdict, &Line::causes, &Line::voided});
+      [&](ConnectionWatchdog&) {
+        return query_rows<Line>(database_->sql, query, filter, "",
+                                {&Line::run, &Line::kind, &Line::station, &Line::camera,
+                                 &Line::ended_utc, &Line::verdict, &Line::causes, &Line::voided});
       },
-      kManyRows);
+      kManyRowsTimeoutFactor);
 }
 
-std::vector<TrendPoint> Records::trend(const std::string& figure, const RunFilter& filter) {
+std::vector<TrendPoint> Records::trend(const std::string& metric, const RunFilter& filter) {
   using Point = TrendPoint;
   const std::string query =
       "SELECT runs.run, runs.station, runs.camera, runs.verdict, runs.ended_utc, figures.value "
       "FROM runs JOIN figures ON figures.run = runs.run " +
-      condition(filter) + " AND " + kNotVoided +
+      make_condition(filter) + " AND " + kNotVoided +
       " AND figures.name = :figure AND figures.value IS NOT NULL ORDER BY runs.ended_utc, runs.run";
   return database_->run(
-      [&](Watch&) {
-        return rows_of<Point>(
-            database_->sql, query, filter, figure,
+      [&](ConnectionWatchdog&) {
+        return query_rows<Point>(
+            database_->sql, query, filter, metric,
             {&Point::run, &Point::station, &Point::camera, &Point::verdict, &Point::ended_utc},
             &Point::value);
       },
-      kManyRows);
+      kManyRowsTimeoutFactor);
 }
 
 std::optional<RunRecord> Records::find(const std::string& run) {
-  return database_->run([&](Watch&) { return rows_of_run(database_->sql, run); });
+  return database_->run([&](ConnectionWatchdog&) { return load_run(database_->sql, run); });
 }
 
-TrailCheck Records::check(const std::string& noted) {
+TrailCheck Records::check(const std::string& expected_digest) {
   return database_->run(
-      [&](Watch& watch) {
+      [&](ConnectionWatchdog& watch) {
         soci::session& sql = database_->sql;
         soci::transaction transaction(sql);
         // Consistent snapshot despite concurrent writers; transactions of SQLite always have one.
         if (sql.get_backend_name() == "postgresql") {
           sql << "SET TRANSACTION ISOLATION LEVEL REPEATABLE READ";
         }
-        TrailCheck found = check_trail(sql, noted, [&] { watch.heard(); });
+        TrailCheck found = check_trail(sql, expected_digest, [&] { watch.on_progress(); });
         transaction.rollback();
         return found;
       },
-      kManyRows);
+      kManyRowsTimeoutFactor);
 }
 
 }  // namespace vlp

@@ -44,11 +44,11 @@ struct TrendPoint {
   double value;
 };
 
-std::vector<double> values_of(std::span<const TrendPoint> points);
+std::vector<double> extract_values(std::span<const TrendPoint> points);
 
 /// Returns the last `last` elements of `rows`; all of them if `last` is 0.
 template <typename Row>
-std::vector<Row> last_of(std::vector<Row> rows, int last) {
+std::vector<Row> keep_last(std::vector<Row> rows, int last) {
   const auto kept = static_cast<std::size_t>(last);
   if (last > 0 && rows.size() > kept) {
     rows.erase(rows.begin(), rows.end() - static_cast<std::ptrdiff_t>(kept));
@@ -58,15 +58,15 @@ std::vector<Row> last_of(std::vector<Row> rows, int last) {
 
 /// Error if records do not respond, refuse the connection or its user, or are locked. A later
 /// attempt can succeed.
-class RecordsAway : public InputError {
+class RecordsOffline : public InputError {
  public:
   using InputError::InputError;
 };
 /// Error if records respond but refuse access: the setting `records` or the server has to be
 /// corrected.
-class RecordsRefused : public RecordsAway {
+class RecordsRefused : public RecordsOffline {
  public:
-  using RecordsAway::RecordsAway;
+  using RecordsOffline::RecordsOffline;
 };
 
 /// Records of one or more stations in a database: an SQLite file, or PostgreSQL by a connection
@@ -78,13 +78,13 @@ class RecordsRefused : public RecordsAway {
 /// other programs. Committed data is on the disk. A lost connection is opened again.
 ///
 /// All functions throw InputError that names the database, without passwords. The error is
-/// RecordsAway if
+/// RecordsOffline if
 /// - the server cannot be reached,
 /// - the server refuses the connection (wrong password, no such database, no TLS), which the
 ///   message states,
 /// - the file cannot be opened,
 /// - another program holds a lock, or
-/// - the time limit expired: patience_s(), 10 times that for queries of many runs, 360 times that
+/// - the time limit expired: timeout_s(), 10 times that for queries of many runs, 360 times that
 ///   for creating or migrating tables.
 class Records {
  public:
@@ -102,23 +102,23 @@ class Records {
   void check_writable();
   /// Returns the first run of another camera, not voided, that uses an image of this digest; empty
   /// if none does.
-  ImageOwner owner_of(const std::string& sha256, const std::string& other_than_camera);
+  ImageOwner find_owner(const std::string& sha256, const std::string& other_than_camera);
   /// Returns the judged runs of a unit, not voided, that use an image of this digest, the earliest
   /// first.
-  std::vector<std::string> judged_runs_with(const std::string& sha256, const std::string& camera);
+  std::vector<std::string> find_judged_runs(const std::string& sha256, const std::string& camera);
   /// Returns the first judged run of a golden unit that uses an image of this digest; empty if none
   /// does.
-  std::string golden_run_of(const std::string& sha256);
-  /// Returns the runs of this station with an open hook (hook_is_open()), in chronological order;
+  std::string find_golden_run(const std::string& sha256);
+  /// Returns the runs of this station with an open hook (is_hook_open()), in chronological order;
   /// those of all stations if `station` is empty.
-  std::vector<std::string> with_open_hook(const std::string& station);
+  std::vector<std::string> find_open_hooks(const std::string& station);
   /// Returns the runs that match the filter, in chronological order.
   std::vector<RunSummary> list(const RunFilter& filter);
   /// Returns the values of a metric in the runs that match the filter, without voided runs.
-  std::vector<TrendPoint> trend(const std::string& figure, const RunFilter& filter);
+  std::vector<TrendPoint> trend(const std::string& metric, const RunFilter& filter);
   /// Checks by the trail (trail.h) that the records are unchanged. `expected_digest` is the last
   /// digest of an earlier check, which the trail must still contain, or empty.
-  TrailCheck check(const std::string& noted);
+  TrailCheck check(const std::string& expected_digest);
 
  private:
   struct Database;

@@ -23,7 +23,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kRunLength = 33;  // of new_run()
+constexpr std::size_t kRunLength = 33;  // of make_run_id()
 
 bool is_older(const std::string& utc, int days) {
   constexpr double seconds_per_day = 86'400;
@@ -93,7 +93,7 @@ bool leads_through(const fs::path& file, const fs::path& folder) {
 bool is_in_use(const fs::path& folder, const StationConfig& config) {
   std::vector<fs::path> needed = config.inputs;
   needed.insert(needed.end(), {config.spool, config.captures, config.results});
-  if (!is_server(config.records)) needed.emplace_back(config.records);
+  if (!is_server_address(config.records)) needed.emplace_back(config.records);
   if (config.hook) {  // its arguments can be files, such as the script of an interpreter
     for (const std::string& word : config.hook->command) {
       if (!word.empty()) needed.push_back(config.hook->folder / word);
@@ -105,7 +105,7 @@ bool is_in_use(const fs::path& folder, const StationConfig& config) {
 }
 
 /// Makes an entry for a folder that is named by this camera and run.
-void add_if_expired(Retained& found, Records& records, const StationConfig& config,
+void add_if_expired(RetentionResult& found, Records& records, const StationConfig& config,
                     const fs::path& folder, const std::string& camera, const std::string& run,
                     const char* what, int days) {
   if (run.size() != kRunLength || !is_older(begun_utc(run), days)) return;
@@ -137,8 +137,8 @@ SharedFolder open_parent(const ExpiredFolder& expired, const StationConfig& conf
 
 }  // namespace
 
-Retained look_for_expired(const StationConfig& config, Records& records) {
-  Retained found;
+RetentionResult find_expired(const StationConfig& config, Records& records) {
+  RetentionResult found;
   if (const auto& days = config.keep.images_days) {
     for (const fs::path& folder : folders_in(config.captures)) {
       const std::string name = folder.filename().string();
@@ -165,9 +165,9 @@ void check_clock(const StationConfig& config, Records& records) {
   constexpr double max_idle_s = 366 * day_s;  // longer than a plant is shut
   constexpr double max_ahead_s = day_s;       // between computers that share records
   constexpr int trusted_days = 7;             // within them a wrong clock is noticed
-  RunFilter own;
-  own.station = config.station;
-  const std::vector<RunSummary> runs = records.list(own);
+  RunFilter station_filter;
+  station_filter.station = config.station;
+  const std::vector<RunSummary> runs = records.list(station_filter);
   std::vector<std::string> ended;
   ended.reserve(runs.size());
   for (const RunSummary& run : runs) {
@@ -207,12 +207,13 @@ void delete_expired(const ExpiredFolder& expired, const StationConfig& config, S
   const Id name(expired.folder.filename().string(), expired.folder, "run");
   open_existing(parent, name).remove_content();
   const auto& events = expired.run.events;
-  const bool told = std::any_of(events.begin(), events.end(),
-                                [&](const RunEvent& event) { return event.what == expired.what; });
-  if (!told) {
+  const bool has_event = std::any_of(events.begin(), events.end(), [&](const RunEvent& event) {
+    return event.what == expired.what;
+  });
+  if (!has_event) {
     constexpr double megabyte = 1e6;
     RunRecord run = expired.run;
-    run.events.push_back(new_event(
+    run.events.push_back(make_event(
         expired.what,
         fmt::format("kept {} days, {:.1f} MB", expired.days, double(expired.bytes) / megabyte)));
     spool.keep(run);

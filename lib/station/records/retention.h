@@ -23,7 +23,7 @@ struct ExpiredFolder {
   RunRecord run;
 };
 
-struct Retained {
+struct RetentionResult {
   /// Folders to delete, by name, images first.
   std::vector<ExpiredFolder> expired;
   /// Folders of the same age without a run in the records; not deleted.
@@ -36,12 +36,12 @@ struct Retained {
 /// and the end of each run in the records. The folders are those of images, CAPTURES/CAMERA.RUN,
 /// and of results, RESULTS/CAMERA/RUN. Ignores other names, such as folders in which images still
 /// arrive, runs of other stations, and symbolic links.
-Retained look_for_expired(const StationConfig& config, Records& records);
+RetentionResult find_expired(const StationConfig& config, Records& records);
 
-/// Checks the clock, because all runs appear expired if it is years ahead. Ignores voided runs. Throws
-/// InputError if the newest run of the station ended after the clock's time or more than a year
-/// before it, or if the runs of the last seven days ended more than a year after the previous ones.
-/// A wrong clock with which runs were recorded for more than seven days is not detected.
+/// Checks the clock, because all runs appear expired if it is years ahead. Ignores voided runs.
+/// Throws InputError if the newest run of the station ended after the clock's time or more than a
+/// year before it, or if the runs of the last seven days ended more than a year after the previous
+/// ones. A wrong clock with which runs were recorded for more than seven days is not detected.
 void check_clock(const StationConfig& config, Records& records);
 
 /// Deletes the folder of a run, without following links below `config.captures` and

@@ -18,25 +18,25 @@ std::string call_hook(const Hook& hook, RunRecord& record, const HookLock& lock,
   return problem;
 }
 
-HooksRun run_open_hooks(
+HookCounts run_open_hooks(
     const StationConfig& config, Spool& spool,
-    const std::function<void(const RunRecord& run, const std::string& outcome)>& tell) {
-  const auto runs = spool.with_open_hook(config.station);
-  HooksRun result{runs.size()};
+    const std::function<void(const RunRecord& run, const std::string& outcome)>& report) {
+  const auto runs = spool.find_open_hooks(config.station);
+  HookCounts result{runs.size()};
   for (const std::string& run : runs) {
     const HookLock lock(spool.folder(), run);
     auto record = spool.find(run);
     // Another program can have called it.
-    if (!record || !hook_is_open(*record)) continue;
+    if (!record || !is_hook_open(*record)) continue;
     if (!lock.held()) {
-      tell(*record, "is being run");
+      report(*record, "is being run");
       continue;
     }
     const std::string unrecorded = call_hook(*config.hook, *record, lock, spool);
     const std::string problem = hook_problem(*record);
     if (!problem.empty()) ++result.failed;
-    tell(*record, problem.empty() ? "done" : problem);
-    if (!unrecorded.empty()) tell(*record, unrecorded);
+    report(*record, problem.empty() ? "done" : problem);
+    if (!unrecorded.empty()) report(*record, unrecorded);
   }
   return result;
 }

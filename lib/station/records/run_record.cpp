@@ -25,7 +25,7 @@
 namespace vlp {
 namespace {
 
-std::string utc_of(std::time_t time, const char* format) {
+std::string format_utc(std::time_t time, const char* format) {
   std::tm parts{};
   ::gmtime_r(&time, &parts);
   char text[32];
@@ -33,23 +33,23 @@ std::string utc_of(std::time_t time, const char* format) {
 }
 
 /// Returns the time of the clock of this file: std::time() lags behind it by a tick of the kernel.
-std::time_t now_s() {
+std::time_t current_time_s() {
   return std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
 }
 
-std::string utc(const char* format) { return utc_of(now_s(), format); }
+std::string utc(const char* format) { return format_utc(current_time_s(), format); }
 
 /// Returns the account that runs this program, and its machine.
-std::string account() {
+std::string describe_account() {
   const passwd* user = ::getpwuid(::geteuid());
   return fmt::format("{}@{}", user != nullptr ? user->pw_name : std::to_string(::geteuid()),
-                     name_of_machine());
+                     get_host_name());
 }
 
 }  // namespace
 
-void RunRecord::judge(const std::vector<Cause>& why) {
-  verdict = name_of(verdict_of(why));
+void RunRecord::set_verdict(const std::vector<Cause>& why) {
+  verdict = to_string(decide_verdict(why));
   causes.clear();
   for (const Cause& cause : why) causes.append(cause.text).append("\n");
 }
@@ -84,25 +84,25 @@ bool repeats_images(const RunRecord& run, const RunRecord& earlier) {
          std::none_of(run.images.begin(), run.images.end(), is_new);
 }
 
-std::string why_no_verdict(const RunRecord& record) {
+std::string find_verdict_problem(const RunRecord& record) {
   if (const RunEvent* event = voided(record)) {
     return fmt::format("was voided by {}: {}", event->who, event->text);
   }
   if (!record.passed()) return "";
   constexpr const char* words = "the record says PASS, but {}: it was changed by hand";
   if (!record.causes.empty()) return fmt::format(words, "names a cause");
-  for (const CheckedMetric& figure : record.figures) {
-    if (figure.limit && !figure.met()) return fmt::format(words, words_of(figure));
+  for (const CheckedMetric& metric : record.metrics) {
+    if (metric.limit && !metric.passed()) return fmt::format(words, describe(metric));
   }
   return "";
 }
 
-std::string new_run() {
+std::string make_run_id() {
   std::random_device random;
   return utc("%Y%m%dT%H%M%SZ-") + fmt::format("{:08x}{:08x}", random(), random());
 }
 
-bool is_name_of_run(const std::string& text) {
+bool is_run_id(const std::string& text) {
   constexpr std::string_view form = "00000000T000000Z-xxxxxxxxxxxxxxxx";
   return std::ranges::equal(text, form, [](char c, char kind) {
     const bool is_digit = c >= '0' && c <= '9';
@@ -120,24 +120,25 @@ std::string begun_utc(const std::string& run) {
 
 std::string RunEvent::utc() const { return begun_utc(event.substr(0, event.find('.')) + "Z"); }
 
-RunEvent new_event(const std::string& what, const std::string& text,
-                   const std::string& operator_name) {
+RunEvent make_event(const std::string& what, const std::string& text,
+                    const std::string& operator_name) {
   std::random_device random;
   using std::chrono::microseconds;
   const auto now = std::chrono::time_point_cast<microseconds>(std::chrono::system_clock::now());
-  constexpr int of_a_second = 1'000'000;
-  const auto part = now.time_since_epoch().count() % of_a_second;
-  return {utc_of(std::chrono::system_clock::to_time_t(now), "%Y%m%dT%H%M%S") +
+  constexpr int microseconds_per_second = 1'000'000;
+  const auto part = now.time_since_epoch().count() % microseconds_per_second;
+  return {format_utc(std::chrono::system_clock::to_time_t(now), "%Y%m%dT%H%M%S") +
               fmt::format(".{:06d}Z-{:08x}", part, random()),
           what, text,
-          operator_name.empty() ? account() : fmt::format("{} ({})", operator_name, account())};
+          operator_name.empty() ? describe_account()
+                                : fmt::format("{} ({})", operator_name, describe_account())};
 }
 
 double seconds_since(const std::string& utc) {
   std::tm parts{};
   const char* end = ::strptime(utc.c_str(), "%Y-%m-%dT%H:%M:%SZ", &parts);
   if (end == nullptr || *end != '\0') return std::numeric_limits<double>::quiet_NaN();
-  return std::difftime(now_s(), ::timegm(&parts));
+  return std::difftime(current_time_s(), ::timegm(&parts));
 }
 
 std::string now_utc() { return utc("%Y-%m-%dT%H:%M:%SZ"); }
@@ -193,8 +194,8 @@ std::string clock_problem(const RunRecord& run) {
       run.ended_utc, run.begun_utc);
 }
 
-RunRecord new_record(const char* kind, const StationConfig& config, const std::string& camera,
-                     const std::string& run, const ProgramVersion& program) {
+RunRecord make_record(const char* kind, const StationConfig& config, const std::string& camera,
+                      const std::string& run, const ProgramVersion& program) {
   RunRecord record;
   record.run = run;
   record.kind = kind;

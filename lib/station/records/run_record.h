@@ -28,19 +28,19 @@ struct RunEvent {
   /// Returns the time of the event, as 2026-11-21T13:45:01Z.
   std::string utc() const;
 };
-inline constexpr const char *kHookWanted = "hook wanted", *kHookDone = "hook done",
+inline constexpr const char *kHookRequested = "hook wanted", *kHookDone = "hook done",
                             *kHookFailed = "hook failed", *kImagesDeleted = "images deleted",
                             *kResultsDeleted = "results deleted", *kVoided = "voided",
                             *kUnchecked = "unchecked";
 
 /// Makes an event of the current time. RunEvent::who is this program's account, or "Ann
 /// (vlp@station-7)" with an operator.
-RunEvent new_event(const std::string& what, const std::string& text,
-                   const std::string& operator_name = "");
+RunEvent make_event(const std::string& what, const std::string& text,
+                    const std::string& operator_name = "");
 
 /// Record of a run.
 struct RunRecord {
-  /// Unique id over all stations (new_run()).
+  /// Unique id over all stations (make_run_id()).
   std::string run;
   /// "unit", or "golden" for the station's reference camera.
   std::string kind;
@@ -49,14 +49,14 @@ struct RunRecord {
   std::string operator_name, shift;
   /// As 2026-11-21T13:45:01Z.
   std::string begun_utc, ended_utc;
-  /// Verdict (name_of()), and its causes, one per line, the primary cause first.
+  /// Verdict (to_string()), and its causes, one per line, the primary cause first.
   std::string verdict, causes;
   /// Program with its version, and the libraries that affect the result with their versions.
   std::string program, libraries;
   std::string config_sha256;
   /// Content of calibration.yaml of the completed steps; can be empty.
   std::string calibration;
-  std::vector<CheckedMetric> figures;
+  std::vector<CheckedMetric> metrics;
   struct Image {
     std::string step, name, sha256;
     /// Reason why the image was not used; empty if it was.
@@ -66,12 +66,12 @@ struct RunRecord {
   /// Events, in chronological order.
   std::vector<RunEvent> events;
 
-  bool passed() const { return verdict == name_of(Verdict::pass); }
-  bool invalid() const { return verdict == name_of(Verdict::invalid); }
+  bool passed() const { return verdict == to_string(Verdict::pass); }
+  bool invalid() const { return verdict == to_string(Verdict::invalid); }
   /// Returns the first cause, in one line; empty if the run passed.
   std::string first_cause() const { return causes.substr(0, causes.find('\n')); }
   /// Sets verdict and causes from `why`, the most important cause first.
-  void judge(const std::vector<Cause>& why);
+  void set_verdict(const std::vector<Cause>& why);
 };
 
 /// Run that used an image; empty if none did.
@@ -97,7 +97,7 @@ const RunEvent* voided(const RunRecord& record);
 /// Returns the reason why the verdict of a record is not valid; empty if it is valid. The verdict
 /// is not valid if the run was voided, or if it is PASS despite a failed gate or a cause. The
 /// latter shows that the record was edited.
-std::string why_no_verdict(const RunRecord& record);
+std::string find_verdict_problem(const RunRecord& record);
 
 /// Text member of a record: a column of the table of runs and a key of its JSON.
 struct RunField {
@@ -110,15 +110,15 @@ struct RunField {
 };
 
 /// Returns all text members of a record, in order. A new text requires a member of RunRecord, an
-/// entry in run_fields(), code that sets it (new_record() or the program), and a migration in
+/// entry in run_fields(), code that sets it (make_record() or the program), and a migration in
 /// record_tables.cpp.
 std::span<const RunField> run_fields();
 
 /// Returns the id of a run that starts now, 20261121T134501Z-0123456789abcdef: UTC and 16 random
 /// hexadecimal digits.
-std::string new_run();
-/// Returns true if a text has the form of new_run().
-bool is_name_of_run(const std::string& text);
+std::string make_run_id();
+/// Returns true if a text has the form of make_run_id().
+bool is_run_id(const std::string& text);
 /// Returns the UTC of the start of a run, as 2026-11-21T13:45:01Z; empty if `run` is no run id.
 std::string begun_utc(const std::string& run);
 std::string now_utc();
@@ -136,8 +136,8 @@ std::string clock_problem(const RunRecord& run);
 
 /// Makes the common part of the records of units and golden units for a run that ends now: all
 /// members except verdict, inputs and operator.
-RunRecord new_record(const char* kind, const StationConfig& config, const std::string& camera,
-                     const std::string& run, const ProgramVersion& program);
+RunRecord make_record(const char* kind, const StationConfig& config, const std::string& camera,
+                      const std::string& run, const ProgramVersion& program);
 
 /// Returns OpenCV, Ceres, mrcal and other libraries with their versions.
 std::string library_versions();

@@ -6,32 +6,32 @@ namespace vlp {
 namespace {
 
 void read_figures(soci::session& sql, RunRecord& record) {
-  CheckedMetric figure;
+  CheckedMetric metric;
   double value = 0, gate = 0;
   GuardBand guard{};
   int at_least = 0;
   soci::indicator has_value = soci::i_null, has_gate = soci::i_null, has_u = soci::i_null,
                   has_k = soci::i_null;
-  soci::statement figures =
+  soci::statement metrics =
       (sql.prepare << "SELECT name, value, gate, at_least, unit, uncertainty, guard_k FROM figures "
                       "WHERE run = :run ORDER BY place",
-       soci::into(figure.name), soci::into(value, has_value), soci::into(gate, has_gate),
-       soci::into(at_least), soci::into(figure.unit), soci::into(guard.standard_uncertainty, has_u),
+       soci::into(metric.name), soci::into(value, has_value), soci::into(gate, has_gate),
+       soci::into(at_least), soci::into(metric.unit), soci::into(guard.standard_uncertainty, has_u),
        soci::into(guard.k, has_k), soci::use(record.run));
-  figures.execute();
-  while (figures.fetch()) {
-    figure.value = has_value == soci::i_ok ? std::optional(value) : std::nullopt;
-    figure.limit = has_gate == soci::i_ok ? std::optional(gate) : std::nullopt;
-    figure.asked = at_least != 0 ? Direction::at_least : Direction::at_most;
+  metrics.execute();
+  while (metrics.fetch()) {
+    metric.value = has_value == soci::i_ok ? std::optional(value) : std::nullopt;
+    metric.limit = has_gate == soci::i_ok ? std::optional(gate) : std::nullopt;
+    metric.direction = at_least != 0 ? Direction::at_least : Direction::at_most;
     const bool guarded = has_u == soci::i_ok && has_k == soci::i_ok;
-    figure.guard = guarded ? std::optional(guard) : std::nullopt;
-    record.figures.push_back(figure);
+    metric.guard = guarded ? std::optional(guard) : std::nullopt;
+    record.metrics.push_back(metric);
   }
 }
 
 }  // namespace
 
-std::optional<RunRecord> texts_of_run(soci::session& sql, const std::string& run) {
+std::optional<RunRecord> load_run_header(soci::session& sql, const std::string& run) {
   RunRecord record;
   soci::statement select(sql);
   std::string columns;
@@ -47,8 +47,8 @@ std::optional<RunRecord> texts_of_run(soci::session& sql, const std::string& run
   return record;
 }
 
-std::optional<RunRecord> rows_of_run(soci::session& sql, const std::string& run) {
-  std::optional<RunRecord> found = texts_of_run(sql, run);
+std::optional<RunRecord> load_run(soci::session& sql, const std::string& run) {
+  std::optional<RunRecord> found = load_run_header(sql, run);
   if (!found) return found;
   read_figures(sql, *found);
   RunRecord::Image image;

@@ -30,20 +30,20 @@ using Clock = std::chrono::steady_clock;
 
 constexpr const char* kRunFormat = "vlp-run/1";
 constexpr const char* kRunEnding = ".json";
-constexpr std::size_t kMostRunBytes = 64 << 20;
+constexpr std::size_t kMaxRunFileBytes = 64 << 20;
 /// Several times the size of a run of hundreds of images.
-constexpr std::uintmax_t kRoom_bytes = 1'000'000;
+constexpr std::uintmax_t kRequiredSpace_bytes = 1'000'000;
 
-std::optional<double> number_if_any(const Json& json) {
+std::optional<double> read_optional_number(const Json& json) {
   return json.is_null() ? std::nullopt : std::optional(json.get<double>());
 }
 
-std::optional<GuardBand> guard_if_any(const Json& figure) {
-  if (!figure.contains("guard_k")) return std::nullopt;
-  return GuardBand{figure.at("uncertainty").get<double>(), figure.at("guard_k").get<double>()};
+std::optional<GuardBand> read_guard_band(const Json& metric) {
+  if (!metric.contains("guard_k")) return std::nullopt;
+  return GuardBand{metric.at("uncertainty").get<double>(), metric.at("guard_k").get<double>()};
 }
 
-SpooledRun run_from(const Json& json) {
+SpooledRun parse_run(const Json& json) {
   if (json.at("format").get<std::string>() != kRunFormat)
     throw std::runtime_error("another format");
   SpooledRun spooled;
@@ -57,12 +57,12 @@ SpooledRun run_from(const Json& json) {
   for (const std::string& id : {run.run, run.camera}) {
     if (!Id::accepts(id)) throw std::runtime_error("its run or camera is no id");
   }
-  for (const Json& figure : json.at("figures")) {
-    run.figures.push_back(
-        {figure.at("name").get<std::string>(), figure.at("unit").get<std::string>(),
-         number_if_any(figure.at("value")), number_if_any(figure.at("gate")),
-         figure.at("at_least").get<bool>() ? Direction::at_least : Direction::at_most,
-         guard_if_any(figure)});
+  for (const Json& metric : json.at("figures")) {
+    run.metrics.push_back(
+        {metric.at("name").get<std::string>(), metric.at("unit").get<std::string>(),
+         read_optional_number(metric.at("value")), read_optional_number(metric.at("gate")),
+         metric.at("at_least").get<bool>() ? Direction::at_least : Direction::at_most,
+         read_guard_band(metric)});
   }
   for (const Json& image : json.at("images")) {
     run.images.push_back({image.at("step").get<std::string>(), image.at("image").get<std::string>(),
@@ -85,7 +85,7 @@ std::string file_name(const RunRecord& run) {
 }
 
 /// Adds a run, merging the events of its files.
-void add_run(std::vector<RunRecord>& runs, const RunRecord& run) {
+void merge_run(std::vector<RunRecord>& runs, const RunRecord& run) {
   if (runs.empty() || runs.back().run != run.run) {
     runs.push_back(run);
     return;
@@ -99,7 +99,7 @@ void add_run(std::vector<RunRecord>& runs, const RunRecord& run) {
   }
 }
 
-std::vector<fs::path> entries_of(const fs::path& folder, std::error_code& error) {
+std::vector<fs::path> list_entries(const fs::path& folder, std::error_code& error) {
   std::vector<fs::path> entries;
   fs::directory_iterator entry(folder, error);
   for (; !error && entry != fs::directory_iterator(); entry.increment(error)) {
@@ -109,10 +109,10 @@ std::vector<fs::path> entries_of(const fs::path& folder, std::error_code& error)
 }
 
 /// Removes temporary files older than a day, which are those of killed programs.
-void remove_left_over(const fs::path& folder) {
+void remove_stale_files(const fs::path& folder) {
   constexpr std::chrono::hours a_day(24);
   std::error_code error;
-  for (const fs::path& file : entries_of(folder, error)) {
+  for (const fs::path& file : list_entries(folder, error)) {
     const std::string name = file.filename().string();
     if (!name.starts_with('.') || name.find(".json.tmp-") == std::string::npos) continue;
     const auto written = fs::last_write_time(file, error);
@@ -120,7 +120,7 @@ void remove_left_over(const fs::path& folder) {
   }
 }
 
-bool uses(const RunRecord& run, const std::string& sha256) {
+bool uses_image(const RunRecord& run, const std::string& sha256) {
   return std::any_of(run.images.begin(), run.images.end(), [&](const RunRecord::Image& image) {
     return image.sha256 == sha256 && image.refused.empty();
   });
@@ -128,31 +128,31 @@ bool uses(const RunRecord& run, const std::string& sha256) {
 
 /// Returns the operator's message about offline records; empty if only the error contains the
 /// remedy.
-std::string notice_of(const InputError& error) {
+std::string make_notice(const InputError& error) {
   if (dynamic_cast<const RecordsRefused*>(&error) != nullptr) {
     return "records are offline (access refused)";
   }
-  return dynamic_cast<const RecordsAway*>(&error) != nullptr ? "records are offline" : "";
+  return dynamic_cast<const RecordsOffline*>(&error) != nullptr ? "records are offline" : "";
 }
 
 }  // namespace
 
-std::string text_of_run(const SpooledRun& spooled) {
+std::string format_run(const SpooledRun& spooled) {
   const RunRecord run = printable_run(spooled.run);
   Json json;
   json["format"] = kRunFormat;
   json["records"] = printable_line(spooled.records);
   for (const RunField& field : run_fields()) json[field.name] = run.*field.text;
   json["figures"] = Json::array();
-  for (const CheckedMetric& figure : run.figures) {
-    json["figures"].push_back({{"name", figure.name},
-                               {"unit", figure.unit},
-                               {"value", number_or_null(figure.value)},
-                               {"gate", number_or_null(figure.limit)},
-                               {"at_least", figure.asked == Direction::at_least}});
-    if (!figure.guard) continue;
-    json["figures"].back()["uncertainty"] = figure.guard->standard_uncertainty;
-    json["figures"].back()["guard_k"] = figure.guard->k;
+  for (const CheckedMetric& metric : run.metrics) {
+    json["figures"].push_back({{"name", metric.name},
+                               {"unit", metric.unit},
+                               {"value", number_or_null(metric.value)},
+                               {"gate", number_or_null(metric.limit)},
+                               {"at_least", metric.direction == Direction::at_least}});
+    if (!metric.guard) continue;
+    json["figures"].back()["uncertainty"] = metric.guard->standard_uncertainty;
+    json["figures"].back()["guard_k"] = metric.guard->k;
   }
   json["images"] = Json::array();
   for (const auto& [step, name, sha256, refused] : run.images) {
@@ -169,11 +169,12 @@ std::string text_of_run(const SpooledRun& spooled) {
 }
 
 SpooledRun read_run(const fs::path& file) {
-  const auto text = SharedFolder(file.parent_path()).read(file.filename().string(), kMostRunBytes);
+  const auto text =
+      SharedFolder(file.parent_path()).read(file.filename().string(), kMaxRunFileBytes);
   if (!text) throw InputError(file, "cannot be opened: it was taken away");
   try {
     check_json_bounds(*text);
-    return run_from(Json::parse(*text));
+    return parse_run(Json::parse(*text));
   } catch (const std::exception& error) {
     throw InputError(file, std::string("is no run of a station: ") + error.what());
   }
@@ -182,59 +183,59 @@ SpooledRun read_run(const fs::path& file) {
 Spool::Spool(fs::path folder, std::string records)
     : folder_(std::move(folder)),
       where_(std::move(records)),
-      name_(printable_line(identity_of_database(where_))) {}
+      name_(printable_line(make_database_identity(where_))) {}
 
 Spool::~Spool() = default;
 
 void Spool::open() {
   if (records_) return;
   std::error_code none;
-  if (!is_server(where_) && !fs::exists(where_, none)) {
-    throw RecordsAway(where_, "there are no records");
+  if (!is_server_address(where_) && !fs::exists(where_, none)) {
+    throw RecordsOffline(where_, "there are no records");
   }
   records_ = std::make_unique<Records>(where_);
 }
 
 /// Runs an action on the records. Returns the reason if it failed; empty on success.
 template <typename Action>
-std::string Spool::ask(const Action& action) {
+std::string Spool::run_on_records(const Action& action) {
   try {
     open();
     action(*records_);
-    away_.clear();
+    offline_reason_.clear();
     return "";
-  } catch (const RecordsAway& error) {
-    put_off(error);
+  } catch (const RecordsOffline& error) {
+    suspend_access(error);
     return error.what();
   } catch (const InputError& error) {
     if (!records_) {
-      put_off(error);
+      suspend_access(error);
     } else {
-      away_.clear();
+      offline_reason_.clear();
     }
     return error.what();
   }
 }
 
-bool Spool::may_ask() const { return Clock::now() >= ask_again_; }
+bool Spool::may_access_records() const { return Clock::now() >= next_access_; }
 
-void Spool::put_off(const InputError& error) {
+void Spool::suspend_access(const InputError& error) {
   constexpr std::chrono::minutes a_while(1);
-  ask_again_ = Clock::now() + a_while;
-  away_ = error.what();
-  away_notice_ = notice_of(error);
+  next_access_ = Clock::now() + a_while;
+  offline_reason_ = error.what();
+  offline_notice_ = make_notice(error);
 }
 
 void Spool::prepare() {
   make_folder(folder_);
-  check_room(SharedFolder(folder_), kRoom_bytes);
-  remove_left_over(folder_);
+  check_free_space(SharedFolder(folder_), kRequiredSpace_bytes);
+  remove_stale_files(folder_);
   try {
     if (!records_) records_ = std::make_unique<Records>(where_);
-  } catch (const RecordsAway& error) {
-    return put_off(error);
+  } catch (const RecordsOffline& error) {
+    return suspend_access(error);
   }
-  problem_ = ask([](Records& records) { records.check_writable(); });
+  problem_ = run_on_records([](Records& records) { records.check_writable(); });
   if (problem_.empty()) deliver();
 }
 
@@ -243,9 +244,9 @@ void Spool::keep(const RunRecord& run) {
     make_folder(folder_);
     const std::string name = file_name(run);
     known_.erase(folder_ / name);  // possibly a different run of the same name
-    SharedFolder(folder_).replace(name, text_of_run({run, name_}));
+    SharedFolder(folder_).replace(name, format_run({run, name_}));
   } catch (const InputError& error) {
-    const std::string refused = ask([&](Records& records) { records.keep(run); });
+    const std::string refused = run_on_records([&](Records& records) { records.keep(run); });
     if (refused.empty()) return;
     throw InputError(folder_,
                      fmt::format("neither here can a run be kept ({}) nor in the records ({})",
@@ -254,12 +255,12 @@ void Spool::keep(const RunRecord& run) {
 }
 
 void Spool::deliver() {
-  constexpr std::chrono::seconds long_enough(10);
+  constexpr std::chrono::seconds max_duration(10);
   const auto begun = Clock::now();
-  if (!may_ask()) return;
+  if (!may_access_records()) return;
   problem_.clear();
   for (const fs::path& file : files()) {
-    if (Clock::now() - begun > long_enough) {
+    if (Clock::now() - begun > max_duration) {
       if (problem_.empty()) problem_ = "there are many, the rest goes with the next run";
       return;
     }
@@ -271,8 +272,9 @@ void Spool::deliver() {
       continue;
     }
     if (spooled.records != name_) continue;
-    const std::string refused = ask([&](Records& records) { records.keep(spooled.run); });
-    if (!away_.empty()) return;
+    const std::string refused =
+        run_on_records([&](Records& records) { records.keep(spooled.run); });
+    if (!offline_reason_.empty()) return;
     if (refused.empty()) {
       fs::remove(file, gone);
       if (gone) problem_ = file.string() + ": cannot be removed: " + gone.message();
@@ -291,29 +293,29 @@ std::size_t Spool::count_waiting() const {
 }
 
 std::string Spool::with_remarks(const std::string& first) const {
-  std::set<std::string> others;
+  std::set<std::string> other_runs;
   std::string other_records;
   for (const auto& [file, spooled] : known_) {
     if (spooled.records == name_) continue;
-    others.insert(spooled.run.run);
+    other_runs.insert(spooled.run.run);
     other_records = spooled.records;
   }
-  std::vector<std::string> said;
-  if (!first.empty()) said.push_back(first);
-  if (!others.empty()) {
-    said.push_back(
-        fmt::format("{} here for other records, such as {}", others.size(), other_records));
+  std::vector<std::string> remarks;
+  if (!first.empty()) remarks.push_back(first);
+  if (!other_runs.empty()) {
+    remarks.push_back(
+        fmt::format("{} here for other records, such as {}", other_runs.size(), other_records));
   }
-  if (!unread_.empty()) said.push_back(unread_);
-  if (not_asked_ > 0) {
-    said.push_back(fmt::format("{} images were not looked up in the records", not_asked_));
+  if (!unread_.empty()) remarks.push_back(unread_);
+  if (num_unchecked_ > 0) {
+    remarks.push_back(fmt::format("{} images were not looked up in the records", num_unchecked_));
   }
-  return fmt::format("{}", fmt::join(said, "; "));
+  return fmt::format("{}", fmt::join(remarks, "; "));
 }
 
 std::string Spool::state() {
   read();
-  const std::string& why = away_.empty() ? problem_ : away_;
+  const std::string& why = offline_reason_.empty() ? problem_ : offline_reason_;
   const std::size_t waiting = count_waiting();
   if (waiting > 0) {
     return with_remarks(
@@ -323,18 +325,18 @@ std::string Spool::state() {
 }
 
 std::string Spool::notice() {
-  if (away_.empty() || away_notice_.empty()) return state();
+  if (offline_reason_.empty() || offline_notice_.empty()) return state();
   read();
   const std::size_t waiting = count_waiting();
   const std::string runs = waiting == 0   ? "runs are"
                            : waiting == 1 ? "1 run"
                                           : fmt::format("{} runs", waiting);
-  return with_remarks(fmt::format("{}; {} kept, delivered automatically", away_notice_, runs));
+  return with_remarks(fmt::format("{}; {} kept, delivered automatically", offline_notice_, runs));
 }
 
 std::vector<fs::path> Spool::files() {
   std::error_code error;
-  std::vector<fs::path> files = entries_of(folder_, error);
+  std::vector<fs::path> files = list_entries(folder_, error);
   if (error && error != std::errc::no_such_file_or_directory) {
     problem_ = folder_.string() + ": cannot be read: " + error.message();
   }
@@ -368,7 +370,7 @@ std::vector<RunRecord> Spool::waiting() {
   read();
   std::vector<RunRecord> runs;
   for (const auto& [file, spooled] : known_) {
-    if (spooled.records == name_) add_run(runs, spooled.run);
+    if (spooled.records == name_) merge_run(runs, spooled.run);
   }
   return runs;
 }
@@ -377,22 +379,23 @@ std::optional<RunRecord> Spool::find(const std::string& run) {
   read();
   std::vector<RunRecord> here;
   for (const auto& [file, spooled] : known_) {
-    if (spooled.run.run == run) add_run(here, spooled.run);
+    if (spooled.run.run == run) merge_run(here, spooled.run);
   }
   if (!here.empty()) return here.front();
   std::optional<RunRecord> found;
-  if (may_ask()) ask([&](Records& records) { found = records.find(run); });
+  if (may_access_records()) run_on_records([&](Records& records) { found = records.find(run); });
   return found;
 }
 
-std::vector<std::string> Spool::with_open_hook(const std::string& station) {
+std::vector<std::string> Spool::find_open_hooks(const std::string& station) {
   std::vector<std::string> kept;
-  if (may_ask()) ask([&](Records& records) { kept = records.with_open_hook(station); });
+  if (may_access_records())
+    run_on_records([&](Records& records) { kept = records.find_open_hooks(station); });
   std::set<std::string> runs(kept.begin(), kept.end());
   for (const RunRecord& run : waiting()) {
     if (!station.empty() && run.station != station) continue;
     // Waiting runs are newer.
-    if (hook_is_open(run)) {
+    if (is_hook_open(run)) {
       runs.insert(run.run);
     } else {
       runs.erase(run.run);
@@ -401,21 +404,23 @@ std::vector<std::string> Spool::with_open_hook(const std::string& station) {
   return {runs.begin(), runs.end()};
 }
 
-ImageOwner Spool::owner_of(const std::string& sha256, const std::string& other_than_camera) {
+ImageOwner Spool::find_owner(const std::string& sha256, const std::string& other_than_camera) {
   read();
   for (const auto& [file, spooled] : known_) {
     const RunRecord& run = spooled.run;
-    if (run.camera != other_than_camera && uses(run, sha256) && voided(run) == nullptr) {
+    if (run.camera != other_than_camera && uses_image(run, sha256) && voided(run) == nullptr) {
       return {run.camera, run.run};
     }
   }
   ImageOwner owner;
-  const auto look = [&](Records& records) { owner = records.owner_of(sha256, other_than_camera); };
-  if (!may_ask() || !ask(look).empty()) ++not_asked_;
+  const auto query_records = [&](Records& records) {
+    owner = records.find_owner(sha256, other_than_camera);
+  };
+  if (!may_access_records() || !run_on_records(query_records).empty()) ++num_unchecked_;
   return owner;
 }
 
-std::optional<std::string> Spool::repeated_run_of(const RunRecord& run) {
+std::optional<std::string> Spool::find_repeated_run(const RunRecord& run) {
   const auto first = std::find_if(run.images.begin(), run.images.end(),
                                   [](const auto& image) { return image.refused.empty(); });
   if (first == run.images.end()) return "";
@@ -428,27 +433,27 @@ std::optional<std::string> Spool::repeated_run_of(const RunRecord& run) {
     }
   }
   std::string repeated;
-  const auto look = [&](Records& records) {
-    for (const std::string& name : records.judged_runs_with(first->sha256, run.camera)) {
+  const auto query_records = [&](Records& records) {
+    for (const std::string& name : records.find_judged_runs(first->sha256, run.camera)) {
       const auto earlier = records.find(name);
       if (!earlier || voided_runs.contains(name) || !repeats_images(run, *earlier)) continue;
       repeated = name;
       return;
     }
   };
-  if (!may_ask() || !ask(look).empty()) return std::nullopt;
+  if (!may_access_records() || !run_on_records(query_records).empty()) return std::nullopt;
   return repeated;
 }
 
-std::string Spool::golden_run_of(const std::string& sha256) {
+std::string Spool::find_golden_run(const std::string& sha256) {
   read();
   for (const auto& [file, spooled] : known_) {
     const RunRecord& run = spooled.run;
-    if (run.kind == "golden" && !run.invalid() && uses(run, sha256)) return run.run;
+    if (run.kind == "golden" && !run.invalid() && uses_image(run, sha256)) return run.run;
   }
   std::string run;
-  const auto look = [&](Records& records) { run = records.golden_run_of(sha256); };
-  if (!may_ask() || !ask(look).empty()) ++not_asked_;
+  const auto query_records = [&](Records& records) { run = records.find_golden_run(sha256); };
+  if (!may_access_records() || !run_on_records(query_records).empty()) ++num_unchecked_;
   return run;
 }
 

@@ -15,7 +15,7 @@
 
 namespace vlp {
 
-/// Run and identity_of_database() of the records that it belongs to.
+/// Run and make_database_identity() of the records that it belongs to.
 struct SpooledRun {
   RunRecord run;
   std::string records;
@@ -24,8 +24,8 @@ struct SpooledRun {
 /// Queue of a station's runs that are to be delivered to its records, which may be offline.
 ///
 /// Each run waits as a complete file of the spool: RUN.json, or RUN.EVENT.json with later events
-/// (`vlp-run/1`). It is delivered only to the records that it belongs to (identity_of_database()),
-/// so that stations with different records can share a folder.
+/// (`vlp-run/1`). It is delivered only to the records that it belongs to
+/// (make_database_identity()), so that stations with different records can share a folder.
 ///
 /// No run is lost if a program is killed at any time. Files are written atomically and removed
 /// after the run is committed. No run is stored twice, because records store a run once by its id.
@@ -64,10 +64,10 @@ class Spool {
   /// replaced by "records are offline; 1 run kept, delivered automatically".
   std::string notice();
   /// Suspends access to the records for a minute because of `error`.
-  void put_off(const InputError& error);
+  void suspend_access(const InputError& error);
   const std::filesystem::path& folder() const { return folder_; }
   /// Returns the reason why the records were offline at the last access; empty if they were online.
-  const std::string& away() const { return away_; }
+  const std::string& offline_reason() const { return offline_reason_; }
 
   /// Returns the runs that wait for these records, in chronological order. Skips files that are no
   /// runs.
@@ -75,24 +75,24 @@ class Spool {
   /// Returns a run that waits for any records, or that the records contain; otherwise std::nullopt,
   /// also if the records do not answer (away()).
   std::optional<RunRecord> find(const std::string& run);
-  /// Returns Records::with_open_hook() of the waiting runs and, if online, of the records.
-  std::vector<std::string> with_open_hook(const std::string& station);
-  /// Returns Records::owner_of() of the waiting runs and, if online, of the records.
-  ImageOwner owner_of(const std::string& sha256, const std::string& other_than_camera);
+  /// Returns Records::find_open_hooks() of the waiting runs and, if online, of the records.
+  std::vector<std::string> find_open_hooks(const std::string& station);
+  /// Returns Records::find_owner() of the waiting runs and, if online, of the records.
+  ImageOwner find_owner(const std::string& sha256, const std::string& other_than_camera);
   /// Returns the first judged run of the same unit, not voided, that used all images of `run`
   /// (repeats_images()). Searches the waiting runs and the records. Returns an empty string if
   /// there is none, and std::nullopt if the records do not answer and no waiting run matches.
-  std::optional<std::string> repeated_run_of(const RunRecord& run);
-  /// Returns Records::golden_run_of() of the waiting runs and, if online, of the records.
-  std::string golden_run_of(const std::string& sha256);
+  std::optional<std::string> find_repeated_run(const RunRecord& run);
+  /// Returns Records::find_golden_run() of the waiting runs and, if online, of the records.
+  std::string find_golden_run(const std::string& sha256);
 
  private:
   std::vector<std::filesystem::path> files();
   void read();
   void open();
   template <typename Action>
-  std::string ask(const Action& action);
-  bool may_ask() const;
+  std::string run_on_records(const Action& action);
+  bool may_access_records() const;
   /// Counts the runs that wait for these records.
   std::size_t count_waiting() const;
   /// Returns `first`, unless it is empty, and further remarks: runs for other records, unreadable
@@ -100,25 +100,25 @@ class Spool {
   std::string with_remarks(const std::string& first) const;
 
   std::filesystem::path folder_;
-  /// Connection string, and its identity_of_database(), which the files of runs contain.
+  /// Connection string, and its make_database_identity(), which the files of runs contain.
   std::string where_, name_;
   std::unique_ptr<Records> records_;
   /// Reason why the records are offline; why they did not accept a run; a file that read() could
   /// not read, or that contains no run.
-  std::string away_, problem_, unread_;
-  /// `away_` for the operator; empty if only `away_` contains the remedy.
-  std::string away_notice_;
-  std::chrono::steady_clock::time_point ask_again_;
+  std::string offline_reason_, problem_, unread_;
+  /// `offline_reason_` for the operator; empty if only `offline_reason_` contains the remedy.
+  std::string offline_notice_;
+  std::chrono::steady_clock::time_point next_access_;
   /// Runs that read() has found, for these and for other records.
   std::map<std::filesystem::path, SpooledRun> known_;
-  std::size_t not_asked_ = 0;
+  std::size_t num_unchecked_ = 0;
 };
 
 /// Serializes a run as `vlp-run/1`: a JSON object with "records", the texts of run_fields(),
 /// "figures", "images" and "events". Figures with a guard band have "uncertainty" and "guard_k".
 /// Invalid text is written as by printable().
-std::string text_of_run(const SpooledRun& spooled);
-/// Reads a run in the format of text_of_run(). A missing text of run_fields() is empty, as in files
+std::string format_run(const SpooledRun& spooled);
+/// Reads a run in the format of format_run(). A missing text of run_fields() is empty, as in files
 /// of older programs. Throws InputError with the file, also if it contains no run.
 SpooledRun read_run(const std::filesystem::path& file);
 

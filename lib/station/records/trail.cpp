@@ -17,7 +17,7 @@ namespace vlp {
 namespace {
 
 /// Concatenation of texts with their lengths, which makes it unambiguous.
-class Digested {
+class DigestInput {
  public:
   void add(std::string_view text) { text_ += fmt::format("{} {}\n", text.size(), text); }
   /// Adds a number with all bits, in the same digits for every program.
@@ -30,27 +30,27 @@ class Digested {
 
 /// Computes the digest of a run without its events, which have their own entries. Skips empty
 /// texts, so that texts added by later versions of the tables do not change it.
-std::string digest_of(const RunRecord& run) {
-  Digested content;
+std::string compute_digest(const RunRecord& run) {
+  DigestInput content;
   for (const RunField& field : run_fields()) {
     if ((run.*field.text).empty()) continue;
     content.add(field.name);
     content.add(run.*field.text);
   }
-  for (const CheckedMetric& figure : run.figures) {
+  for (const CheckedMetric& metric : run.metrics) {
     content.add("figure");
-    content.add(figure.name);
-    content.add(figure.unit);
-    content.add(figure.asked == Direction::at_least ? "at least" : "at most");
-    if (figure.value) content.add(*figure.value);
-    if (figure.limit) {
+    content.add(metric.name);
+    content.add(metric.unit);
+    content.add(metric.direction == Direction::at_least ? "at least" : "at most");
+    if (metric.value) content.add(*metric.value);
+    if (metric.limit) {
       content.add("gate");
-      content.add(*figure.limit);
+      content.add(*metric.limit);
     }
-    if (!figure.guard) continue;
+    if (!metric.guard) continue;
     content.add("guard");
-    content.add(figure.guard->standard_uncertainty);
-    content.add(figure.guard->k);
+    content.add(metric.guard->standard_uncertainty);
+    content.add(metric.guard->k);
   }
   // Databases sort names differently.
   auto images = run.images;
@@ -64,8 +64,8 @@ std::string digest_of(const RunRecord& run) {
   return content.sha256();
 }
 
-std::string digest_of(const std::string& run, const RunEvent& event) {
-  Digested content;
+std::string compute_digest(const std::string& run, const RunEvent& event) {
+  DigestInput content;
   for (const std::string* text : {&run, &event.event, &event.what, &event.who, &event.text}) {
     content.add(*text);
   }
@@ -78,8 +78,8 @@ struct Entry {
   std::string run, event, content, digest;
 };
 
-std::string digest_of(const Entry& entry, const std::string& before) {
-  Digested digest;
+std::string compute_digest(const Entry& entry, const std::string& before) {
+  DigestInput digest;
   digest.add(std::to_string(entry.number));
   for (const std::string* text : {&entry.run, &entry.event, &entry.content, &before}) {
     digest.add(*text);
@@ -87,7 +87,7 @@ std::string digest_of(const Entry& entry, const std::string& before) {
   return digest.sha256();
 }
 
-std::vector<Entry> entries_of(soci::session& sql) {
+std::vector<Entry> load_entries(soci::session& sql) {
   Entry entry;
   std::vector<Entry> entries;
   soci::statement all =
@@ -99,7 +99,7 @@ std::vector<Entry> entries_of(soci::session& sql) {
   return entries;
 }
 
-std::vector<std::string> names_of_runs(soci::session& sql) {
+std::vector<std::string> load_run_ids(soci::session& sql) {
   std::string run;
   std::vector<std::string> runs;
   soci::statement all =
@@ -109,7 +109,7 @@ std::vector<std::string> names_of_runs(soci::session& sql) {
   return runs;
 }
 
-std::string words_for(const std::string& run, const std::string& event) {
+std::string describe_item(const std::string& run, const std::string& event) {
   return event.empty() ? "run " + run : fmt::format("event {} of run {}", event, run);
 }
 
@@ -126,10 +126,10 @@ void check_chain(const std::vector<Entry>& entries, std::vector<std::string>& pr
               ? fmt::format("entry {} of the trail was removed", next)
               : fmt::format("entries {} to {} of the trail were removed", next, entry.number - 1));
     }
-    const std::string digest = digest_of(entry, before);
-    if (!gap && digest != entry.digest && digest_of(entry, should_be) != entry.digest) {
+    const std::string digest = compute_digest(entry, before);
+    if (!gap && digest != entry.digest && compute_digest(entry, should_be) != entry.digest) {
       problems.push_back(fmt::format("entry {} of the trail, of {}, was changed", entry.number,
-                                     words_for(entry.run, entry.event)));
+                                     describe_item(entry.run, entry.event)));
     }
     before = entry.digest;
     should_be = digest;
@@ -145,23 +145,23 @@ class Contents {
     for (const Entry& entry : entries) {
       if (entries_.emplace(std::pair(entry.run, entry.event), entry.content).second) continue;
       problems_.push_back(fmt::format("entry {} of the trail was added: {} has one already",
-                                      entry.number, words_for(entry.run, entry.event)));
+                                      entry.number, describe_item(entry.run, entry.event)));
     }
   }
   void check(const std::string& run, const std::string& event, const std::string& content) {
     const auto entry = entries_.find({run, event});
     if (entry == entries_.end()) {
-      problems_.push_back(words_for(run, event) +
+      problems_.push_back(describe_item(run, event) +
                           " has no entry in the trail: it was added by hand");
       return;
     }
-    if (entry->second != content) problems_.push_back(words_for(run, event) + " was changed");
+    if (entry->second != content) problems_.push_back(describe_item(run, event) + " was changed");
     entries_.erase(entry);
   }
   /// Reports the remaining contents, which were not found.
   void end() {
     for (const auto& [name, content] : entries_) {
-      problems_.push_back(words_for(name.first, name.second) + " was removed");
+      problems_.push_back(describe_item(name.first, name.second) + " was removed");
     }
   }
 
@@ -174,13 +174,13 @@ class Contents {
 
 void lock_trail(soci::session& sql) { sql << "UPDATE vlp_schema SET version = version"; }
 
-TrailContent content_of_run(soci::session& sql, const std::string& run) {
+TrailContent make_run_content(soci::session& sql, const std::string& run) {
   // As read from the database, which can store a number differently than given.
-  return {run, "", digest_of(rows_of_run(sql, run).value())};
+  return {run, "", compute_digest(load_run(sql, run).value())};
 }
 
-TrailContent content_of_event(const std::string& run, const RunEvent& event) {
-  return {run, event.event, digest_of(run, event)};
+TrailContent make_event_content(const std::string& run, const RunEvent& event) {
+  return {run, event.event, compute_digest(run, event)};
 }
 
 void append_to_trail(soci::session& sql, const std::vector<TrailContent>& contents) {
@@ -191,7 +191,7 @@ void append_to_trail(soci::session& sql, const std::vector<TrailContent>& conten
       soci::into(last.digest);
   for (const auto& [run, event, content] : contents) {
     Entry entry{last.number + 1, run, event, content, ""};
-    entry.digest = digest_of(entry, last.digest);
+    entry.digest = compute_digest(entry, last.digest);
     sql << "INSERT INTO trail (number, run, event, content, digest) VALUES (:number, :run, :event, "
            ":content, :digest)",
         soci::use(entry.number), soci::use(entry.run), soci::use(entry.event),
@@ -200,39 +200,40 @@ void append_to_trail(soci::session& sql, const std::vector<TrailContent>& conten
   }
 }
 
-void append_all(soci::session& sql) {
+void append_all_runs(soci::session& sql) {
   std::vector<TrailContent> contents;
-  for (const std::string& run : names_of_runs(sql)) {
-    contents.push_back(content_of_run(sql, run));
-    const RunRecord kept = rows_of_run(sql, run).value();
-    for (const RunEvent& event : kept.events) contents.push_back(content_of_event(run, event));
+  for (const std::string& run : load_run_ids(sql)) {
+    contents.push_back(make_run_content(sql, run));
+    const RunRecord kept = load_run(sql, run).value();
+    for (const RunEvent& event : kept.events) contents.push_back(make_event_content(run, event));
   }
   append_to_trail(sql, contents);
 }
 
-TrailCheck check_trail(soci::session& sql, const std::string& noted,
-                       const std::function<void()>& heard) {
+TrailCheck check_trail(soci::session& sql, const std::string& expected_digest,
+                       const std::function<void()>& on_progress) {
   TrailCheck check;
-  const auto entries = entries_of(sql);
+  const auto entries = load_entries(sql);
   check.entries = entries.size();
   if (!entries.empty()) check.last_digest = entries.back().digest;
   check_chain(entries, check.problems);
-  heard();
+  on_progress();
   Contents contents(entries, check.problems);
-  for (const std::string& name : names_of_runs(sql)) {
-    const RunRecord run = rows_of_run(sql, name).value();
+  for (const std::string& name : load_run_ids(sql)) {
+    const RunRecord run = load_run(sql, name).value();
     ++check.runs;
-    contents.check(name, "", digest_of(run));
+    contents.check(name, "", compute_digest(run));
     for (const RunEvent& event : run.events) {
-      contents.check(name, event.event, digest_of(name, event));
+      contents.check(name, event.event, compute_digest(name, event));
     }
-    heard();
+    on_progress();
   }
   contents.end();
-  const bool there = std::any_of(entries.begin(), entries.end(),
-                                 [&](const Entry& entry) { return entry.digest == noted; });
-  if (!noted.empty() && !there) {
-    check.problems.push_back("the entry that was noted, " + noted +
+  const bool is_in_trail = std::any_of(entries.begin(), entries.end(), [&](const Entry& entry) {
+    return entry.digest == expected_digest;
+  });
+  if (!expected_digest.empty() && !is_in_trail) {
+    check.problems.push_back("the entry that was noted, " + expected_digest +
                              ", is not in the trail: its end was removed, or all of it is another");
   }
   return check;

@@ -30,8 +30,8 @@ namespace vlp {
 struct TrailContent {
   std::string run, event, content;
 };
-TrailContent content_of_run(soci::session& sql, const std::string& run);
-TrailContent content_of_event(const std::string& run, const RunEvent& event);
+TrailContent make_run_content(soci::session& sql, const std::string& run);
+TrailContent make_event_content(const std::string& run, const RunEvent& event);
 
 /// Locks the trail for this program until the end of its transaction. Slow work should be done
 /// before.
@@ -39,7 +39,7 @@ void lock_trail(soci::session& sql);
 /// Locks the trail and appends entries.
 void append_to_trail(soci::session& sql, const std::vector<TrailContent>& contents);
 /// Appends entries of all runs, for records of an earlier version without a trail.
-void append_all(soci::session& sql);
+void append_all_runs(soci::session& sql);
 
 /// Result of comparing the records with their trail.
 struct TrailCheck {
@@ -52,7 +52,7 @@ struct TrailCheck {
 
 /// Checks all records in the current transaction. `expected_digest` is the last digest of an
 /// earlier check, or empty. `on_progress` is called repeatedly during the check.
-TrailCheck check_trail(soci::session& sql, const std::string& noted,
-                       const std::function<void()>& heard);
+TrailCheck check_trail(soci::session& sql, const std::string& expected_digest,
+                       const std::function<void()>& on_progress);
 
 }  // namespace vlp

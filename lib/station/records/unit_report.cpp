@@ -11,9 +11,9 @@
 namespace vlp {
 namespace {
 
-ReportVerdict box_of(const RunRecord& record) {
+ReportVerdict make_verdict_box(const RunRecord& record) {
   using Look = ReportVerdict::Look;
-  const std::string no_verdict = why_no_verdict(record);
+  const std::string no_verdict = find_verdict_problem(record);
   ReportVerdict verdict{record.verdict,
                         record.passed()    ? Look::pass
                         : record.invalid() ? Look::none
@@ -25,26 +25,26 @@ ReportVerdict box_of(const RunRecord& record) {
   return verdict;
 }
 
-std::string meaning_of(const CheckedMetric& figure) {
-  const auto kind = metric_kind(figure.name);
+std::string describe_meaning(const CheckedMetric& metric) {
+  const auto kind = metric_kind(metric.name);
   return kind ? kind->meaning : "a figure of another version of the program";
 }
 
 }  // namespace
 
-std::string unit_report(const RunRecord& record, const std::filesystem::path& calibration,
-                        const std::vector<ReportPicture>& pictures) {
+std::string make_unit_report(const RunRecord& record, const std::filesystem::path& calibration,
+                             const std::vector<ReportPlot>& pictures) {
   Report report;
   report.title = "Camera " + record.camera + " on " + record.station;
-  report.verdict = box_of(record);
+  report.verdict = make_verdict_box(record);
   constexpr int digits = 4;
-  for (const CheckedMetric& figure : record.figures) {
-    const std::string name = figure.name + ": " + meaning_of(figure);
-    if (figure.limit) {
-      report.gates.push_back(figure);
+  for (const CheckedMetric& metric : record.metrics) {
+    const std::string name = metric.name + ": " + describe_meaning(metric);
+    if (metric.limit) {
+      report.gates.push_back(metric);
       report.gates.back().name = name;
-    } else if (figure.value) {
-      report.figures.push_back({name, significant(*figure.value, digits), figure.unit, ""});
+    } else if (metric.value) {
+      report.metrics.push_back({name, significant(*metric.value, digits), metric.unit, ""});
     }
   }
   for (const auto& [step, image, sha256, refused] : record.images) {

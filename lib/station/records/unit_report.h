@@ -14,7 +14,7 @@ namespace vlp {
 /// Returns the report of a run (report.html): verdict and causes, gates, other metrics, the
 /// calibration with its history, the plots of its steps, and the rejected images. `calibration` is
 /// the file with the record's calibration; empty if there is none. Throws InputError.
-std::string unit_report(const RunRecord& record, const std::filesystem::path& calibration,
-                        const std::vector<ReportPicture>& pictures);
+std::string make_unit_report(const RunRecord& record, const std::filesystem::path& calibration,
+                             const std::vector<ReportPlot>& pictures);
 
 }  // namespace vlp

@@ -21,15 +21,15 @@ namespace {
 constexpr double kLevel = 0.05;
 
 /// Computes the sum of (x - mean x) (y - mean y).
-double products_about_means(const std::vector<double>& x, const std::vector<double>& y) {
-  const double of_x = mean_of(x), of_y = mean_of(y);
+double sum_of_products(const std::vector<double>& x, const std::vector<double>& y) {
+  const double mean_x = compute_mean(x), mean_y = compute_mean(y);
   double sum = 0;
-  for (std::size_t i = 0; i < x.size(); ++i) sum += (x[i] - of_x) * (y[i] - of_y);
+  for (std::size_t i = 0; i < x.size(); ++i) sum += (x[i] - mean_x) * (y[i] - mean_y);
   return sum;
 }
 
-TestedEstimate tested(double value, double standard_error, double dof) {
-  TestedEstimate estimate{value, standard_error, dof, 0, 1, value, value};
+EstimateTest test_estimate(double value, double standard_error, double dof) {
+  EstimateTest estimate{value, standard_error, dof, 0, 1, value, value};
   if (standard_error > 0) {
     estimate.t = value / standard_error;
     estimate.p = t_two_tails(estimate.t, dof);
@@ -43,45 +43,45 @@ TestedEstimate tested(double value, double standard_error, double dof) {
   return estimate;
 }
 
-Linearity line_of(const std::vector<double>& references, const std::vector<double>& differences) {
+Linearity fit_line(const std::vector<double>& references, const std::vector<double>& differences) {
   Linearity line;
   line.count = static_cast<double>(references.size());
-  line.mean_reference = mean_of(references);
-  line.squares_of_references = products_about_means(references, references);
-  const double slope = products_about_means(references, differences) / line.squares_of_references,
-               mean = mean_of(differences), intercept = mean - slope * line.mean_reference;
+  line.mean_reference = compute_mean(references);
+  line.reference_squares = sum_of_products(references, references);
+  const double slope = sum_of_products(references, differences) / line.reference_squares,
+               mean = compute_mean(differences), intercept = mean - slope * line.mean_reference;
   double residuals = 0;
   for (std::size_t i = 0; i < references.size(); ++i) {
     const double fitted = mean + slope * (references[i] - line.mean_reference);
     residuals += std::pow(differences[i] - fitted, 2);
   }
-  const double dof = line.count - 2, all = products_about_means(differences, differences);
+  const double dof = line.count - 2, all = sum_of_products(differences, differences);
   line.residual_sd = std::sqrt(residuals / dof);
   line.r_squared = all > 0 ? 1 - residuals / all : 0;
-  line.slope = tested(slope, line.residual_sd / std::sqrt(line.squares_of_references), dof);
-  line.intercept = tested(
+  line.slope = test_estimate(slope, line.residual_sd / std::sqrt(line.reference_squares), dof);
+  line.intercept = test_estimate(
       intercept,
       line.residual_sd * std::sqrt(1 / line.count + line.mean_reference * line.mean_reference /
-                                                        line.squares_of_references),
+                                                        line.reference_squares),
       dof);
   return line;
 }
 
 }  // namespace
 
-bool TestedEstimate::shows() const { return p < kLevel; }
+bool EstimateTest::is_significant() const { return p < kLevel; }
 
 double Linearity::bias_at(double reference) const {
   return intercept.value + slope.value * reference;
 }
 
 double Linearity::band_at(double reference) const {
-  const double off = reference - mean_reference;
+  const double offset = reference - mean_reference;
   return t_quantile(kLevel, slope.dof) * residual_sd *
-         std::sqrt(1 / count + off * off / squares_of_references);
+         std::sqrt(1 / count + offset * offset / reference_squares);
 }
 
-BiasStudy bias_study(const std::vector<ReferenceValue>& values) {
+BiasStudy analyze_bias(const std::vector<ReferenceValue>& values) {
   if (values.empty()) throw std::invalid_argument("a bias study needs runs of reference units");
   std::map<std::pair<double, std::string>, std::vector<double>> by_unit;
   std::vector<double> references, differences;
@@ -92,24 +92,25 @@ BiasStudy bias_study(const std::vector<ReferenceValue>& values) {
   }
   BiasStudy study;
   double within = 0;  // sum of squared deviations from the units' means
-  for (const auto& [key, of_unit] : by_unit) {
+  for (const auto& [key, unit_values] : by_unit) {
     const auto& [reference, unit] = key;
-    if (of_unit.size() < 2) {
+    if (unit_values.size() < 2) {
       throw std::invalid_argument(
           fmt::format("unit {} has one run: a bias study needs two or more of each", unit));
     }
-    const auto n = static_cast<double>(of_unit.size());
-    const double mean = mean_of(of_unit), squares = products_about_means(of_unit, of_unit),
+    const auto n = static_cast<double>(unit_values.size());
+    const double mean = compute_mean(unit_values),
+                 squares = sum_of_products(unit_values, unit_values),
                  sd = std::sqrt(squares / (n - 1));
     within += squares;
-    study.units.push_back({unit, reference, of_unit.size(), mean, sd,
-                           tested(mean - reference, sd / std::sqrt(n), n - 1)});
+    study.units.push_back({unit, reference, unit_values.size(), mean, sd,
+                           test_estimate(mean - reference, sd / std::sqrt(n), n - 1)});
   }
   const auto count = static_cast<double>(values.size());
   const double dof = count - static_cast<double>(by_unit.size());
-  study.all = tested(mean_of(differences), std::sqrt(within / dof / count), dof);
+  study.all = test_estimate(compute_mean(differences), std::sqrt(within / dof / count), dof);
   const bool differ = study.units.front().reference < study.units.back().reference;
-  if (differ) study.linearity = line_of(references, differences);
+  if (differ) study.linearity = fit_line(references, differences);
   return study;
 }
 

@@ -21,11 +21,11 @@ struct ReferenceValue {
 ///   t = value / standard_error,   p = P(|T| > |t|) with `dof` degrees of freedom
 ///
 /// `low` to `high` is the 95 % interval. Without scatter p is 0, or 1 for a value of 0.
-struct TestedEstimate {
+struct EstimateTest {
   double value = 0, standard_error = 0, dof = 0, t = 0, p = 1, low = 0, high = 0;
 
   /// Returns true if the value differs significantly from 0 (p < 0.05).
-  bool shows() const;
+  bool is_significant() const;
 };
 
 /// Bias of one unit.
@@ -34,17 +34,17 @@ struct UnitBias {
   double reference = 0;
   std::size_t count = 0;
   double mean = 0, sd = 0;
-  TestedEstimate bias;
+  EstimateTest bias;
 };
 
 /// Regression of the bias on the reference value, by least squares over all values:
 ///
 ///   value - reference = intercept + slope * reference + e.
 struct Linearity {
-  TestedEstimate slope, intercept;
+  EstimateTest slope, intercept;
   /// Standard deviation s of the residuals, and fraction of the variance that the line explains.
   double residual_sd = 0, r_squared = 0;
-  double count = 0, mean_reference = 0, squares_of_references = 0;
+  double count = 0, mean_reference = 0, reference_squares = 0;
 
   double bias_at(double reference) const;
   /// Returns half of the 95 % confidence band of the line at a reference x: t s sqrt(1 / n + (x -
@@ -62,13 +62,13 @@ struct BiasStudy {
   /// Biases by unit, by increasing reference.
   std::vector<UnitBias> units;
   /// Bias of all values. It is meaningful only if the slope is not significant.
-  TestedEstimate all;
+  EstimateTest all;
   std::optional<Linearity> linearity;
 };
 
 /// Computes bias and linearity. Throws std::invalid_argument if there is no value, or a unit with a
 /// single value; the message names what is missing.
-BiasStudy bias_study(const std::vector<ReferenceValue>& values);
+BiasStudy analyze_bias(const std::vector<ReferenceValue>& values);
 
 /// Plots the differences over the references, the mean of each unit, the line and its band, as .png
 /// or .svg. Throws InputError.

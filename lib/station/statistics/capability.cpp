@@ -12,47 +12,47 @@
 namespace vlp {
 namespace {
 
-constexpr double kBelow = 0.025, kAbove = 0.975, kNormal = 1.959963984540054;
+constexpr double kBelow = 0.025, kAbove = 0.975, kNormalQuantile = 1.959963984540054;
 
 }  // namespace
 
-CapabilityIndex cp_of(double tolerance, double sd, double dof) {
+CapabilityIndex compute_cp(double tolerance, double sd, double dof) {
   const double cp = tolerance / (6 * sd);
   return {cp, cp * std::sqrt(chi_square_quantile(kBelow, dof) / dof),
           cp * std::sqrt(chi_square_quantile(kAbove, dof) / dof)};
 }
 
-CapabilityIndex cpk_of(const ToleranceLimits& limits, double mean, double sd, double dof,
-                       std::size_t count) {
+CapabilityIndex compute_cpk(const ToleranceLimits& limits, double mean, double sd, double dof,
+                            std::size_t count) {
   constexpr double none = std::numeric_limits<double>::infinity();
-  const double room = std::min(limits.upper ? *limits.upper - mean : none,
-                               limits.lower ? mean - *limits.lower : none);
-  const double cpk = room / (3 * sd);
+  const double margin = std::min(limits.upper ? *limits.upper - mean : none,
+                                 limits.lower ? mean - *limits.lower : none);
+  const double cpk = margin / (3 * sd);
   const double half =
-      kNormal * std::sqrt(1 / (9 * static_cast<double>(count)) + cpk * cpk / (2 * dof));
+      kNormalQuantile * std::sqrt(1 / (9 * static_cast<double>(count)) + cpk * cpk / (2 * dof));
   return {cpk, cpk - half, cpk + half};
 }
 
-std::optional<Capability> capability(std::span<const double> values,
-                                     const ToleranceLimits& limits) {
+std::optional<Capability> compute_capability(std::span<const double> values,
+                                             const ToleranceLimits& limits) {
   if (values.size() < 2 || (!limits.lower && !limits.upper)) return std::nullopt;
   const auto count = static_cast<double>(values.size());
-  const ControlChart chart = control_chart(values);
+  const ControlChart chart = compute_control_chart(values);
   double squares = 0;
   for (const double value : values) squares += (value - chart.mean) * (value - chart.mean);
   if (squares == 0) return std::nullopt;
-  constexpr double of_moving_range = 0.826;
-  const double dof = count - 1, within_dof = dof / (2 * of_moving_range);
+  constexpr double moving_range_factor = 0.826;
+  const double dof = count - 1, within_dof = dof / (2 * moving_range_factor);
   Capability result{.count = values.size(),
                     .mean = chart.mean,
                     .within_sd = chart.sigma,
                     .overall_sd = std::sqrt(squares / dof)};
-  result.cpk = cpk_of(limits, result.mean, result.within_sd, within_dof, result.count);
-  result.ppk = cpk_of(limits, result.mean, result.overall_sd, dof, result.count);
+  result.cpk = compute_cpk(limits, result.mean, result.within_sd, within_dof, result.count);
+  result.ppk = compute_cpk(limits, result.mean, result.overall_sd, dof, result.count);
   if (limits.lower && limits.upper) {
     const double tolerance = *limits.upper - *limits.lower;
-    result.cp = cp_of(tolerance, result.within_sd, within_dof);
-    result.pp = cp_of(tolerance, result.overall_sd, dof);
+    result.cp = compute_cp(tolerance, result.within_sd, within_dof);
+    result.pp = compute_cp(tolerance, result.overall_sd, dof);
   }
   return result;
 }

@@ -22,7 +22,7 @@ using Sigmas = std::span<const double>;
 /// Returns true if at least `many` of the last `of` values, including the last one, are more than
 /// `away` sigmas from the mean on one side.
 template <int many, int of, int away>
-bool beyond(Sigmas sigmas) {
+bool has_values_beyond(Sigmas sigmas) {
   if (sigmas.size() < many) return false;
   const Sigmas last = sigmas.last(std::min<std::size_t>(of, sigmas.size()));
   for (const double side : {1.0, -1.0}) {
@@ -37,7 +37,7 @@ bool beyond(Sigmas sigmas) {
 /// Returns true if the last `many` values increase or decrease throughout; if `turns`, if they
 /// alternate.
 template <std::size_t many, bool turns>
-bool steps(Sigmas sigmas) {
+bool has_steps(Sigmas sigmas) {
   if (sigmas.size() < many) return false;
   const Sigmas last = sigmas.last(many);
   for (const double first : {1.0, -1.0}) {
@@ -54,7 +54,7 @@ bool steps(Sigmas sigmas) {
 /// Returns true if all of the last `many` values are nearer to the mean than one sigma, or all
 /// farther.
 template <std::size_t many, bool nearer>
-bool all_about(Sigmas sigmas) {
+bool are_all_near_or_far(Sigmas sigmas) {
   if (sigmas.size() < many) return false;
   const Sigmas last = sigmas.last(many);
   return std::all_of(last.begin(), last.end(), [](double value) {
@@ -67,23 +67,25 @@ constexpr const char *kBeyond3 = "more than 3 sigmas from the mean",
                      *kBeyond1 = "4 of 5 more than a sigma from the mean, on one side";
 
 constexpr std::array kRules{
-    ChartRule{"western-electric-1", kBeyond3, beyond<1, 1, 3>},
-    ChartRule{"western-electric-2", kBeyond2, beyond<2, 3, 2>},
-    ChartRule{"western-electric-3", kBeyond1, beyond<4, 5, 1>},
-    ChartRule{"western-electric-4", "8 in a row on one side of the mean", beyond<8, 8, 0>},
-    ChartRule{"nelson-1", kBeyond3, beyond<1, 1, 3>},
-    ChartRule{"nelson-2", "9 in a row on one side of the mean", beyond<9, 9, 0>},
-    ChartRule{"nelson-3", "6 in a row up, or down", steps<6, false>},
-    ChartRule{"nelson-4", "14 in a row up and down in turns", steps<14, true>},
-    ChartRule{"nelson-5", kBeyond2, beyond<2, 3, 2>},
-    ChartRule{"nelson-6", kBeyond1, beyond<4, 5, 1>},
-    ChartRule{"nelson-7", "15 in a row within a sigma of the mean", all_about<15, true>},
-    ChartRule{"nelson-8", "8 in a row more than a sigma from the mean", all_about<8, false>}};
+    ChartRule{"western-electric-1", kBeyond3, has_values_beyond<1, 1, 3>},
+    ChartRule{"western-electric-2", kBeyond2, has_values_beyond<2, 3, 2>},
+    ChartRule{"western-electric-3", kBeyond1, has_values_beyond<4, 5, 1>},
+    ChartRule{"western-electric-4", "8 in a row on one side of the mean",
+              has_values_beyond<8, 8, 0>},
+    ChartRule{"nelson-1", kBeyond3, has_values_beyond<1, 1, 3>},
+    ChartRule{"nelson-2", "9 in a row on one side of the mean", has_values_beyond<9, 9, 0>},
+    ChartRule{"nelson-3", "6 in a row up, or down", has_steps<6, false>},
+    ChartRule{"nelson-4", "14 in a row up and down in turns", has_steps<14, true>},
+    ChartRule{"nelson-5", kBeyond2, has_values_beyond<2, 3, 2>},
+    ChartRule{"nelson-6", kBeyond1, has_values_beyond<4, 5, 1>},
+    ChartRule{"nelson-7", "15 in a row within a sigma of the mean", are_all_near_or_far<15, true>},
+    ChartRule{"nelson-8", "8 in a row more than a sigma from the mean",
+              are_all_near_or_far<8, false>}};
 
 constexpr const char* kEwma = "ewma";
 constexpr double kEwmaWeight = 0.3;
 
-bool is_of(const std::string& rule, const std::string& name) {
+bool is_selected_by(const std::string& rule, const std::string& name) {
   return rule == name || rule.substr(0, rule.rfind('-')) == name;
 }
 
@@ -91,7 +93,7 @@ bool is_of(const std::string& rule, const std::string& name) {
 void check_rules(const std::vector<std::string>& names) {
   for (const std::string& name : names) {
     const bool known = name == kEwma || std::any_of(kRules.begin(), kRules.end(), [&](auto& rule) {
-                         return is_of(rule.name, name);
+                         return is_selected_by(rule.name, name);
                        });
     if (known) continue;
     throw std::invalid_argument("there is no rule " + name +
@@ -102,14 +104,14 @@ void check_rules(const std::vector<std::string>& names) {
 
 }  // namespace
 
-ControlChart control_chart(std::span<const double> values) {
+ControlChart compute_control_chart(std::span<const double> values) {
   constexpr double d2 = 1.128;
   ControlChart chart;
   if (values.empty()) return chart;
   const auto count = static_cast<double>(values.size());
   double ranges = 0;
   for (std::size_t i = 1; i < values.size(); ++i) ranges += std::abs(values[i] - values[i - 1]);
-  chart.mean = mean_of(values);
+  chart.mean = compute_mean(values);
   chart.sigma = values.size() > 1 ? ranges / (count - 1) / d2 : 0;
   chart.lower = chart.mean - 3 * chart.sigma;
   chart.upper = chart.mean + 3 * chart.sigma;
@@ -118,8 +120,8 @@ ControlChart control_chart(std::span<const double> values) {
 
 std::span<const ChartRule> chart_rules() { return kRules; }
 
-Ewma ewma(std::span<const double> values, double target, double sigma, double weight,
-          double width) {
+Ewma compute_ewma(std::span<const double> values, double target, double sigma, double weight,
+                  double width) {
   const double half = width * sigma * std::sqrt(weight / (2 - weight));
   Ewma result{target - half, target + half, {}};
   result.averages.reserve(values.size());
@@ -131,28 +133,29 @@ Ewma ewma(std::span<const double> values, double target, double sigma, double we
   return result;
 }
 
-std::vector<ChartAlarm> chart_alarms(std::span<const double> values,
-                                     const std::vector<std::string>& rules) {
+std::vector<ChartAlarm> find_alarms(std::span<const double> values,
+                                    const std::vector<std::string>& rules) {
   check_rules(rules);
-  const ControlChart chart = control_chart(values);
+  const ControlChart chart = compute_control_chart(values);
   if (chart.sigma <= 0) return {};
   std::vector<double> sigmas;
   sigmas.reserve(values.size());
   for (const double value : values) sigmas.push_back((value - chart.mean) / chart.sigma);
-  const Ewma average = ewma(sigmas, 0, 1, kEwmaWeight);
+  const Ewma average = compute_ewma(sigmas, 0, 1, kEwmaWeight);
   std::vector<ChartAlarm> alarms;
   for (std::size_t i = 0; i < values.size(); ++i) {
-    const auto asked = [&](const std::string& rule) {
+    const auto is_selected = [&](const std::string& rule) {
       return std::any_of(rules.begin(), rules.end(),
-                         [&](const std::string& name) { return is_of(rule, name); });
+                         [&](const std::string& name) { return is_selected_by(rule, name); });
     };
     for (const ChartRule& rule : kRules) {
-      if (asked(rule.name) && rule.holds(Sigmas(sigmas).first(i + 1))) {
+      if (is_selected(rule.name) && rule.matches(Sigmas(sigmas).first(i + 1))) {
         alarms.push_back({rule.name, rule.meaning, i});
       }
     }
-    const bool off = average.averages[i] < average.lower || average.averages[i] > average.upper;
-    if (off && asked(kEwma)) {
+    const bool is_outside =
+        average.averages[i] < average.lower || average.averages[i] > average.upper;
+    if (is_outside && is_selected(kEwma)) {
       alarms.push_back({kEwma, "the moving average is beyond its limits", i});
     }
   }
@@ -162,36 +165,37 @@ std::vector<ChartAlarm> chart_alarms(std::span<const double> values,
 void draw_trend(const std::filesystem::path& picture, const std::string& title,
                 std::span<const TrendPoint> points, std::span<const ChartAlarm> alarms,
                 std::optional<double> gate) {
-  const std::vector<double> values = values_of(points);
-  const ControlChart chart = control_chart(values);
+  const std::vector<double> values = extract_values(points);
+  const ControlChart chart = compute_control_chart(values);
   std::vector<bool> alarm(points.size());
   for (const ChartAlarm& each : alarms) alarm[each.index] = true;
-  std::string data, marked;
+  std::string data, alarm_points;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const std::string row = data_row({double(i + 1), values[i]});
     data += row;
-    if (alarm[i]) marked += row;
+    if (alarm[i]) alarm_points += row;
   }
-  const auto level = [](double value, const std::string& look) {
-    return significant(value, 9) + " with lines " + look;
+  const auto horizontal_line = [](double value, const std::string& line_style) {
+    return significant(value, 9) + " with lines " + line_style;
   };
   const std::string limits = std::string("dashtype 2 linecolor rgb '") + plot_colors::vermillion;
   std::string commands = data_block("data", data) + plot_settings();
-  if (!marked.empty()) commands += data_block("marked", marked);
-  commands +=
-      "set xlabel 'runs, in the order of their end'\nset ylabel " + gnuplot_quoted(title) +
-      " noenhanced\nset xrange " + plot_range(0.5, double(points.size()) + 0.5) +
-      "\nset offsets 0, 0, graph 0.1, graph 0.1\nplot " +
-      level(chart.upper, limits + "' title 'limits'") + ", " +
-      level(chart.lower, limits + "' notitle") + ", " +
-      level(chart.mean, std::string("linecolor rgb '") + plot_colors::green + "' title 'mean'") +
-      ", $data using 1:2 with linespoints pointtype 7 linecolor rgb '" + plot_colors::blue +
-      "' title 'runs'";
+  if (!alarm_points.empty()) commands += data_block("marked", alarm_points);
+  commands += "set xlabel 'runs, in the order of their end'\nset ylabel " + gnuplot_quoted(title) +
+              " noenhanced\nset xrange " + plot_range(0.5, double(points.size()) + 0.5) +
+              "\nset offsets 0, 0, graph 0.1, graph 0.1\nplot " +
+              horizontal_line(chart.upper, limits + "' title 'limits'") + ", " +
+              horizontal_line(chart.lower, limits + "' notitle") + ", " +
+              horizontal_line(chart.mean, std::string("linecolor rgb '") + plot_colors::green +
+                                              "' title 'mean'") +
+              ", $data using 1:2 with linespoints pointtype 7 linecolor rgb '" + plot_colors::blue +
+              "' title 'runs'";
   if (gate) {
-    commands += ", " + level(*gate, std::string("dashtype 3 linewidth 2 linecolor rgb '") +
-                                        plot_colors::purple + "' title 'gate'");
+    commands +=
+        ", " + horizontal_line(*gate, std::string("dashtype 3 linewidth 2 linecolor rgb '") +
+                                          plot_colors::purple + "' title 'gate'");
   }
-  if (!marked.empty()) {
+  if (!alarm_points.empty()) {
     commands += std::string(
                     ", $marked using 1:2 with points pointtype 4 pointsize 2 linewidth 2 "
                     "linecolor rgb '") +

@@ -21,7 +21,7 @@ struct ControlChart {
 };
 
 /// Computes the chart of `values`. The limits equal the mean for fewer than two values.
-ControlChart control_chart(std::span<const double> values);
+ControlChart compute_control_chart(std::span<const double> values);
 
 /// Pattern that is improbable for values with random variation only. It refers to a value and its
 /// predecessors, as distances from the mean in units of sigma. A value at the mean is on neither
@@ -32,7 +32,7 @@ struct ChartRule {
   const char* name;
   const char* meaning;
   /// Returns true if the pattern ends at the last value.
-  bool (*holds)(std::span<const double> sigmas);
+  bool (*matches)(std::span<const double> sigmas);
 };
 std::span<const ChartRule> chart_rules();
 
@@ -44,8 +44,8 @@ struct Ewma {
   double lower = 0, upper = 0;
   std::vector<double> averages;
 };
-Ewma ewma(std::span<const double> values, double target, double sigma, double weight,
-          double width = 3);
+Ewma compute_ewma(std::span<const double> values, double target, double sigma, double weight,
+                  double width = 3);
 
 /// Value at which a pattern ends.
 struct ChartAlarm {
@@ -56,8 +56,8 @@ struct ChartAlarm {
 /// Finds alarms, in the order of the values, by rules of these names. "western-electric" and
 /// "nelson" select all of their rules, "ewma" the moving average with weight 0.3. Equal values have
 /// no alarms. Throws std::invalid_argument for an unknown name.
-std::vector<ChartAlarm> chart_alarms(std::span<const double> values,
-                                     const std::vector<std::string>& rules);
+std::vector<ChartAlarm> find_alarms(std::span<const double> values,
+                                    const std::vector<std::string>& rules);
 
 /// Plots values in their order with mean, limits, alarms and the gate, if any, as .png or .svg.
 /// Throws InputError (draw()).

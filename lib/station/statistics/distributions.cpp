@@ -11,7 +11,7 @@ namespace vlp {
 
 using boost::math::complement;
 
-double mean_of(std::span<const double> values) {
+double compute_mean(std::span<const double> values) {
   double above_first = 0;
   for (const double value : values) above_first += value - values.front();
   return values.front() + above_first / static_cast<double>(values.size());

@@ -7,7 +7,7 @@
 namespace vlp {
 
 /// Computes the mean; exactly the common value if all values are equal. Precondition: not empty.
-double mean_of(std::span<const double> values);
+double compute_mean(std::span<const double> values);
 
 /// Returns the quantile of chi squared. Precondition: 0 < probability < 1, dof > 0.
 double chi_square_quantile(double probability, double dof);

@@ -12,7 +12,7 @@
 namespace vlp {
 
 /// Row of an analysis of variance.
-struct AnovaLine {
+struct AnovaRow {
   double dof = 0, sum_of_squares = 0;
   double mean_square() const { return dof > 0 ? sum_of_squares / dof : 0; }
 };
@@ -35,7 +35,7 @@ struct AnovaLine {
 /// also replaces MS_i. All results below are standard deviations.
 struct MeasurementStudy {
   std::size_t units = 0, stations = 0, repeats = 0;
-  AnovaLine unit, station, both, error;
+  AnovaRow unit, station, interaction, error;
   double mean = 0;
   /// Probability of a larger MS_i / MS_e by chance; std::nullopt with one station.
   std::optional<double> interaction_p;
@@ -44,10 +44,10 @@ struct MeasurementStudy {
 
   /// AIAG's EV (equipment variation, e), AV (appraiser variation, station) and INT (interaction).
   /// The last two are 0 with one station, because they cannot be determined.
-  double repeatability = 0, of_station = 0, of_both = 0;
+  double repeatability = 0, of_station = 0, of_interaction = 0;
   /// AIAG's GRR = sqrt(EV^2 + AV^2 + INT^2), PV (part variation), and TV (total variation). By the
   /// manual's rule 100 GRR / TV is acceptable up to 10 and unacceptable above 30.
-  double measuring = 0, of_unit = 0, total = 0;
+  double grr = 0, of_unit = 0, total = 0;
   /// Returns AIAG's ndc = 1.41 PV / GRR, truncated and at least 1; the manual requires 5. Returns
   /// std::nullopt if GRR is 0.
   std::optional<int> distinct_categories() const;
@@ -65,6 +65,6 @@ struct StudyValue {
 
 /// Analyzes a crossed study. Throws std::invalid_argument for fewer than two units or repeats, or
 /// if the number of repeats differs between units or stations; the message names what is missing.
-MeasurementStudy measurement_study(const std::vector<StudyValue>& values);
+MeasurementStudy analyze_measurements(const std::vector<StudyValue>& values);
 
 }  // namespace vlp

@@ -10,15 +10,15 @@
 
 namespace vlp {
 
-std::vector<MetricKind> run_figures() {
+std::vector<MetricKind> list_run_metrics() {
   auto kinds = unit_metrics();
-  const auto of_fixes = metric_kinds({MetricSource::evaluation});
-  kinds.insert(kinds.end(), of_fixes.begin(), of_fixes.end());
+  const auto fix_metrics = metric_kinds({MetricSource::evaluation});
+  kinds.insert(kinds.end(), fix_metrics.begin(), fix_metrics.end());
   return kinds;
 }
 
-MetricKind run_figure(const std::string& name) {
-  const auto kinds = run_figures();
+MetricKind find_run_metric(const std::string& name) {
+  const auto kinds = list_run_metrics();
   const auto kind = std::find_if(kinds.begin(), kinds.end(),
                                  [&](const MetricKind& any) { return any.name == name; });
   if (kind != kinds.end()) return *kind;
@@ -27,14 +27,14 @@ MetricKind run_figure(const std::string& name) {
   throw std::invalid_argument("there is no figure " + name + "; there are: " + names);
 }
 
-std::vector<TrendPoint> judged_values(Records& records, const std::string& figure,
-                                      RunFilter filter) {
-  if (!filter.verdict.empty()) return records.trend(figure, filter);
+std::vector<TrendPoint> load_judged_values(Records& records, const std::string& metric,
+                                           RunFilter filter) {
+  if (!filter.verdict.empty()) return records.trend(metric, filter);
   const int last = std::exchange(filter.last, 0);
-  auto points = records.trend(figure, filter);
-  std::erase_if(points,
-                [](const TrendPoint& point) { return point.verdict == name_of(Verdict::invalid); });
-  return last_of(std::move(points), last);
+  auto points = records.trend(metric, filter);
+  std::erase_if(
+      points, [](const TrendPoint& point) { return point.verdict == to_string(Verdict::invalid); });
+  return keep_last(std::move(points), last);
 }
 
 void check_one_station(const std::vector<TrendPoint>& points) {
@@ -47,29 +47,29 @@ void check_one_station(const std::vector<TrendPoint>& points) {
   }
 }
 
-std::optional<double> gate_of(const std::string& figure, const StationConfig* station,
-                              Records& records, const std::vector<TrendPoint>& points) {
+std::optional<double> find_gate(const std::string& metric, const StationConfig* station,
+                                Records& records, const std::vector<TrendPoint>& points) {
   if (station != nullptr) {
     for (const Gate& gate : station->gates) {
-      if (gate.metric == figure) return gate.limit;
+      if (gate.metric == metric) return gate.limit;
     }
     return std::nullopt;
   }
   const auto last = points.empty() ? std::nullopt : records.find(points.back().run);
   if (!last) return std::nullopt;
-  for (const CheckedMetric& any : last->figures) {
-    if (any.name == figure) return any.limit;
+  for (const CheckedMetric& any : last->metrics) {
+    if (any.name == metric) return any.limit;
   }
   return std::nullopt;
 }
 
-ToleranceLimits limits_of(const MetricKind& kind, std::optional<double> gate) {
-  if (kind.asked == Direction::at_least) return {gate, std::nullopt};
+ToleranceLimits make_limits(const MetricKind& kind, std::optional<double> gate) {
+  if (kind.direction == Direction::at_least) return {gate, std::nullopt};
   return {std::nullopt, gate};
 }
 
-std::vector<StudyValue> study_values(const std::vector<TrendPoint>& points,
-                                     const std::vector<std::string>& units) {
+std::vector<StudyValue> select_study_values(const std::vector<TrendPoint>& points,
+                                            const std::vector<std::string>& units) {
   std::map<std::string, std::size_t> runs;
   for (const TrendPoint& point : points) ++runs[point.camera];
   std::string unknown;
@@ -109,13 +109,13 @@ void check_repetitions(Records& records, const std::vector<TrendPoint>& points,
   }
 }
 
-std::vector<ReferenceValue> reference_values(const std::vector<TrendPoint>& points,
-                                             const std::map<std::string, double>& references) {
+std::vector<ReferenceValue> select_reference_values(
+    const std::vector<TrendPoint>& points, const std::map<std::string, double>& references) {
   std::vector<std::string> units;
   units.reserve(references.size());
   for (const auto& [unit, reference] : references) units.push_back(unit);
   std::vector<ReferenceValue> values;
-  for (const auto& [unit, station, value] : study_values(points, units)) {
+  for (const auto& [unit, station, value] : select_study_values(points, units)) {
     values.push_back({unit, references.at(unit), value});
   }
   return values;

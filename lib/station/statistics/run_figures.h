@@ -19,14 +19,14 @@ namespace vlp {
 
 /// Returns the metrics of runs: unit_metrics(), and the metrics of errors of fixes in sessions of
 /// archives (archive_runs.h).
-std::vector<MetricKind> run_figures();
+std::vector<MetricKind> list_run_metrics();
 /// Returns the metric of this name. Throws std::invalid_argument that lists the valid names.
-MetricKind run_figure(const std::string& name);
+MetricKind find_run_metric(const std::string& name);
 
 /// Returns the values of a metric in judged runs, or in runs of the verdict that the filter
 /// selects.
-std::vector<TrendPoint> judged_values(Records& records, const std::string& figure,
-                                      RunFilter filter);
+std::vector<TrendPoint> load_judged_values(Records& records, const std::string& metric,
+                                           RunFilter filter);
 
 /// Throws std::invalid_argument if the values are of two stations. They are compared only on
 /// request.
@@ -34,20 +34,20 @@ void check_one_station(const std::vector<TrendPoint>& points);
 
 /// Returns the gate of a metric in the station's configuration or, without a station, in the last
 /// run. Returns std::nullopt if there is none.
-std::optional<double> gate_of(const std::string& figure, const StationConfig* station,
-                              Records& records, const std::vector<TrendPoint>& points);
-ToleranceLimits limits_of(const MetricKind& kind, std::optional<double> gate);
+std::optional<double> find_gate(const std::string& metric, const StationConfig* station,
+                                Records& records, const std::vector<TrendPoint>& points);
+ToleranceLimits make_limits(const MetricKind& kind, std::optional<double> gate);
 
 /// Returns the values of the named units; those of all units with two runs or more if `units` is
 /// empty. Throws std::invalid_argument for units without a value.
-std::vector<StudyValue> study_values(const std::vector<TrendPoint>& points,
-                                     const std::vector<std::string>& units);
+std::vector<StudyValue> select_study_values(const std::vector<TrendPoint>& points,
+                                            const std::vector<std::string>& units);
 /// Throws std::invalid_argument that names two runs of one of the units that use the same images,
 /// because such runs do not show repeatability. Ignores runs without images.
 void check_repetitions(Records& records, const std::vector<TrendPoint>& points,
                        const std::vector<StudyValue>& values);
-/// Returns the values of reference units with their known values. Throws as study_values().
-std::vector<ReferenceValue> reference_values(const std::vector<TrendPoint>& points,
-                                             const std::map<std::string, double>& references);
+/// Returns the values of reference units with their known values. Throws as select_study_values().
+std::vector<ReferenceValue> select_reference_values(
+    const std::vector<TrendPoint>& points, const std::map<std::string, double>& references);
 
 }  // namespace vlp

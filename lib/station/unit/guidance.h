@@ -10,12 +10,12 @@
 namespace vlp {
 
 /// Returns the progress of a step as text of at most 78 columns.
-std::vector<std::string> progress_of(const Unit& unit, StationStep step);
+std::vector<std::string> describe_progress(const Unit& unit, StationStep step);
 
 /// Returns the next instruction for the operator, in one or two lines of at most 70 columns.
-std::string next_of(const Unit& unit, StationStep step);
+std::string describe_next_action(const Unit& unit, StationStep step);
 
 /// Returns the number of images and the required number: "12/36".
-std::string count_of(const Unit& unit, StationStep step);
+std::string format_count(const Unit& unit, StationStep step);
 
 }  // namespace vlp

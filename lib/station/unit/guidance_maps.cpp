@@ -24,7 +24,7 @@ std::string missing_angles(const TurnMap::Height& height) {
 
 }  // namespace
 
-std::vector<std::string> board_map(const Unit& unit) {
+std::vector<std::string> draw_board_map(const Unit& unit) {
   const ImageCoverage coverage =
       board_coverage(unit.step(StationStep::boards), unit.config().type.imager_px);
   constexpr int many = 20;
@@ -41,26 +41,27 @@ std::vector<std::string> board_map(const Unit& unit) {
   }
   lines.push_back(edge);
   lines[1] += fmt::format("   {:.0f} % of the image have corners, {:.0f} % wanted",
-                          100 * coverage.fraction(), 100 * unit.config().enough.board_coverage);
+                          100 * coverage.fraction(), 100 * unit.config().sufficient.board_coverage);
   lines[3] += "   # many corners   + some   . none";
   const UnitStep& boards = unit.step(StationStep::boards);
   const auto last = boards.images.find(boards.last);
   if (last == boards.images.end() || !last->second.seen.board) return lines;
-  if (const auto mtf50 = mtf50_of_view(last->second.seen.board->seen)) {
+  if (const auto mtf50 = compute_view_mtf50(last->second.seen.board->seen)) {
     lines[5] += fmt::format("   sharpness of the last image: MTF50 {:.3f} cycles/px", *mtf50);
   }
   return lines;
 }
 
-TurnMap turn_of(const Unit& unit) {
+TurnMap compute_unit_turn_map(const Unit& unit) {
   const auto& lens = unit.step(StationStep::boards).result;
   if (!lens || !lens->ok()) return {};
-  return turn_map(frames_of(unit.step(StationStep::rotation)), unit.config(), lens->calibration);
+  return compute_turn_map(collect_frames(unit.step(StationStep::rotation)), unit.config(),
+                          lens->calibration);
 }
 
-std::vector<std::string> turn_lines(const Unit& unit) {
+std::vector<std::string> describe_turn(const Unit& unit) {
   std::vector<std::string> lines;
-  for (const TurnMap::Height& height : turn_of(unit).heights) {
+  for (const TurnMap::Height& height : compute_unit_turn_map(unit).heights) {
     std::string parts;
     for (const bool there : height.parts) parts += there ? '#' : '.';
     const double z_m = std::round(100 * height.z_m) / 100 + 0.0;  // without negative zero
@@ -72,10 +73,10 @@ std::vector<std::string> turn_lines(const Unit& unit) {
   return lines;
 }
 
-std::string lamps_line(const Unit& unit, const UnitStep& step) {
+std::string describe_lamps(const Unit& unit, const UnitStep& step) {
   std::map<int, int> seen;
   for (const UnitImage* image : used_images(step)) {
-    for (const Detection& lamp : lamps_in(image->seen)) ++seen[lamp.lamp];
+    for (const Detection& lamp : collect_lamps(image->seen)) ++seen[lamp.lamp];
   }
   std::string there, missing;
   for (const Lamp& lamp : unit.config().lamps.lamps) {

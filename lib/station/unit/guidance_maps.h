@@ -11,14 +11,14 @@
 namespace vlp {
 
 /// Returns a map of the corners over the image: '#' many, '+' some, '.' none.
-std::vector<std::string> board_map(const Unit& unit);
+std::vector<std::string> draw_board_map(const Unit& unit);
 
 /// Returns the covered angles of the rotation in place; empty before the lens is known.
-TurnMap turn_of(const Unit& unit);
+TurnMap compute_unit_turn_map(const Unit& unit);
 /// Returns the heights of the rotation with covered and missing angles, as lines.
-std::vector<std::string> turn_lines(const Unit& unit);
+std::vector<std::string> describe_turn(const Unit& unit);
 
 /// Returns a line with the lamps that the captures of a step contain, and the missing ones.
-std::string lamps_line(const Unit& unit, const UnitStep& step);
+std::string describe_lamps(const Unit& unit, const UnitStep& step);
 
 }  // namespace vlp

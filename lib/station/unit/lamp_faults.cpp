@@ -51,8 +51,9 @@ std::vector<PlaceError> place_errors(std::span<const Frame> frames, const LampMa
 
 }  // namespace
 
-std::vector<std::string> lamp_faults(std::span<const Frame> frames, const LampMap& map,
-                                     const Calibration& calibration, double min_offset_px) {
+std::vector<std::string> describe_lamp_faults(std::span<const Frame> frames, const LampMap& map,
+                                              const Calibration& calibration,
+                                              double min_offset_px) {
   std::vector<std::string> faults;
   if (frames.size() < kMinFrames) return faults;
   MapErrorOptions options;
@@ -65,15 +66,15 @@ std::vector<std::string> lamp_faults(std::span<const Frame> frames, const LampMa
   return faults;
 }
 
-std::vector<std::string> unseen_lamps(std::span<const Frame> frames, const LampMap& map) {
+std::vector<std::string> describe_missing_lamps(std::span<const Frame> frames, const LampMap& map) {
   std::vector<std::string> faults;
   if (frames.size() < kMinFrames) return faults;
   for (const MapError& error : find_unseen_lamps(frames, map)) faults.push_back(describe(error));
   return faults;
 }
 
-std::string place_fault(std::span<const Frame> frames, const LampMap& map,
-                        const Calibration& calibration, const CapturesTable& places) {
+std::string describe_place_fault(std::span<const Frame> frames, const LampMap& map,
+                                 const Calibration& calibration, const CapturesTable& places) {
   std::vector<CheckError> errors;
   for (const PlaceError& error : place_errors(frames, map, calibration, places)) {
     errors.push_back({error.image, error.horizontal_m.norm(), error.frame});
@@ -81,8 +82,8 @@ std::string place_fault(std::span<const Frame> frames, const LampMap& map,
   return describe_check_outliers(errors);
 }
 
-std::string capture_fault(std::span<const Frame> frames, const LampMap& map,
-                          const Calibration& calibration) {
+std::string describe_capture_fault(std::span<const Frame> frames, const LampMap& map,
+                                   const Calibration& calibration) {
   const Positioner positioner(map, calibration);
   std::vector<CaptureResidual> residuals;
   residuals.reserve(frames.size());

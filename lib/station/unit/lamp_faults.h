@@ -20,22 +20,23 @@ namespace vlp {
 /// each. Requires three captures. Offsets below `min_offset_px` in the image are ignored. The
 /// default is large, so that small errors of the map do not excuse a camera that is being
 /// calibrated. It can be smaller for a known camera.
-std::vector<std::string> lamp_faults(std::span<const Frame> frames, const LampMap& map,
-                                     const Calibration& calibration, double min_offset_px = 2.5);
+std::vector<std::string> describe_lamp_faults(std::span<const Frame> frames, const LampMap& map,
+                                              const Calibration& calibration,
+                                              double min_offset_px = 2.5);
 
 /// Describes the lamps of the map that no capture contains, one line each. Requires three captures.
-std::vector<std::string> unseen_lamps(std::span<const Frame> frames, const LampMap& map);
+std::vector<std::string> describe_missing_lamps(std::span<const Frame> frames, const LampMap& map);
 
 /// Describes captures at other places than in their table, or by another camera
 /// (describe_check_outliers()), from fixes of three lamps or more. Returns an empty string if there
 /// are none.
-std::string place_fault(std::span<const Frame> frames, const LampMap& map,
-                        const Calibration& calibration, const CapturesTable& places);
+std::string describe_place_fault(std::span<const Frame> frames, const LampMap& map,
+                                 const Calibration& calibration, const CapturesTable& places);
 
 /// Describes captures whose residuals are outliers (describe_residual_outliers()), from fixes of
 /// three lamps or more. Returns an empty string if there are none.
-std::string capture_fault(std::span<const Frame> frames, const LampMap& map,
-                          const Calibration& calibration);
+std::string describe_capture_fault(std::span<const Frame> frames, const LampMap& map,
+                                   const Calibration& calibration);
 
 /// Common offset of all captures at known points.
 struct CommonOffset {

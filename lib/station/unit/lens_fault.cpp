@@ -22,23 +22,23 @@ constexpr Eigen::Index kFocalAndCenter = 4;
 
 /// Returns the calibration with additional variance for focal lengths and center, 5 % of the focal
 /// length. Distortion is common to the type of camera and is not freed.
-Calibration with_free_focus(Calibration calibration) {
-  constexpr double share = 0.05;
+Calibration with_free_focal_length(Calibration calibration) {
+  constexpr double relative_sd = 0.05;
   const double sd_px =
-      share * (calibration.camera.intrinsics[0] + calibration.camera.intrinsics[1]) / 2;
+      relative_sd * (calibration.camera.intrinsics[0] + calibration.camera.intrinsics[1]) / 2;
   auto& report = calibration.intrinsics_report;
   if (!report) report.emplace();
   auto& covariance = report->covariance;
   if (!covariance) {
-    const Eigen::Index n = stated_intrinsics(calibration.camera);
+    const Eigen::Index n = count_reported_intrinsics(calibration.camera);
     covariance = Eigen::MatrixXd(Eigen::MatrixXd::Zero(n, n));
   }
   for (Eigen::Index i = 0; i < kFocalAndCenter; ++i) (*covariance)(i, i) += sd_px * sd_px;
   return calibration;
 }
 
-AdjustmentResult adjusted(std::span<const Frame> frames, const LampMap& map,
-                          Calibration calibration) {
+AdjustmentResult adjust_frames(std::span<const Frame> frames, const LampMap& map,
+                               Calibration calibration) {
   AdjustmentInput input{{}, map, std::move(calibration)};
   for (Lamp& lamp : input.lamps.lamps) lamp.sd_m = 0;
   for (const Frame& frame : frames) input.captures.push_back({frame.image, frame.detections});
@@ -71,7 +71,7 @@ std::optional<HeightErrors> find_height_errors(const PlacedCaptures& captures, c
 }
 
 /// Returns the largest displacement of an image corner between two lenses.
-double corner_shift_px(const Camera& a, const Camera& b) {
+double max_corner_displacement_px(const Camera& a, const Camera& b) {
   double worst_px = 0;
   for (const double u : {0., double(a.imager_px[0])}) {
     for (const double v : {0., double(a.imager_px[1])}) {
@@ -87,17 +87,19 @@ double corner_shift_px(const Camera& a, const Camera& b) {
 
 }  // namespace
 
-std::string lens_fault(std::span<const Frame> frames, const LampMap& map,
-                       const Calibration& calibration) {
-  constexpr std::size_t least_captures =
+std::string describe_lens_fault(std::span<const Frame> frames, const LampMap& map,
+                                const Calibration& calibration) {
+  constexpr std::size_t min_captures =
       10;  // with fewer a free lens absorbs residuals of other faults
-  if (frames.size() < least_captures) return "";
-  const AdjustmentResult as_stated = adjusted(frames, map, calibration);
-  const AdjustmentResult freed = adjusted(frames, map, with_free_focus(calibration));
-  if (!as_stated.ok() || !freed.ok()) return "";
-  constexpr double far_better = 1.0 / 3, least_px = 1;
-  if (freed.residual_px >= far_better * as_stated.residual_px) return "";
-  if (corner_shift_px(calibration.camera, freed.camera) < least_px) return "";
+  if (frames.size() < min_captures) return "";
+  const AdjustmentResult constrained = adjust_frames(frames, map, calibration);
+  const AdjustmentResult unconstrained =
+      adjust_frames(frames, map, with_free_focal_length(calibration));
+  if (!constrained.ok() || !unconstrained.ok()) return "";
+  constexpr double max_residual_ratio = 1.0 / 3, min_displacement_px = 1;
+  if (unconstrained.residual_px >= max_residual_ratio * constrained.residual_px) return "";
+  if (max_corner_displacement_px(calibration.camera, unconstrained.camera) < min_displacement_px)
+    return "";
   const auto words = [](const Camera& camera) {
     return fmt::format("a focal length of {:.1f} px and the centre ({:.1f}, {:.1f})",
                        std::sqrt(camera.focal_px().prod()), camera.center_px().x(),
@@ -106,37 +108,39 @@ std::string lens_fault(std::span<const Frame> frames, const LampMap& map,
   return fmt::format(
       "the lamps are seen through another lens than the boards: they show {}, the boards {}; are "
       "all images of this unit, or has its lens moved?",
-      words(freed.camera), words(calibration.camera));
+      words(unconstrained.camera), words(calibration.camera));
 }
 
-std::string find_other_focal_length(const PlacedCaptures& captures, const PlacedCaptures& own,
+std::string find_other_focal_length(const PlacedCaptures& captures, const PlacedCaptures& reference,
                                     const LampMap& map, const Calibration& calibration) {
   const auto heights = find_height_errors(captures, map, calibration);
-  const auto own_heights = find_height_errors(own, map, calibration);
-  if (!heights || !own_heights) return "";
+  const auto reference_heights = find_height_errors(reference, map, calibration);
+  if (!heights || !reference_heights) return "";
   // A unit that is loose sideways can have moved by the same amount along its axis.
   constexpr double min_difference_m = kMinOutlierError_m, sigmas = 3, mm_per_m = 1e3;
-  const double difference_m = heights->median_m - own_heights->median_m;
-  const double sd_m = std::hypot(heights->sd_m, own_heights->sd_m);
+  const double difference_m = heights->median_m - reference_heights->median_m;
+  const double sd_m = std::hypot(heights->sd_m, reference_heights->sd_m);
   if (std::abs(difference_m) <= std::max(min_difference_m, sigmas * sd_m)) return "";
   return fmt::format(
       "its focal length differs, by heights that are off by {:+.1f} mm, in dispersion by {:+.1f} "
       "mm",
-      mm_per_m * heights->median_m, mm_per_m * own_heights->median_m);
+      mm_per_m * heights->median_m, mm_per_m * reference_heights->median_m);
 }
 
-std::string find_other_lens(std::span<const Frame> frames, std::span<const Frame> own,
+std::string find_other_lens(std::span<const Frame> frames, std::span<const Frame> reference,
                             const LampMap& map, const Calibration& calibration) {
-  const AdjustmentResult result = adjusted(frames, map, calibration);
-  const AdjustmentResult of_own = adjusted(own, map, calibration);
-  if (!result.ok() || !of_own.ok()) return "";
-  // The same ratio as in lens_fault(); 0.1 px is 0.3 mm at lamps 1.6 m above a lens of 520 px.
+  const AdjustmentResult result = adjust_frames(frames, map, calibration);
+  const AdjustmentResult reference_result = adjust_frames(reference, map, calibration);
+  if (!result.ok() || !reference_result.ok()) return "";
+  // The same ratio as in describe_lens_fault(); 0.1 px is 0.3 mm at lamps 1.6 m above a lens of 520
+  // px.
   constexpr double min_ratio = 3, min_residual_px = 0.1;
-  if (result.residual_px < std::max(min_residual_px, min_ratio * of_own.residual_px)) return "";
+  if (result.residual_px < std::max(min_residual_px, min_ratio * reference_result.residual_px))
+    return "";
   return fmt::format(
       "its lens differs, by residuals of the lamps of {:.2f} px at any tilt, in "
       "dispersion {:.2g} px",
-      result.residual_px, of_own.residual_px);
+      result.residual_px, reference_result.residual_px);
 }
 
 }  // namespace vlp

@@ -22,8 +22,8 @@ namespace vlp {
 /// third of the first, and a corner of the image moves by 1 px or more.
 ///
 /// Returns an empty string if an adjustment is undetermined, and for fewer than ten captures.
-std::string lens_fault(std::span<const Frame> frames, const LampMap& map,
-                       const Calibration& calibration);
+std::string describe_lens_fault(std::span<const Frame> frames, const LampMap& map,
+                                const Calibration& calibration);
 
 /// Captures of lamps with their known heights.
 struct PlacedCaptures {
@@ -37,14 +37,14 @@ struct PlacedCaptures {
 ///
 /// Returns an empty string for a difference below 5 mm or three standard deviations of a height.
 /// Returns an empty string, too, if a set has fewer than five captures of known height.
-std::string find_other_focal_length(const PlacedCaptures& captures, const PlacedCaptures& own,
+std::string find_other_focal_length(const PlacedCaptures& captures, const PlacedCaptures& reference,
                                     const LampMap& map, const Calibration& calibration);
 
 /// Describes in one line that the residuals of `frames` are larger than those of `reference`, by 3
 /// times and above 0.1 px. Each set is adjusted with its own tilt, so that another center or
 /// distortion raises the residuals, and a camera that moved or tilted does not. Returns an empty
 /// string without such a difference, and if an adjustment is undetermined.
-std::string find_other_lens(std::span<const Frame> frames, std::span<const Frame> own,
+std::string find_other_lens(std::span<const Frame> frames, std::span<const Frame> reference,
                             const LampMap& map, const Calibration& calibration);
 
 }  // namespace vlp

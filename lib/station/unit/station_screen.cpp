@@ -36,7 +36,7 @@ void add_wrapped(std::vector<ScreenLine>& lines, const std::string& label, const
   lines.push_back({line.substr(0, kColumns), tone});
 }
 
-std::string outcome_of(const UnitImage& image) {
+std::string describe_outcome(const UnitImage& image) {
   return image.is_used() ? "taken" : "refused: " + image.refusal();
 }
 
@@ -48,7 +48,7 @@ std::optional<StationStep> find_unfinished_step(const RunRecord& record) {
   std::istringstream causes(record.causes);
   for (std::string cause; std::getline(causes, cause);) {
     for (const StationStep step : kStationSteps) {
-      const std::string name = name_of(step);
+      const std::string name = to_string(step);
       if (cause.starts_with(name + ": ") || cause.starts_with(name + " (")) return step;
     }
   }
@@ -59,27 +59,28 @@ std::optional<StationStep> find_unfinished_step(const RunRecord& record) {
 /// their names if all steps finished. Returns an empty string if all gates have a value.
 std::string describe_unmeasured_gates(const RunRecord& record) {
   std::vector<std::string> names;
-  for (const CheckedMetric& figure : record.figures) {
-    if (figure.limit && !figure.value) names.push_back(figure.name);
+  for (const CheckedMetric& metric : record.metrics) {
+    if (metric.limit && !metric.value) names.push_back(metric.name);
   }
   if (names.empty()) return "";
   const auto step = find_unfinished_step(record);
   if (!step) return fmt::format("{}", fmt::join(names, ", "));
   return fmt::format("{} {}, because {} did not finish", names.size(),
-                     names.size() == 1 ? "gate" : "gates", name_of(*step));
+                     names.size() == 1 ? "gate" : "gates", to_string(*step));
 }
 
-ScreenLine gate_line(const CheckedMetric& figure) {
-  const std::string value = figure.value ? fmt::format("{:.4g}", *figure.value) : "-";
-  const std::string limit = fmt::format(
-      "{} {:.4g}", figure.asked == Direction::at_least ? ">=" : "<=", figure.acceptance_limit());
-  std::string outcome = figure.met() ? "met" : "NOT MET";
-  if (const auto sure = figure.conformance_probability()) {
+ScreenLine gate_line(const CheckedMetric& metric) {
+  const std::string value = metric.value ? fmt::format("{:.4g}", *metric.value) : "-";
+  const std::string limit =
+      fmt::format("{} {:.4g}",
+                  metric.direction == Direction::at_least ? ">=" : "<=", metric.acceptance_limit());
+  std::string outcome = metric.passed() ? "met" : "NOT MET";
+  if (const auto sure = metric.conformance_probability()) {
     outcome += fmt::format(", p {:.3f}", *sure);
   }
   return {
-      fmt::format("{:<24}{:>12}{:>14} {:<4} {}", figure.name, value, limit, figure.unit, outcome),
-      figure.met() ? Tone::plain : Tone::bad};
+      fmt::format("{:<24}{:>12}{:>14} {:<4} {}", metric.name, value, limit, metric.unit, outcome),
+      metric.passed() ? Tone::plain : Tone::bad};
 }
 
 const std::array kPass{"  ####     #     ####    #### ", "  #   #   # #   #       #     ",
@@ -97,7 +98,7 @@ const std::array kInvalid{"  ###  #   #  #   #    #    #      ###  #### ",
 
 }  // namespace
 
-std::vector<ScreenLine> station_screen(const Unit& unit) {
+std::vector<ScreenLine> make_station_screen(const Unit& unit) {
   std::vector<ScreenLine> lines;
   lines.push_back(
       {fmt::format("{}   camera {}", unit.config().station, unit.camera_id()).substr(0, kColumns),
@@ -106,53 +107,53 @@ std::vector<ScreenLine> station_screen(const Unit& unit) {
   std::string steps;
   for (const StationStep step : kStationSteps) {
     const char* mark = unit.step(step).done() ? "x" : step == current ? ">" : " ";
-    steps += fmt::format("[{}] {} {}   ", mark, name_of(step), count_of(unit, step));
+    steps += fmt::format("[{}] {} {}   ", mark, to_string(step), format_count(unit, step));
   }
   lines.push_back({steps.substr(0, kColumns)});
-  if (!unit.distrusted().empty()) {
-    add_wrapped(lines, "Station", unit.distrusted() + "; no unit passes", Tone::bad);
+  if (!unit.invalid_reason().empty()) {
+    add_wrapped(lines, "Station", unit.invalid_reason() + "; no unit passes", Tone::bad);
   }
   lines.push_back({""});
   if (!current) return lines;
   const UnitStep& state = unit.step(*current);
-  lines.push_back({name_of(*current), Tone::heading});
-  for (std::string& line : progress_of(unit, *current)) {
+  lines.push_back({to_string(*current), Tone::heading});
+  for (std::string& line : describe_progress(unit, *current)) {
     lines.push_back({line.substr(0, kColumns)});
   }
-  add_wrapped(lines, "Next", next_of(unit, *current), Tone::plain);
+  add_wrapped(lines, "Next", describe_next_action(unit, *current), Tone::plain);
   if (const auto image = state.images.find(state.last); image != state.images.end()) {
-    add_wrapped(lines, "Last", image->first + ": " + outcome_of(image->second),
+    add_wrapped(lines, "Last", image->first + ": " + describe_outcome(image->second),
                 image->second.is_used() ? Tone::good : Tone::bad);
   }
-  for (const CheckedMetric& figure : unit.figures()) {
+  for (const CheckedMetric& metric : unit.metrics()) {
     // Blur of all current views: a few views can be misleading.
-    const bool known = figure.value && figure.name != "blur_px";
-    if (known && !figure.met()) add_wrapped(lines, "Fails", cause_of(figure), Tone::bad);
+    const bool known = metric.value && metric.name != "blur_px";
+    if (known && !metric.passed()) add_wrapped(lines, "Fails", describe_failure(metric), Tone::bad);
   }
-  if (state.refused_in_a_row > 1) {
+  if (state.num_consecutive_rejections > 1) {
     add_wrapped(lines, "Refused",
-                fmt::format("{} in a row; after {} the run ends", state.refused_in_a_row,
-                            unit.config().max_rejected_in_a_row),
+                fmt::format("{} in a row; after {} the run ends", state.num_consecutive_rejections,
+                            unit.config().max_consecutive_rejections),
                 Tone::bad);
   }
   return lines;
 }
 
-std::string last_image_line(const Unit& unit, StationStep step, const std::string& image) {
+std::string make_last_image_line(const Unit& unit, StationStep step, const std::string& image) {
   const auto& images = unit.step(step).images;
   const auto found = images.find(image);
   const std::string outcome =
-      found == images.end() ? "waits for the step before" : outcome_of(found->second);
-  return fmt::format("{} {}: {} ({})", name_of(step), image, outcome, count_of(unit, step));
+      found == images.end() ? "waits for the step before" : describe_outcome(found->second);
+  return fmt::format("{} {}: {} ({})", to_string(step), image, outcome, format_count(unit, step));
 }
 
-std::vector<ScreenLine> spool_lines(const std::string& notice) {
+std::vector<ScreenLine> make_spool_lines(const std::string& notice) {
   std::vector<ScreenLine> lines;
   if (!notice.empty()) add_wrapped(lines, "Records", printable(notice), Tone::bad);
   return lines;
 }
 
-std::vector<ScreenLine> hook_lines(const RunRecord& record) {
+std::vector<ScreenLine> make_hook_lines(const RunRecord& record) {
   std::vector<ScreenLine> lines;
   const std::string problem = hook_problem(record);
   if (problem.empty()) return lines;
@@ -160,14 +161,14 @@ std::vector<ScreenLine> hook_lines(const RunRecord& record) {
   return lines;
 }
 
-std::vector<ScreenLine> verdict_screen(const RunRecord& record) {
-  const std::string no_verdict = why_no_verdict(record);
+std::vector<ScreenLine> make_verdict_screen(const RunRecord& record) {
+  const std::string no_verdict = find_verdict_problem(record);
   const bool passed = record.passed() && no_verdict.empty();
   const Tone tone = passed ? Tone::good : Tone::bad;
   std::vector<ScreenLine> lines{
       {fmt::format("{:<24}{:>12}{:>14}", "gate", "figure", "limit"), Tone::heading}};
-  for (const CheckedMetric& figure : record.figures) {
-    if (figure.limit && figure.value) lines.push_back(gate_line(figure));
+  for (const CheckedMetric& metric : record.metrics) {
+    if (metric.limit && metric.value) lines.push_back(gate_line(metric));
   }
   if (const std::string gates = describe_unmeasured_gates(record); !gates.empty()) {
     add_wrapped(lines, "Gates", "not measured: " + gates, Tone::plain);

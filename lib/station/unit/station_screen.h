@@ -21,19 +21,19 @@ struct ScreenLine {
 
 /// Returns the operator's screen while a unit is processed: the steps, progress of the current
 /// step, the next instruction, and the result of the last image.
-std::vector<ScreenLine> station_screen(const Unit& unit);
+std::vector<ScreenLine> make_station_screen(const Unit& unit);
 
 /// Returns the result of an image of a step, in one line.
-std::string last_image_line(const Unit& unit, StationStep step, const std::string& image);
+std::string make_last_image_line(const Unit& unit, StationStep step, const std::string& image);
 
 /// Returns hook_problem() with its remedy as lines; no line if it is empty.
-std::vector<ScreenLine> hook_lines(const RunRecord& record);
+std::vector<ScreenLine> make_hook_lines(const RunRecord& record);
 
 /// Returns Spool::notice() as lines; no line if it is empty.
-std::vector<ScreenLine> spool_lines(const std::string& notice);
+std::vector<ScreenLine> make_spool_lines(const std::string& notice);
 
 /// Returns the screen of a verdict: gates with value and limit, causes, the primary one first, and
 /// PASS, FAIL or INVALID in large letters.
-std::vector<ScreenLine> verdict_screen(const RunRecord& record);
+std::vector<ScreenLine> make_verdict_screen(const RunRecord& record);
 
 }  // namespace vlp

@@ -13,7 +13,7 @@ enum class StationStep { boards, rotation, dispersion, check };
 inline constexpr std::array kStationSteps{StationStep::boards, StationStep::rotation,
                                           StationStep::dispersion, StationStep::check};
 
-constexpr const char* name_of(StationStep step) {
+constexpr const char* to_string(StationStep step) {
   constexpr std::array names{"boards", "rotation", "dispersion", "check"};
   return names[static_cast<std::size_t>(step)];
 }

@@ -22,16 +22,16 @@
 namespace vlp {
 namespace {
 
-constexpr double kMillimetres = 1e3;
+constexpr double kMillimetersPerMeter = 1e3;
 
 /// Prepends the failed part to the reason.
-StepResult named(const char* what, StepResult result) {
+StepResult with_step_name(const char* what, StepResult result) {
   if (!result.ok()) result.why = fmt::format("{}: {}", what, result.why);
   return result;
 }
 
 /// Adds metrics of the difference between the lens and the nominal one.
-void compare(const Camera& type, LensResult& result) {
+void add_nominal_differences(const Camera& type, LensResult& result) {
   constexpr double percent = 100;
   const auto& found = result.lens.solution.problem.intrinsics;
   const auto& nominal = type.intrinsics;
@@ -40,18 +40,18 @@ void compare(const Camera& type, LensResult& result) {
   result.metrics.push_back({"focal_percent", percent * focal});
   result.metrics.push_back({"center_px", std::hypot(found[2] - nominal[2], found[3] - nominal[3])});
   const auto difference =
-      projection_difference(result.lens.solution.lens(), Lens(type.lens_model, nominal),
-                            type.imager_px, [](const Eigen::Vector2d&) { return 1.0; });
+      compute_projection_difference(result.lens.solution.lens(), Lens(type.lens_model, nominal),
+                                    type.imager_px, [](const Eigen::Vector2d&) { return 1.0; });
   if (difference) result.metrics.push_back({"nominal_px", difference->worst_px});
   const auto& report = result.calibration.intrinsics_report;
   const auto [x_m, y_m] =
       report ? report->board_warp_m.value_or(std::array{0.0, 0.0}) : std::array{0.0, 0.0};
-  const double bend_m = std::max({std::abs(x_m), std::abs(y_m), std::abs(x_m + y_m)});
-  result.metrics.push_back({"board_bend_mm", kMillimetres * bend_m});
+  const double warp_m = std::max({std::abs(x_m), std::abs(y_m), std::abs(x_m + y_m)});
+  result.metrics.push_back({"board_bend_mm", kMillimetersPerMeter * warp_m});
 }
 
-LampCaptures captures_of(const StationConfig& config, const Calibration& calibration,
-                         const std::vector<Frame>& frames) {
+LampCaptures make_lamp_captures(const StationConfig& config, const Calibration& calibration,
+                                const std::vector<Frame>& frames) {
   return {frames, config.lamps, "lamp map", calibration};
 }
 
@@ -70,7 +70,7 @@ std::string places_problem(std::size_t known, std::size_t captures, int wanted) 
 StepResult fail_if_inconsistent(const StationConfig& config, const std::vector<Frame>& frames,
                                 StepResult result) {
   if (!result.ok()) return result;
-  std::string fault = capture_fault(frames, config.lamps, result.calibration);
+  std::string fault = describe_capture_fault(frames, config.lamps, result.calibration);
   if (!fault.empty()) result.fail(StepFailure::undetermined, std::move(fault));
   return result;
 }
@@ -81,7 +81,7 @@ struct KnownPoints {
   std::vector<TruthRow> truth;
 };
 
-KnownPoints known_points(const std::vector<Frame>& frames, const CapturesTable& places) {
+KnownPoints select_known_points(const std::vector<Frame>& frames, const CapturesTable& places) {
   KnownPoints known;
   for (const Frame& frame : frames) {
     const auto entry = places.find(frame.image);
@@ -96,32 +96,33 @@ KnownPoints known_points(const std::vector<Frame>& frames, const CapturesTable& 
 
 /// Adds three fractions: captures with a fix, detections used by fixes, and lamps of the map that
 /// were detected.
-void add_shares(const LocateResult& located, const std::vector<Frame>& frames, const LampMap& map,
-                StepResult& result) {
+void add_check_fractions(const LocateResult& located, const std::vector<Frame>& frames,
+                         const LampMap& map, StepResult& result) {
   std::set<int> seen;
-  std::size_t lamps = 0, fitting = 0;
+  std::size_t lamps = 0, num_inliers = 0;
   for (std::size_t i = 0; i < frames.size(); ++i) {
     lamps += frames[i].detections.size();
     for (const Detection& detection : frames[i].detections) seen.insert(detection.lamp);
-    if (located.fixes[i].ok()) fitting += static_cast<std::size_t>(located.fixes[i].lamps);
+    if (located.fixes[i].ok()) num_inliers += static_cast<std::size_t>(located.fixes[i].lamps);
   }
-  const auto share = [](std::size_t part, std::size_t whole) {
+  const auto ratio = [](std::size_t part, std::size_t whole) {
     return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : 0;
   };
-  result.metrics = {{"check_fixes", share(located.summary.fixes, frames.size())},
-                    {"check_lamps", share(fitting, lamps)},
-                    {"check_lamps_seen", share(seen.size(), map.lamps.size())}};
+  result.metrics = {{"check_fixes", ratio(located.summary.fixes, frames.size())},
+                    {"check_lamps", ratio(num_inliers, lamps)},
+                    {"check_lamps_seen", ratio(seen.size(), map.lamps.size())}};
 }
 
 void add_errors(const EvaluationInput& input, const Evaluation& evaluation, StepResult& result) {
-  result.metrics.push_back({"check_mean_mm", kMillimetres * evaluation.horizontal_m.mean});
-  result.metrics.push_back({"check_worst_mm", kMillimetres * evaluation.horizontal_m.max});
+  result.metrics.push_back({"check_mean_mm", kMillimetersPerMeter * evaluation.horizontal_m.mean});
+  result.metrics.push_back({"check_worst_mm", kMillimetersPerMeter * evaluation.horizontal_m.max});
   Eigen::Vector2d sum_m = Eigen::Vector2d::Zero();
-  for (const FixError& error : errors_of(input, input.fixes).errors) sum_m += error.horizontal_m;
+  for (const FixError& error : compute_errors(input, input.fixes).errors)
+    sum_m += error.horizontal_m;
   const double offset_m = sum_m.norm() / static_cast<double>(evaluation.fixes);
-  result.metrics.push_back({"check_offset_mm", kMillimetres * offset_m});
+  result.metrics.push_back({"check_offset_mm", kMillimetersPerMeter * offset_m});
   if (const auto& height_m = evaluation.height_m) {
-    result.metrics.push_back({"check_height_mm", kMillimetres * height_m->sizes.rms});
+    result.metrics.push_back({"check_height_mm", kMillimetersPerMeter * height_m->sizes.rms});
   }
 }
 
@@ -133,8 +134,9 @@ StepResult solve_boards(const StationConfig& config, const std::string& camera_i
   input.camera.id = camera_id;
   LensResult result = solve_lens(std::move(input), {});
   result.skipped.clear();  // the station reports images itself
-  if (result.failure == StepFailure::wrong_board) return named("wrong board", std::move(result));
-  if (result.ok()) compare(config.type, result);
+  if (result.failure == StepFailure::wrong_board)
+    return with_step_name("wrong board", std::move(result));
+  if (result.ok()) add_nominal_differences(config.type, result);
   // A lens from images of two cameras fits neither of them. The operator has to remove the wrong
   // images.
   if (result.ok() && !result.lens.inconsistent_views.empty()) {
@@ -145,42 +147,43 @@ StepResult solve_boards(const StationConfig& config, const std::string& camera_i
 
 StepResult solve_rotation(const StationConfig& config, const Calibration& calibration,
                           const std::vector<Frame>& frames) {
-  return named("the turn on the spot",
-               fail_if_inconsistent(config, frames,
-                                    solve_rotation(captures_of(config, calibration, frames),
-                                                   RotationMethod::axis, {})));
+  return with_step_name(
+      "the turn on the spot",
+      fail_if_inconsistent(config, frames,
+                           solve_rotation(make_lamp_captures(config, calibration, frames),
+                                          RotationMethod::axis, {})));
 }
 
 StepResult solve_dispersion(const StationConfig& config, const Calibration& calibration,
                             const std::vector<Frame>& frames, const CapturesTable& places) {
-  const KnownPlaces known = at_known_places(frames, places, config.dispersion_station_m);
+  const KnownPlaces known = collect_known_places(frames, places, config.dispersion_station_m);
   std::string problem =
-      places_problem(known.captures.size(), frames.size(), config.enough.dispersion_captures);
+      places_problem(known.captures.size(), frames.size(), config.sufficient.dispersion_captures);
   if (!problem.empty()) {
     StepResult result;
     result.fail(StepFailure::wrong_place, std::move(problem));
     return result;
   }
-  return named(
+  return with_step_name(
       "the fixes at the station",
       fail_if_inconsistent(config, frames,
-                           solve_dispersion(captures_of(config, calibration, frames), known,
+                           solve_dispersion(make_lamp_captures(config, calibration, frames), known,
                                             DispersionMethod::camera, DispersionCircle::mean, {})));
 }
 
 StepResult check_fixes(const StationConfig& config, const Calibration& calibration,
                        const std::vector<Frame>& frames, const CapturesTable& places) {
   StepResult result;
-  KnownPoints known = known_points(frames, places);
+  KnownPoints known = select_known_points(frames, places);
   std::string problem =
-      places_problem(known.frames.size(), frames.size(), config.enough.check_captures);
+      places_problem(known.frames.size(), frames.size(), config.sufficient.check_captures);
   if (!problem.empty()) {
     result.fail(StepFailure::wrong_place, std::move(problem));
     return result;
   }
   result.calibration = calibration;
   const LocateResult located = locate_frames({known.frames, config.lamps, calibration, places});
-  add_shares(located, known.frames, config.lamps, result);
+  add_check_fractions(located, known.frames, config.lamps, result);
   result.lamps_left_out = located.lamps_left_out;
   result.warnings = located.warnings;
   result.notes = located.notes;
@@ -188,9 +191,9 @@ StepResult check_fixes(const StationConfig& config, const Calibration& calibrati
   EvaluationInput input;
   input.fixes = {"check", located.rows};
   input.truth = {"check", std::move(known.truth)};
-  input.station_m = place_radius_m(calibration);
+  input.station_m = compute_place_radius_m(calibration);
   const EvaluateResult errors = evaluate_fixes(input, {});
-  result.drawing = [input, lamps = config.lamps] { return draw_floor_plan(input, lamps); };
+  result.drawing = [input, lamps = config.lamps] { return make_floor_plan_drawing(input, lamps); };
   add_errors(input, errors.evaluation, result);
   if (const auto& typical = located.summary.typical; typical && typical->median_residual_px) {
     result.metrics.push_back({"check_residual_px", *typical->median_residual_px});

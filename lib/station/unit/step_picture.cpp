@@ -6,10 +6,10 @@
 
 namespace vlp {
 
-StepPicture draw_aside(std::function<Drawing()> drawing) {
-  const auto draw = [drawing = std::move(drawing)]() -> std::optional<ReportPicture> {
+StepPlot render_async(std::function<Drawing()> drawing) {
+  const auto draw = [drawing = std::move(drawing)]() -> std::optional<ReportPlot> {
     try {
-      return report_picture(drawing());
+      return make_report_plot(drawing());
     } catch (const InputError&) {  // no gnuplot: a report without it is better than none
       return std::nullopt;
     }

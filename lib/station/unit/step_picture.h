@@ -11,10 +11,10 @@
 namespace vlp {
 
 /// Plot for the unit's report, rendered asynchronously; std::nullopt if it could not be rendered.
-using StepPicture = std::shared_future<std::optional<ReportPicture>>;
+using StepPlot = std::shared_future<std::optional<ReportPlot>>;
 
 /// Makes and renders a drawing on its own thread, while the unit continues, because gnuplot would
 /// delay the verdict. Destroying the last copy of the result waits for the thread.
-StepPicture draw_aside(std::function<Drawing()> drawing);
+StepPlot render_async(std::function<Drawing()> drawing);
 
 }  // namespace vlp

@@ -6,19 +6,19 @@ namespace vlp {
 
 StepSources::StepSources(const std::vector<std::string>& sources,
                          const std::array<int, 2>& imager_px) {
-  std::shared_ptr<FrameSource> others;
+  std::shared_ptr<FrameSource> default_source;
   for (const std::string& source : sources) {
     bool named = false;
     for (const StationStep step : kStationSteps) {
-      const std::string prefix = std::string(name_of(step)) + "=";
+      const std::string prefix = std::string(to_string(step)) + "=";
       if (!source.starts_with(prefix)) continue;
       by_step_[step] = std::make_shared<FrameSource>(source.substr(prefix.size()), imager_px);
       named = true;
     }
-    if (!named) others = std::make_shared<FrameSource>(source, imager_px);
+    if (!named) default_source = std::make_shared<FrameSource>(source, imager_px);
   }
-  if (!others) return;
-  for (const StationStep step : kStationSteps) by_step_.emplace(step, others);
+  if (!default_source) return;
+  for (const StationStep step : kStationSteps) by_step_.emplace(step, default_source);
 }
 
 void StepSources::feed(const Unit& unit, WatchedRun& run) {

@@ -24,10 +24,10 @@ struct TurnMap {
   /// Heights, in increasing order.
   std::vector<Height> heights;
   /// True if heights, captures at each and angular range meet the station's criteria.
-  bool enough = false;
+  bool sufficient = false;
 };
 
-TurnMap turn_map(const std::vector<Frame>& frames, const StationConfig& config,
-                 const Calibration& calibration);
+TurnMap compute_turn_map(const std::vector<Frame>& frames, const StationConfig& config,
+                         const Calibration& calibration);
 
 }  // namespace vlp

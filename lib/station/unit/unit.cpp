@@ -23,13 +23,13 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Returns UnitImage::level for an image.
-Eigen::Matrix3d level_in(const LevelRotations& levels, const std::string& image) {
+Eigen::Matrix3d find_level(const LevelRotations& levels, const std::string& image) {
   const auto level = levels.find(image);
   return level == levels.end() ? Eigen::Matrix3d::Zero().eval() : level->second.value();
 }
 
 /// Returns the use of the images of a step.
-ImageUse use_of(StationStep step) {
+ImageUse image_use_for(StationStep step) {
   if (step == StationStep::boards) return ImageUse::boards;
   return step == StationStep::rotation ? ImageUse::turn : ImageUse::places;
 }
@@ -45,25 +45,26 @@ Unit::Unit(const StationConfig& config, std::string camera_id, ProgramVersion pr
 
 void Unit::reread(StationStep step) {
   if (step != StationStep::dispersion && step != StationStep::check) return;
-  look_again(step);
+  process_again(step);
   at(step).result.reset();
-  forget_after(step);
+  reset_after(step);
 }
 
 /// Processes the images again whose inclination changed. They are not counted again.
-void Unit::look_again(StationStep step) {
-  const LevelRotations levels = levels_of(step);
+void Unit::process_again(StationStep step) {
+  const LevelRotations levels = find_level_rotations(step);
   UnitStep& state = at(step);
   std::vector<fs::path> again;
   for (const auto& [name, image] : state.images) {
-    if (!image.discarded && level_in(levels, name) != image.level) again.push_back(image.seen.file);
+    if (!image.discarded && find_level(levels, name) != image.level)
+      again.push_back(image.seen.file);
   }
   if (again.empty() || !calibration_before(step)) return;
-  const int refused = state.refused_together;
-  const bool used = state.used_together;
-  look(step, again);
-  state.refused_together = refused;
-  state.used_together = used;
+  const int refused = state.num_rejected_in_batch;
+  const bool used = state.is_any_used_in_batch;
+  process_files(step, again);
+  state.num_rejected_in_batch = refused;
+  state.is_any_used_in_batch = used;
 }
 
 void Unit::advance(bool all_in) {
@@ -77,14 +78,14 @@ void Unit::solve_steps(bool all_in) {
     if (!calibration_before(step)) return;
     const auto waiting = std::exchange(state.waiting, {});
     if (!waiting.empty()) {
-      look(step, waiting);
-      count_refusals(step);
+      process_files(step, waiting);
+      count_rejections(step);
     }
     if (state.result && (state.result->ok() || !all_in)) continue;
-    state.enough = has_enough(step);
-    if (!state.enough && !all_in) return;
+    state.sufficient = has_sufficient_images(step);
+    if (!state.sufficient && !all_in) return;
     state.result = solve(step, all_in);
-    state.picture = state.result->drawing ? draw_aside(state.result->drawing) : StepPicture{};
+    state.picture = state.result->drawing ? render_async(state.result->drawing) : StepPlot{};
     if (!state.result->ok()) return;
   }
 }
@@ -103,8 +104,8 @@ std::optional<StationStep> Unit::current() const {
   return std::nullopt;
 }
 
-std::vector<ReportPicture> Unit::pictures() const {
-  std::vector<ReportPicture> pictures;
+std::vector<ReportPlot> Unit::pictures() const {
+  std::vector<ReportPlot> pictures;
   for (const UnitStep& state : steps_) {
     if (!state.result || !state.picture.valid()) continue;
     if (const auto& picture = state.picture.get()) pictures.push_back(*picture);
@@ -112,16 +113,16 @@ std::vector<ReportPicture> Unit::pictures() const {
   return pictures;
 }
 
-bool Unit::hopeless() const {
+bool Unit::is_hopeless() const {
   const auto step = current();
   if (!step) return false;
   const UnitStep& state = this->step(*step);
-  if (state.refused_in_a_row >= config_.max_rejected_in_a_row) return true;
-  const bool stuck = state.enough && state.result && !state.result->ok();
+  if (state.num_consecutive_rejections >= config_.max_consecutive_rejections) return true;
+  const bool stuck = state.sufficient && state.result && !state.result->ok();
   if (!stuck || *step == StationStep::boards) return false;
-  const auto frames = frames_of(state);
-  return !lamp_faults(frames, config_.lamps, *calibration_before(*step)).empty() ||
-         !unseen_lamps(frames, config_.lamps).empty();
+  const auto frames = collect_frames(state);
+  return !describe_lamp_faults(frames, config_.lamps, *calibration_before(*step)).empty() ||
+         !describe_missing_lamps(frames, config_.lamps).empty();
 }
 
 namespace fs = std::filesystem;
@@ -134,44 +135,45 @@ void Unit::add(StationStep step, const std::vector<fs::path>& files, bool more_t
     state.waiting.insert(state.waiting.end(), files.begin(), files.end());
     return;
   }
-  look(step, files);
-  if (!more_to_come) count_refusals(step);
+  process_files(step, files);
+  if (!more_to_come) count_rejections(step);
 }
 
 /// Updates the number of consecutive rejections after a batch.
-void Unit::count_refusals(StationStep step) {
+void Unit::count_rejections(StationStep step) {
   UnitStep& state = at(step);
-  const int refused = std::exchange(state.refused_together, 0);
-  const bool used = std::exchange(state.used_together, false);
-  state.refused_in_a_row = used ? 0 : state.refused_in_a_row + refused;
+  const int refused = std::exchange(state.num_rejected_in_batch, 0);
+  const bool used = std::exchange(state.is_any_used_in_batch, false);
+  state.num_consecutive_rejections = used ? 0 : state.num_consecutive_rejections + refused;
 }
 
 /// Returns the rotations of captures of known inclination. Those of the rotation step have none,
 /// because its axis is vertical.
-LevelRotations Unit::levels_of(StationStep step) const {
+LevelRotations Unit::find_level_rotations(StationStep step) const {
   if (step != StationStep::dispersion && step != StationStep::check) return {};
   const auto calibration = calibration_before(step);
   if (!calibration) return {};
   try {
-    return level_rotations(captures_table(this->step(step).folder), *calibration, 0);
+    return compute_level_rotations(read_captures_of_folder(this->step(step).folder), *calibration,
+                                   0);
   } catch (const InputError&) {  // reported by the step
     return {};
   }
 }
 
-void Unit::look(StationStep step, const std::vector<fs::path>& files) {
+void Unit::process_files(StationStep step, const std::vector<fs::path>& files) {
   std::vector<UnitImage> images(files.size());
-  const LevelRotations levels = levels_of(step);
+  const LevelRotations levels = find_level_rotations(step);
   std::optional<LampIntake> lamps;
   if (step != StationStep::boards) {
-    lamps.emplace(LightDetector(config_.lamps, detector_camera(*calibration_before(step))),
-                  use_of(step), config_.frontend, config_.type.imager_px, levels);
+    lamps.emplace(LightDetector(config_.lamps, make_detector_camera(*calibration_before(step))),
+                  image_use_for(step), config_.frontend, config_.type.imager_px, levels);
   }
   images_in_parallel(files.size(), threads_, [&](std::size_t i) {
     images[i] = observe_unit_image(files[i], [&](const SourceImage& source) {
       return lamps ? lamps->observe(source) : boards_.observe(source);
     });
-    images[i].level = level_in(levels, images[i].seen.name());
+    images[i].level = find_level(levels, images[i].seen.name());
   });
   for (UnitImage& image : images) {
     const ImageOwner owner = owner_ && !image.sha256.empty() ? owner_(image.sha256) : ImageOwner();
@@ -180,23 +182,23 @@ void Unit::look(StationStep step, const std::vector<fs::path>& files) {
                         "already of " + describe_owner(owner, config_.file));
     }
     at(step).last = image.seen.name();
-    take(step, std::move(image));
+    add_image(step, std::move(image));
   }
 }
 
-void Unit::take(StationStep step, UnitImage image) {
+void Unit::add_image(StationStep step, UnitImage image) {
   UnitStep& state = at(step);
   const std::string name = image.seen.name();
-  drop(step, name);  // it was overwritten
+  remove_image(step, name);  // it was overwritten
   if (image.is_used()) reject_redundant(step, image);
   const bool used = image.is_used();
   const bool fault = !used && !image.is_redundant() && !state.done();
-  state.refused_together += fault ? 1 : 0;
-  state.used_together = state.used_together || used;
+  state.num_rejected_in_batch += fault ? 1 : 0;
+  state.is_any_used_in_batch = state.is_any_used_in_batch || used;
   state.images.emplace(name, std::move(image));
   if (!used) return;
   state.result.reset();
-  forget_after(step);
+  reset_after(step);
 }
 
 /// Rejects an image without a fault that is redundant. It has the content of an image of any step,
@@ -209,7 +211,7 @@ void Unit::reject_redundant(StationStep step, UnitImage& image) const {
                                "is the same image as " + other->seen.name());
     }
   }
-  Selection selection(use_of(step), config_.frontend);
+  Selection selection(image_use_for(step), config_.frontend);
   for (const UnitImage* other : used_images(this->step(step))) selection.keep(other->seen);
   selection.add(image.seen);
   if (!image.is_used() || !this->step(step).done()) return;
@@ -218,7 +220,7 @@ void Unit::reject_redundant(StationStep step, UnitImage& image) const {
 
 /// Removes an image and the results that depend on it. Images that were redundant because of it are
 /// used again.
-void Unit::drop(StationStep step, const std::string& name) {
+void Unit::remove_image(StationStep step, const std::string& name) {
   UnitStep& state = at(step);
   const auto image = state.images.find(name);
   if (image == state.images.end()) return;
@@ -226,7 +228,7 @@ void Unit::drop(StationStep step, const std::string& name) {
   state.images.erase(image);
   if (!used) return;
   state.result.reset();
-  forget_after(step);
+  reset_after(step);
   std::vector<UnitImage> again;
   for (const auto& [other, known] : state.images) {
     if (known.is_redundant()) again.push_back(known);
@@ -234,22 +236,22 @@ void Unit::drop(StationStep step, const std::string& name) {
   std::erase_if(state.images, [](const auto& known) { return known.second.is_redundant(); });
   for (UnitImage& known : again) {
     known.seen.rejection.reset();
-    take(step, std::move(known));
+    add_image(step, std::move(known));
   }
 }
 
 void Unit::remove(StationStep step, const std::string& name) {
   UnitStep& state = at(step);
   std::erase_if(state.waiting, [&](const fs::path& file) { return file.filename() == name; });
-  if (state.images.contains(name)) state.refused_in_a_row = 0;
-  drop(step, name);
+  if (state.images.contains(name)) state.num_consecutive_rejections = 0;
+  remove_image(step, name);
 }
 
 void Unit::discard(StationStep step, const std::string& name) {
   UnitStep& state = at(step);
   const auto image = state.images.find(name);
   if (image == state.images.end() || image->second.is_used()) return;
-  state.refused_in_a_row = 0;
+  state.num_consecutive_rejections = 0;
   if (image->second.is_redundant()) {
     state.images.erase(image);
   } else {
@@ -258,7 +260,7 @@ void Unit::discard(StationStep step, const std::string& name) {
 }
 
 /// Resets the later steps; their images are processed again with the new result.
-void Unit::forget_after(StationStep step) {
+void Unit::reset_after(StationStep step) {
   for (const StationStep later : kStationSteps) {
     if (later <= step) continue;
     UnitStep& state = at(later);
@@ -267,23 +269,23 @@ void Unit::forget_after(StationStep step) {
     }
     std::erase_if(state.images, [](const auto& image) { return !image.second.discarded; });
     state.result.reset();
-    state.enough = false;
+    state.sufficient = false;
   }
 }
 
-bool Unit::has_enough(StationStep step) const {
+bool Unit::has_sufficient_images(StationStep step) const {
   const UnitStep& state = this->step(step);
-  const StationEnough& enough = config_.enough;
+  const CompletionCriteria& sufficient = config_.sufficient;
   switch (step) {
     case StationStep::boards:
-      return state.used() >= enough.board_views &&
-             board_coverage(state, config_.type.imager_px).fraction() >= enough.board_coverage;
+      return state.used() >= sufficient.board_views &&
+             board_coverage(state, config_.type.imager_px).fraction() >= sufficient.board_coverage;
     case StationStep::rotation:
-      return turn_map(frames_of(state), config_, *calibration_before(step)).enough;
+      return compute_turn_map(collect_frames(state), config_, *calibration_before(step)).sufficient;
     case StationStep::dispersion:
-      return state.used() >= enough.dispersion_captures;
+      return state.used() >= sufficient.dispersion_captures;
     case StationStep::check:
-      return state.used() >= enough.check_captures;
+      return state.used() >= sufficient.check_captures;
   }
   return false;
 }
@@ -299,16 +301,18 @@ StepResult Unit::solve(StationStep step, bool all_in) const {
   try {
     switch (step) {
       case StationStep::boards:
-        result = solve_boards(config_, camera_id_, observations_of(state));
+        result = solve_boards(config_, camera_id_, collect_observations(state));
         break;
       case StationStep::rotation:
-        result = solve_rotation(config_, before, frames_of(state));
+        result = solve_rotation(config_, before, collect_frames(state));
         break;
       case StationStep::dispersion:
-        result = solve_dispersion(config_, before, frames_of(state), captures_in(state.folder));
+        result = solve_dispersion(config_, before, collect_frames(state),
+                                  read_captures_with_truth(state.folder));
         break;
       case StationStep::check:
-        return check_fixes(config_, before, frames_of(state), captures_in(state.folder));
+        return check_fixes(config_, before, collect_frames(state),
+                           read_captures_with_truth(state.folder));
     }
   } catch (const InputError& error) {  // the table may be incomplete
     if (all_in) throw;
@@ -318,13 +322,13 @@ StepResult Unit::solve(StationStep step, bool all_in) const {
   if (result.ok()) {
     HistoryEntry& entry = result.calibration.history.back();
     const std::string part = entry.part;
-    entry = history_of(step);
+    entry = make_history_entry(step);
     entry.part = part;
   }
   return result;
 }
 
-HistoryEntry Unit::history_of(StationStep step) const {
+HistoryEntry Unit::make_history_entry(StationStep step) const {
   std::string digests;
   for (const auto& [name, image] : this->step(step).images) {
     if (image.is_used()) digests += fmt::format("{}  {}\n", image.sha256, name);
@@ -333,20 +337,20 @@ HistoryEntry Unit::history_of(StationStep step) const {
           program_.program,
           program_.version,
           "",
-          {{"station", config_.sha256}, {name_of(step), sha256_of_text(digests)}}};
+          {{"station", config_.sha256}, {to_string(step), sha256_of_text(digests)}}};
 }
 
 std::vector<Observation> lamp_observations(const Unit& unit) {
   std::vector<Observation> images;
   for (const StationStep step : kStationSteps) {
     if (step == StationStep::boards) continue;
-    Observations seen = observations_of(unit.step(step));
+    Observations seen = collect_observations(unit.step(step));
     std::move(seen.images.begin(), seen.images.end(), std::back_inserter(images));
   }
   return images;
 }
 
-StatedRowTime stated_row_time(const StationConfig& config) {
+GivenRowTime stated_row_time(const StationConfig& config) {
   return {config.type.row_time_s.value(), config.type_file};
 }
 
@@ -358,7 +362,7 @@ std::optional<Calibration> Unit::calibration() const {
   return last;
 }
 
-std::vector<CheckedMetric> Unit::figures() const {
+std::vector<CheckedMetric> Unit::metrics() const {
   std::vector<Metric> values;
   if (const auto blur_px = typical_blur_px(step(StationStep::boards))) {
     values.push_back({"blur_px", *blur_px});

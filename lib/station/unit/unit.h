@@ -54,7 +54,7 @@ class Unit {
   void advance(bool all_in);
   /// Sets the function that finds another camera's run by the SHA-256 of an image. Such images are
   /// rejected.
-  void refuse_images_of_others(std::function<ImageOwner(const std::string& sha256)> owner) {
+  void reject_images_of_others(std::function<ImageOwner(const std::string& sha256)> owner) {
     owner_ = std::move(owner);
   }
   /// Ends an incomplete unit: no more images arrive. `why` is human-readable, as "the operator
@@ -65,8 +65,8 @@ class Unit {
 
   /// Makes the verdict of this unit not count, because of the station. `why`, human-readable,
   /// becomes the first of its causes; empty if the verdict counts.
-  void distrust(std::string why) { distrusted_ = std::move(why); }
-  const std::string& distrusted() const { return distrusted_; }
+  void invalidate(std::string why) { invalid_reason_ = std::move(why); }
+  const std::string& invalid_reason() const { return invalid_reason_; }
 
   const UnitStep& step(StationStep step) const { return steps_[index(step)]; }
   /// Returns the comparison of the type's row time with that of the lamps of all steps, as of the
@@ -76,15 +76,15 @@ class Unit {
   std::optional<StationStep> current() const;
   /// Returns true if continuing is useless. A step then has too many consecutive rejected images,
   /// or it is complete but fails because of the lamps.
-  bool hopeless() const;
+  bool is_hopeless() const;
 
   /// Returns the calibration of the last completed step; std::nullopt before the lens is known.
   std::optional<Calibration> calibration() const;
   /// Returns all metrics, including those with gates.
-  std::vector<CheckedMetric> figures() const;
+  std::vector<CheckedMetric> metrics() const;
   /// Returns the plots of lens, rotation center and dispersion for the report, of the solved steps.
   /// Waits for their rendering.
-  std::vector<ReportPicture> pictures() const;
+  std::vector<ReportPlot> pictures() const;
   const StationConfig& config() const { return config_; }
   const std::string& camera_id() const { return camera_id_; }
 
@@ -92,24 +92,24 @@ class Unit {
   static std::size_t index(StationStep step) { return static_cast<std::size_t>(step); }
   UnitStep& at(StationStep step) { return steps_[index(step)]; }
   void solve_steps(bool all_in);
-  void look(StationStep step, const std::vector<std::filesystem::path>& files);
-  LevelRotations levels_of(StationStep step) const;
-  void look_again(StationStep step);
-  void take(StationStep step, UnitImage image);
-  void count_refusals(StationStep step);
+  void process_files(StationStep step, const std::vector<std::filesystem::path>& files);
+  LevelRotations find_level_rotations(StationStep step) const;
+  void process_again(StationStep step);
+  void add_image(StationStep step, UnitImage image);
+  void count_rejections(StationStep step);
   void reject_redundant(StationStep step, UnitImage& image) const;
-  void drop(StationStep step, const std::string& name);
-  void forget_after(StationStep step);
-  bool has_enough(StationStep step) const;
+  void remove_image(StationStep step, const std::string& name);
+  void reset_after(StationStep step);
+  bool has_sufficient_images(StationStep step) const;
   StepResult solve(StationStep step, bool all_in) const;
   std::optional<Calibration> calibration_before(StationStep step) const;
-  HistoryEntry history_of(StationStep step) const;
+  HistoryEntry make_history_entry(StationStep step) const;
 
   const StationConfig& config_;
   std::string camera_id_;
   ProgramVersion program_;
   int threads_;
-  std::string ended_ = {}, distrusted_ = {};
+  std::string ended_ = {}, invalid_reason_ = {};
   std::function<ImageOwner(const std::string&)> owner_ = {};
   BoardIntake boards_;
   std::array<UnitStep, 4> steps_;
@@ -120,6 +120,6 @@ class Unit {
 std::vector<Observation> lamp_observations(const Unit& unit);
 
 /// Returns the row time of the station's type of camera.
-StatedRowTime stated_row_time(const StationConfig& config);
+GivenRowTime stated_row_time(const StationConfig& config);
 
 }  // namespace vlp

@@ -13,16 +13,16 @@ int UnitStep::used() const {
                                         [](const auto& image) { return image.second.is_used(); }));
 }
 
-Observations observations_of(const UnitStep& step) {
+Observations collect_observations(const UnitStep& step) {
   Observations seen;
   for (const auto& [name, image] : step.images) seen.images.push_back(image.seen);
   return seen;
 }
 
-std::vector<Frame> frames_of(const UnitStep& step) {
+std::vector<Frame> collect_frames(const UnitStep& step) {
   std::vector<Frame> frames;
   for (const UnitImage* image : used_images(step)) {
-    frames.push_back({image->seen.name(), lamps_in(image->seen)});
+    frames.push_back({image->seen.name(), collect_lamps(image->seen)});
   }
   return frames;
 }
@@ -39,7 +39,8 @@ ImageCoverage board_coverage(const UnitStep& step, const std::array<int, 2>& ima
   ImageCoverage coverage(imager_px);
   for (const UnitImage* image : used_images(step)) {
     if (!image->seen.board) continue;
-    for (const SeenPoint& corner : corners_of(image->seen.board->seen)) coverage.add(corner.pixel);
+    for (const PointDetection& corner : collect_corners(image->seen.board->seen))
+      coverage.add(corner.pixel);
   }
   return coverage;
 }
@@ -47,7 +48,7 @@ ImageCoverage board_coverage(const UnitStep& step, const std::array<int, 2>& ima
 std::optional<double> typical_blur_px(const UnitStep& boards) {
   std::vector<double> blurs_px;
   for (const auto& [name, image] : boards.images) {
-    const bool counts = image.is_used() || !boards.enough;
+    const bool counts = image.is_used() || !boards.sufficient;
     if (counts && image.seen.blur_px) blurs_px.push_back(*image.seen.blur_px);
   }
   if (blurs_px.empty()) return std::nullopt;

@@ -26,27 +26,27 @@ struct UnitStep {
   /// Images that wait for the previous step.
   std::vector<std::filesystem::path> waiting = {};
   /// True if the images meet the station's completion criterion.
-  bool enough = false;
+  bool sufficient = false;
   /// Result of the images, after the step is complete.
   std::optional<StepResult> result = {};
   /// Plot of the result, if it has one.
-  StepPicture picture = {};
+  StepPlot picture = {};
   /// Number of consecutive rejected images at the end.
-  int refused_in_a_row = 0;
+  int num_consecutive_rejections = 0;
   /// Number of rejected images of an incomplete batch.
-  int refused_together = 0;
-  bool used_together = false;
+  int num_rejected_in_batch = 0;
+  bool is_any_used_in_batch = false;
   /// Name of the last image.
   std::string last = {};
 
-  bool done() const { return enough && result && result->ok(); }
+  bool done() const { return sufficient && result && result->ok(); }
   int used() const;
 };
 
 /// Returns the observations of the images, by name.
-Observations observations_of(const UnitStep& step);
+Observations collect_observations(const UnitStep& step);
 /// Returns the frames of the images that are used, by name.
-std::vector<Frame> frames_of(const UnitStep& step);
+std::vector<Frame> collect_frames(const UnitStep& step);
 /// Returns the images that are used, by name.
 std::vector<const UnitImage*> used_images(const UnitStep& step);
 

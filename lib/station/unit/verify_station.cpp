@@ -58,47 +58,49 @@ class Verification {
     UnitStep step = observe_folder(folder_ / "boards", threads_, ImageUse::boards, config_.frontend,
                                    [&](const SourceImage& image) { return intake.observe(image); });
     if (step.used() > 0)
-      add("boards", solve_boards(config_, golden_.camera_id, observations_of(step)));
-    note(StationStep::boards, step);
+      add("boards", solve_boards(config_, golden_.camera_id, collect_observations(step)));
+    add_images(StationStep::boards, step);
   }
 
-  void lamps(StationStep each) {
-    const fs::path folder = folder_ / name_of(each);
-    const LampIntake intake(LightDetector(config_.lamps, detector_camera(golden_.calibration)),
-                            ImageUse::places, config_.frontend, config_.type.imager_px,
-                            level_rotations(captures_table(folder), golden_.calibration, 0));
+  void lamps(StationStep station_step) {
+    const fs::path folder = folder_ / to_string(station_step);
+    const LampIntake intake(
+        LightDetector(config_.lamps, make_detector_camera(golden_.calibration)), ImageUse::places,
+        config_.frontend, config_.type.imager_px,
+        compute_level_rotations(read_captures_of_folder(folder), golden_.calibration, 0));
     UnitStep step = observe_folder(folder, threads_, ImageUse::places, config_.frontend,
                                    [&](const SourceImage& image) { return intake.observe(image); });
-    Observations seen = observations_of(step);
+    Observations seen = collect_observations(step);
     std::move(seen.images.begin(), seen.images.end(), std::back_inserter(lamp_images_));
-    const auto frames = frames_of(step);
+    const auto frames = collect_frames(step);
     frames_.insert(frames_.end(), frames.begin(), frames.end());
-    const auto places = captures_in(step.folder);
-    if (each == StationStep::check) {
+    const auto places = read_captures_with_truth(step.folder);
+    if (station_step == StationStep::check) {
       common_offset_ = find_common_offset(frames, config_.lamps, golden_.calibration, places);
-      place_fault_ = place_fault(frames, config_.lamps, golden_.calibration, places);
+      place_fault_ = describe_place_fault(frames, config_.lamps, golden_.calibration, places);
     }
-    add(name_of(each), each == StationStep::check
-                           ? check_fixes(config_, golden_.calibration, frames, places)
-                           : solve_dispersion(config_, golden_.calibration, frames, places));
-    note(each, step);
+    add(to_string(station_step),
+        station_step == StationStep::check
+            ? check_fixes(config_, golden_.calibration, frames, places)
+            : solve_dispersion(config_, golden_.calibration, frames, places));
+    add_images(station_step, step);
   }
 
   RunRecord record(const std::string& run, const ProgramVersion& program) {
-    const StatedRowTime stated{*config_.type.row_time_s, "the calibration of the golden unit"};
+    const GivenRowTime stated{*config_.type.row_time_s, "the calibration of the golden unit"};
     const RowTimeCheck row_time = check_row_time(lamp_images_, config_.lamps, stated);
     for (const Metric& metric : row_time_metrics(row_time)) values_.push_back(metric);
-    const auto figures = check_all(golden_.gates, values_, unit_metrics());
-    for (const CheckedMetric& figure : figures) {
+    const auto metrics = check_all(golden_.gates, values_, unit_metrics());
+    for (const CheckedMetric& metric : metrics) {
       // The station is under test, and fails by its metrics.
-      if (!figure.met()) causes_.push_back({cause_of(figure), figure.value.has_value()});
+      if (!metric.passed()) causes_.push_back({describe_failure(metric), metric.value.has_value()});
     }
     // Independent of the gates: this camera is known.
     constexpr double min_offset_px = 0.6;
-    auto faults = lamp_faults(frames_, config_.lamps, golden_.calibration, min_offset_px);
+    auto faults = describe_lamp_faults(frames_, config_.lamps, golden_.calibration, min_offset_px);
     if (!causes_.empty()) {
       // If all gates pass, they decide whether all lamps must be detected.
-      auto unseen = unseen_lamps(frames_, config_.lamps);
+      auto unseen = describe_missing_lamps(frames_, config_.lamps);
       std::move(unseen.begin(), unseen.end(), std::back_inserter(faults));
     }
     std::vector<Cause> first;
@@ -115,20 +117,20 @@ class Verification {
     }
     if (!row_time_error.empty()) first.insert(first.begin(), {row_time_error, false});
     causes_.insert(causes_.begin(), first.begin(), first.end());
-    RunRecord record = new_record("golden", config_, golden_.camera_id, run, program);
-    record.figures = figures;
+    RunRecord record = make_record("golden", config_, golden_.camera_id, run, program);
+    record.metrics = metrics;
     record.images = images_;
     if (std::string problem = clock_problem(record); !problem.empty()) {
       causes_.insert(causes_.begin(), {std::move(problem), false});
     }
-    record.judge(causes_);
+    record.set_verdict(causes_);
     return record;
   }
 
-  std::vector<ReportPicture> pictures() const {
-    std::vector<ReportPicture> pictures;
-    for (const StepPicture& drawn : drawn_) {
-      if (const auto& picture = drawn.get()) pictures.push_back(*picture);
+  std::vector<ReportPlot> pictures() const {
+    std::vector<ReportPlot> pictures;
+    for (const StepPlot& plot : plots_) {
+      if (const auto& picture = plot.get()) pictures.push_back(*picture);
     }
     return pictures;
   }
@@ -136,16 +138,16 @@ class Verification {
  private:
   void add(const char* step, const StepResult& result) {
     if (!result.ok()) {
-      const bool of_station =
+      const bool is_station_fault =
           result.failure == StepFailure::wrong_board || result.failure == StepFailure::wrong_map;
-      causes_.push_back({fmt::format("{}: {}", step, result.why), of_station});
+      causes_.push_back({fmt::format("{}: {}", step, result.why), is_station_fault});
     }
     values_.insert(values_.end(), result.metrics.begin(), result.metrics.end());
-    if (result.drawing) drawn_.push_back(draw_aside(result.drawing));
+    if (result.drawing) plots_.push_back(render_async(result.drawing));
   }
-  void note(StationStep each, const UnitStep& step) {
+  void add_images(StationStep station_step, const UnitStep& step) {
     for (const auto& [name, image] : step.images) {
-      images_.push_back({.step = name_of(each),
+      images_.push_back({.step = to_string(station_step),
                          .name = name,
                          .sha256 = image.sha256,
                          .refused = image.refusal()});
@@ -159,7 +161,7 @@ class Verification {
   std::vector<Frame> frames_ = {};
   std::vector<Observation> lamp_images_ = {};
   std::vector<Metric> values_ = {};
-  std::vector<StepPicture> drawn_ = {};
+  std::vector<StepPlot> plots_ = {};
   std::vector<Cause> causes_ = {};
   std::optional<CommonOffset> common_offset_ = {};
   /// Description of captures of the check at wrong positions.
@@ -169,8 +171,9 @@ class Verification {
 
 }  // namespace
 
-Verified verify_station(const StationConfig& config, const fs::path& folder, const std::string& run,
-                        const ProgramVersion& program, int threads) {
+VerificationResult verify_station(const StationConfig& config, const fs::path& folder,
+                                  const std::string& run, const ProgramVersion& program,
+                                  int threads) {
   Verification verification(config, folder, threads);
   if (fs::is_directory(folder / "boards")) verification.boards();
   if (fs::is_directory(folder / "dispersion")) verification.lamps(StationStep::dispersion);
@@ -178,13 +181,14 @@ Verified verify_station(const StationConfig& config, const fs::path& folder, con
   return {verification.record(run, program), verification.pictures()};
 }
 
-void refuse_used_images(
-    RunRecord& record, const std::function<std::string(const std::string& sha256)>& golden_run_of) {
+void reject_used_images(
+    RunRecord& record,
+    const std::function<std::string(const std::string& sha256)>& find_golden_run) {
   for (const RunRecord::Image& image : record.images) {
     if (!image.refused.empty()) continue;
-    const std::string run = golden_run_of(image.sha256);
+    const std::string run = find_golden_run(image.sha256);
     if (run.empty()) continue;
-    record.verdict = name_of(Verdict::invalid);
+    record.verdict = to_string(Verdict::invalid);
     record.causes = fmt::format("image {}/{} was used in golden run {}: measure it anew\n{}",
                                 image.step, image.name, run, record.causes);
     return;

@@ -14,9 +14,9 @@
 namespace vlp {
 
 /// Result of verify_station(), with the plots of boards and dispersion.
-struct Verified {
+struct VerificationResult {
   RunRecord record;
-  std::vector<ReportPicture> pictures;
+  std::vector<ReportPlot> pictures;
 };
 
 /// Verifies the station with its golden unit, a camera of known calibration, from the images in
@@ -27,15 +27,17 @@ struct Verified {
 /// their errors show that lamps or known points have moved. FAIL here refers to the station, and
 /// INVALID means that the golden unit was not measured.
 ///
-/// `run` is a new_run() from before the measurement. Throws InputError without images.
+/// `run` is a make_run_id() from before the measurement. Throws InputError without images.
 /// Precondition: the configuration has a golden unit.
-Verified verify_station(const StationConfig& config, const std::filesystem::path& folder,
-                        const std::string& run, const ProgramVersion& program, int threads);
+VerificationResult verify_station(const StationConfig& config, const std::filesystem::path& folder,
+                                  const std::string& run, const ProgramVersion& program,
+                                  int threads);
 
 /// Makes the record INVALID if an earlier run used one of its images, because the image does not
-/// show the current state of the station. `golden_run_of` returns the earlier run that used an
+/// show the current state of the station. `find_golden_run` returns the earlier run that used an
 /// image of this digest; empty if there is none.
-void refuse_used_images(RunRecord& record,
-                        const std::function<std::string(const std::string& sha256)>& golden_run_of);
+void reject_used_images(
+    RunRecord& record,
+    const std::function<std::string(const std::string& sha256)>& find_golden_run);
 
 }  // namespace vlp

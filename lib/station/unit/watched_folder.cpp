@@ -8,7 +8,7 @@ namespace vlp {
 
 namespace fs = std::filesystem;
 
-WatchedFolder::Changes WatchedFolder::look() {
+WatchedFolder::Changes WatchedFolder::poll_changes() {
   std::map<std::string, File> now;
   std::error_code error;
   for (fs::directory_iterator entry(folder_, error), end; !error && entry != end;
@@ -25,8 +25,8 @@ WatchedFolder::Changes WatchedFolder::look() {
     const auto before = files_.find(name);
     if (before == files_.end()) continue;
     const bool same = before->second.bytes == file.bytes && before->second.time == file.time;
-    if (same && !before->second.told) changes.came.push_back(folder_ / name);
-    file.told = same;
+    if (same && !before->second.is_reported) changes.added.push_back(folder_ / name);
+    file.is_reported = same;
   }
   for (const auto& [name, file] : files_) {
     if (!now.contains(name)) changes.gone.push_back(name);

@@ -17,13 +17,13 @@ class WatchedFolder {
 
   struct Changes {
     /// New images, by name. An overwritten image is new again.
-    std::vector<std::filesystem::path> came;
+    std::vector<std::filesystem::path> added;
     std::vector<std::string> gone;
   };
   /// Returns the changes since the last call. An image is new if file, size and time are the same
   /// in two successive calls, so that it is no longer being written. Ignores names that begin with
   /// a dot, which are incomplete files.
-  Changes look();
+  Changes poll_changes();
   /// Ignores the removal of a file that the caller is about to delete.
   void forget(const std::string& name) { files_.erase(name); }
 
@@ -33,7 +33,7 @@ class WatchedFolder {
   struct File {
     std::uintmax_t bytes;
     std::filesystem::file_time_type time;
-    bool told;
+    bool is_reported;
   };
   std::filesystem::path folder_;
   std::map<std::string, File> files_;

@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 constexpr const char *kKept = "kept", *kState = ".run";
 
 /// Returns a state that changes with the tables of the captures' positions.
-std::string state_of_tables(const fs::path& folder) {
+std::string make_table_state(const fs::path& folder) {
   std::string state;
   for (const char* table : {"captures.csv", "truth.csv"}) {
     std::error_code none;
@@ -49,7 +49,7 @@ WatchedRun::WatchedRun(Unit& unit, Spool& spool)
   steps_.reserve(kStationSteps.size());
   step_folders_.reserve(kStationSteps.size());
   for (const StationStep step : kStationSteps) {
-    step_folders_.push_back(files_.make_folder({name_of(step), folder_, "step"}));
+    step_folders_.push_back(files_.make_folder({to_string(step), folder_, "step"}));
     steps_.emplace_back(step_folders_.back().path());
   }
   waiting_.resize(steps_.size());
@@ -66,7 +66,7 @@ bool WatchedRun::read_state() {
   const auto state = files_.read(kState, max_bytes);
   if (!state) return false;
   run_ = state->substr(0, state->find('\n'));
-  if (!is_name_of_run(run_)) {
+  if (!is_run_id(run_)) {
     throw InputError(folder_ / kState,
                      "holds no name of a run: remove it, then its images are of a new run");
   }
@@ -80,9 +80,9 @@ void WatchedRun::begin(Spool& spool) {
   if (::flock(lock_, LOCK_EX | LOCK_NB) != 0) {
     throw InputError(folder_, "another vlp-station works on this camera");
   }
-  const bool is_kept = read_state();
+  const bool is_stored = read_state();
   if (run_.empty()) {
-    run_ = new_run();
+    run_ = make_run_id();
     files_.replace(kState, run_ + "\n");
     return;
   }
@@ -93,41 +93,43 @@ void WatchedRun::begin(Spool& spool) {
                                  "new run",
                                  run_, finished_->camera));
   }
-  if (!finished_ && is_kept) {
-    throw InputError(
-        folder_,
-        fmt::format("run {} is kept, but its record cannot be read ({}): "
-                    "begin again when it can, or move the folder away",
-                    run_, spool.away().empty() ? "the records do not have it" : spool.away()));
+  if (!finished_ && is_stored) {
+    throw InputError(folder_,
+                     fmt::format("run {} is kept, but its record cannot be read ({}): "
+                                 "begin again when it can, or move the folder away",
+                                 run_,
+                                 spool.offline_reason().empty() ? "the records do not have it"
+                                                                : spool.offline_reason()));
   }
   if (!finished_) return;  // the run continues
   publish_run(*finished_, {}, unit_.config().results);
-  put_away();
+  move_away();
 }
 
-std::vector<WatchedRun::Arrival> WatchedRun::look(std::size_t most) {
+std::vector<WatchedRun::Arrival> WatchedRun::poll_changes(std::size_t max_images) {
   std::vector<Arrival> arrivals;
   bool reread = false;
   for (const StationStep step : kStationSteps) {
     const auto index = static_cast<std::size_t>(step);
     auto& waiting = waiting_[index];
-    std::string tables = state_of_tables(steps_[index].folder());
+    std::string tables = make_table_state(steps_[index].folder());
     if (tables != tables_[index]) {
       tables_[index] = std::move(tables);
       unit_.reread(step);
       reread = true;
     }
-    const auto changes = steps_[index].look();
+    const auto changes = steps_[index].poll_changes();
     for (const std::string& name : changes.gone) {
       std::erase_if(waiting, [&](const fs::path& file) { return file.filename() == name; });
       unit_.remove(step, name);
       arrivals.push_back({step, name, true});
     }
-    waiting.insert(waiting.end(), changes.came.begin(), changes.came.end());
-    const auto end = waiting.begin() + static_cast<std::ptrdiff_t>(std::min(most, waiting.size()));
+    waiting.insert(waiting.end(), changes.added.begin(), changes.added.end());
+    const auto end =
+        waiting.begin() + static_cast<std::ptrdiff_t>(std::min(max_images, waiting.size()));
     const std::vector<fs::path> now(waiting.begin(), end);
     waiting.erase(waiting.begin(), end);
-    most -= now.size();
+    max_images -= now.size();
     unit_.add(step, now, !waiting.empty());
     for (const fs::path& file : now) arrivals.push_back({step, file.filename().string(), false});
   }
@@ -135,10 +137,10 @@ std::vector<WatchedRun::Arrival> WatchedRun::look(std::size_t most) {
   return arrivals;
 }
 
-void WatchedRun::mark_kept() const {
+void WatchedRun::mark_stored() const {
   try {
     files_.replace(kState, fmt::format("{}\n{}\n", run_, kKept));
-  } catch (const InputError&) {  // put_away() reports it; records reject a second verdict
+  } catch (const InputError&) {  // move_away() reports it; records reject a second verdict
   }
 }
 
@@ -149,12 +151,12 @@ void WatchedRun::discard(StationStep step, const std::string& image) {
   unit_.discard(step, image);
 }
 
-void WatchedRun::put_away() const {
+void WatchedRun::move_away() const {
   files_.check_place();
-  vlp::put_away(folder_, run_);
+  vlp::move_away(folder_, run_);
 }
 
-void put_away(const fs::path& folder, const std::string& run) {
+void move_away(const fs::path& folder, const std::string& run) {
   const fs::path kept = folder.string() + "." + run;
   std::error_code error;
   fs::rename(folder, kept, error);

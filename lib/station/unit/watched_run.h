@@ -17,7 +17,7 @@ namespace vlp {
 
 /// Renames the folder of a finished run, CAPTURES/CAMERA, to CAPTURES/CAMERA.RUN, with its images.
 /// Throws InputError.
-void put_away(const std::filesystem::path& folder, const std::string& run);
+void move_away(const std::filesystem::path& folder, const std::string& run);
 
 /// Run of a unit whose images arrive in CAPTURES/CAMERA/STEP/. One program at a time processes a
 /// camera.
@@ -49,7 +49,7 @@ class WatchedRun {
   };
   /// Processes changes, at most `max_images` images, and solves the steps that are complete.
   /// Returns the changes.
-  std::vector<Arrival> look(std::size_t most);
+  std::vector<Arrival> poll_changes(std::size_t max_images);
 
   /// Deletes the file of a rejected image; its rejection remains (Unit::discard). Throws InputError
   /// if it cannot be deleted.
@@ -62,9 +62,9 @@ class WatchedRun {
   }
 
   /// Marks the run as stored. It is not judged again afterwards, even if the records are offline.
-  void mark_kept() const;
-  /// Renames the folder by put_away(). Throws InputError also if its path leads elsewhere by now.
-  void put_away() const;
+  void mark_stored() const;
+  /// Renames the folder by move_away(). Throws InputError also if its path leads elsewhere by now.
+  void move_away() const;
 
  private:
   void begin(Spool& spool);

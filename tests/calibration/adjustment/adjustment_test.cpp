@@ -128,7 +128,7 @@ TEST(AdjustCaptures, DetectsWrongKnownPosition) {
   ASSERT_TRUE(found.ok());
   ASSERT_EQ(found.places.size(), 5U);
   for (const auto& place : found.places) EXPECT_EQ(place.wrong, place.name == "spot-24");
-  EXPECT_THAT(found.places[2].misfit_m, IsNear(Eigen::Vector3d(-0.02, 0, 0), 1e-6));
+  EXPECT_THAT(found.places[2].residual_m, IsNear(Eigen::Vector3d(-0.02, 0, 0), 1e-6));
 }
 
 TEST(AdjustCaptures, DetectsLensContradictingItsCovariance) {
@@ -150,7 +150,7 @@ TEST(AdjustCaptures, DetectsLensContradictingItsCovariance) {
 
 TEST(MakeLensCovariance, MatchesImageDisplacement) {
   const Camera camera{"", {800, 600}, LensModel::pinhole, {500, 400, 399.5, 299.5}, {}, {}, {}};
-  const MatrixX covariance = stated_lens_covariance(camera, 3);
+  const MatrixX covariance = make_lens_covariance(camera, 3);
   // Rays evenly over the image: (u - cx) / fx has the mean square (800^2 - 50^2) / 12 / 500^2.
   const double x = (640000 - 2500) / 12.0 / 250000, y = (360000 - 37.5 * 37.5) / 12.0 / 160000;
   // An error that displaces one axis alone has half the mean square over both axes.
@@ -174,7 +174,7 @@ TEST(AdjustCaptures, EstimatesLensOfUnknownUncertainty) {
   camera.intrinsics[2] += 5;
   camera.intrinsics[4] += 0.03;
   survey.input.calibration.intrinsics_report.emplace();
-  survey.input.calibration.intrinsics_report->covariance = stated_lens_covariance(camera, 10);
+  survey.input.calibration.intrinsics_report->covariance = make_lens_covariance(camera, 10);
   const AdjustmentResult found = adjust_captures(survey.input);
   ASSERT_TRUE(found.ok()) << found.undetermined;
   EXPECT_FALSE(found.lens_contradicted);
@@ -195,7 +195,7 @@ TEST(AdjustCaptures, RejectsMisidentifiedDetections) {
             survey.input.captures[7].detections[3].lamp);
   const AdjustmentResult found = adjust_captures(survey.input);
   ASSERT_TRUE(found.ok());
-  EXPECT_EQ(found.detections_left_out, 2);
+  EXPECT_EQ(found.rejected_detections, 2);
   EXPECT_THAT(*found.center.lever_arm_m, IsNear(survey.lever_arm_m, 1e-7));
 }
 
@@ -216,7 +216,7 @@ TEST(AdjustCaptures, ReportsNoUsableCapture) {
   survey.input.captures.push_back({"alone", {{1, {400, 300}, 0.1}}});
   const AdjustmentResult found = adjust_captures(survey.input);
   EXPECT_THAT(found.undetermined, HasSubstr("two lamps"));
-  EXPECT_EQ(found.captures_left_out, 1);
+  EXPECT_EQ(found.rejected_captures, 1);
 }
 
 }  // namespace

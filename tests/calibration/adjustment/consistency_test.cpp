@@ -36,7 +36,7 @@ Unit calibrated(Survey& survey, const Case& the, Random& random) {
   if (the.lens == Case::boards) {
     draw_lens(calibration, lens_covariance(calibration.camera, 0.1, 8), random);
   } else if (the.lens == Case::elsewhere) {
-    draw_lens(calibration, stated_lens_covariance(calibration.camera, 3), random);
+    draw_lens(calibration, make_lens_covariance(calibration.camera, 3), random);
   }
   survey.add_noise(random, true, true, true);
   const AdjustmentResult found = adjust_captures(survey.input);
@@ -59,7 +59,7 @@ TEST_P(AdjustCapturesCovariance, YieldsConsistentFixCovariances) {
   constexpr int trials = 200;
   Random random(20 + static_cast<std::uint64_t>(the.places));
   const std::vector<Eigen::Vector3d> axes_m{{-0.5, -0.25, 0}, {0.5, -0.2, 0.2}, {0, 0.3, 0.1}};
-  Judged whole, common;
+  NeesStatistics whole, common;
   for (int trial = 0; trial < trials; ++trial) {
     Survey survey(the.map_sd_m);
     for (std::size_t i = 0; i < 3; ++i) {
@@ -76,20 +76,20 @@ TEST_P(AdjustCapturesCovariance, YieldsConsistentFixCovariances) {
       const Fix without_noise = positioner.locate(exact);
       ASSERT_TRUE(fix.ok() && without_noise.ok());
       EXPECT_EQ(fix.rejected_lamps, 0);
-      whole.add(error_of(fix, survey.truth.camera), fix.estimate.covariance);
-      common.add(error_of(without_noise, survey.truth.camera),
+      whole.add(compute_pose_error(fix, survey.truth.camera), fix.estimate.covariance);
+      common.add(compute_pose_error(without_noise, survey.truth.camera),
                  without_noise.estimate.covariance - without_noise.noise_covariance);
     }
   }
-  for (const Judged& judged : {whole, common}) {
+  for (const NeesStatistics& judged : {whole, common}) {
     EXPECT_GT(judged.mean(), 0.9);
     EXPECT_LT(judged.mean(), 1.1);
-    EXPECT_GT(judged.share(), 0.93);
-    EXPECT_LT(judged.share(), 0.97);
+    EXPECT_GT(judged.fraction(), 0.93);
+    EXPECT_LT(judged.fraction(), 0.97);
   }
   RecordProperty("whole_permille", static_cast<int>(std::lround(1e3 * whole.mean())));
   std::printf("%s: whole %.3f, %.1f %%; common %.3f, %.1f %%\n", the.name, whole.mean(),
-              100 * whole.share(), common.mean(), 100 * common.share());
+              100 * whole.fraction(), common.mean(), 100 * common.fraction());
 }
 
 INSTANTIATE_TEST_SUITE_P(

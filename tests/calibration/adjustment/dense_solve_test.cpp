@@ -62,26 +62,26 @@ class DenseAdjustment {
                                                       {"spot-4", {0.4, 0.2, 0.2}}};
     int k = 0;
     for (const AdjustmentCapture& capture : input_.captures) {
-      Own own{};
+      LocalUnknowns local{};
       if (capture.spot.empty()) {
-        own.at = std::ssize(start);
+        local.at = std::ssize(start);
         const Pose pose = k == 9 ? Pose{{0.1, -0.2, 0.1}, 1.2} : Pose{{-0.2, 0.1, 0}, -2};
         start.insert(start.end(), pose.position_m.begin(), pose.position_m.end());
         start.push_back(pose.yaw_rad);
-        own.yaw = own.at + 3;
+        local.yaw = local.at + 3;
       } else {
         const auto [spot, fresh] = spots.emplace(capture.spot, std::ssize(start));
         if (fresh) {
           const Eigen::Vector3d& axis_m = axes.at(capture.spot);
           start.insert(start.end(), axis_m.begin(), axis_m.end());
         }
-        own.at = spot->second;
-        own.on_spot = true;
-        own.yaw = std::ssize(start);
+        local.at = spot->second;
+        local.on_spot = true;
+        local.yaw = std::ssize(start);
         const int in_spot = k < 4 ? k : k - 4, captures = k < 4 ? 4 : 5;
         start.push_back(0.3 + 2 * std::numbers::pi * in_spot / captures);
       }
-      own_.push_back(own);
+      local_.push_back(local);
       ++k;
     }
     state_ = Eigen::Map<Eigen::VectorXd>(start.data(), std::ssize(start));
@@ -109,7 +109,7 @@ class DenseAdjustment {
   }
 
   /// Returns intrinsics, zenith, lever arm and lamps.
-  Eigen::VectorXd shared() const {
+  Eigen::VectorXd global() const {
     Eigen::VectorXd values(intrinsics_.size() + 4 + 3 * lamp_count());
     values << intrinsics_ + lens_root_ * state_.head(zenith_),
         state_.segment(zenith_, 4 + 3 * lamp_count());
@@ -125,7 +125,7 @@ class DenseAdjustment {
   }
 
  private:
-  struct Own {
+  struct LocalUnknowns {
     Eigen::Index at, yaw;
     bool on_spot;
   };
@@ -151,13 +151,13 @@ class DenseAdjustment {
         Eigen::Quaterniond(1 + zenith.z(), -zenith.y(), zenith.x(), 0).normalized();
     const Eigen::Vector3d arm_m(state[zenith_ + 2], state[zenith_ + 3], 0);
     std::map<std::string, bool> axis_counted;
-    for (std::size_t k = 0; k < own_.size(); ++k) {
+    for (std::size_t k = 0; k < local_.size(); ++k) {
       const AdjustmentCapture& capture = input_.captures[k];
-      const Own& own = own_[k];
-      const Eigen::AngleAxisd world_from_level(state[own.yaw], Eigen::Vector3d::UnitZ());
-      const Eigen::Vector3d axis_m = state.segment<3>(own.at);
+      const LocalUnknowns& local = local_[k];
+      const Eigen::AngleAxisd world_from_level(state[local.yaw], Eigen::Vector3d::UnitZ());
+      const Eigen::Vector3d axis_m = state.segment<3>(local.at);
       Eigen::Vector3d camera_m = axis_m;
-      if (own.on_spot) camera_m += world_from_level * arm_m;
+      if (local.on_spot) camera_m += world_from_level * arm_m;
       Eigen::Quaterniond level_from_base = Eigen::Quaterniond::Identity();
       if (capture.inclination) {
         level_from_base =
@@ -171,7 +171,7 @@ class DenseAdjustment {
             *lens.project(camera_from_base * (level_from_base.inverse() * level));
         add(Eigen::Vector2d((detection.pixel - pixel) / *detection.sigma_px));
       }
-      if (!capture.place || (own.on_spot && axis_counted[capture.spot])) continue;
+      if (!capture.place || (local.on_spot && axis_counted[capture.spot])) continue;
       axis_counted[capture.spot] = true;
       Eigen::Vector3d stated_m;
       stated_m << capture.place->xy_m, *capture.place->z_m;
@@ -203,7 +203,7 @@ class DenseAdjustment {
   Eigen::VectorXd intrinsics_, state_;
   Eigen::MatrixXd lens_root_, covariance_;
   Eigen::Index zenith_ = 0, lamps_ = 0;
-  std::vector<Own> own_;
+  std::vector<LocalUnknowns> local_;
 };
 
 struct Known {
@@ -218,13 +218,13 @@ TEST_P(AdjustCapturesReference, MatchesDenseLeastSquares) {
   const Survey survey = small_survey(GetParam().map_sd_m, GetParam().lens, random);
   const AdjustmentResult found = adjust_captures(survey.input);
   ASSERT_TRUE(found.ok()) << found.undetermined;
-  ASSERT_EQ(found.detections_left_out, 0);
+  ASSERT_EQ(found.rejected_detections, 0);
   ASSERT_EQ(found.noise_scale, 1);
   ASSERT_TRUE(found.center.lever_arm_m);
   DenseAdjustment dense(survey);
   dense.solve();
 
-  const Eigen::VectorXd expected = dense.shared();
+  const Eigen::VectorXd expected = dense.global();
   Eigen::VectorXd values(expected.size());
   const auto& intrinsics = found.camera.intrinsics;
   values << Eigen::Map<const Eigen::VectorXd>(intrinsics.data(), std::ssize(intrinsics)),
@@ -261,8 +261,8 @@ INSTANTIATE_TEST_SUITE_P(Adjustment, AdjustCapturesReference,
 class AdjustmentDerivatives : public testing::Test {
  protected:
   Camera camera = synthetic_camera();
-  AdjustmentProblem problem{camera.lens_model, LensFreedom(camera, lens_covariance(camera, 0.1, 6)),
-                            2, 1};
+  AdjustmentProblem problem{camera.lens_model,
+                            LensParametrization(camera, lens_covariance(camera, 0.1, 6)), 2, 1};
 
   AdjustmentDerivatives() {
     const AdjustmentLayout& at = problem.layout();
@@ -315,16 +315,16 @@ TEST_F(AdjustmentDerivatives, LinearizeMatchesFiniteDifferences) {
         const Eigen::MatrixXd expected = differences(first, derivative.cols(), residual);
         EXPECT_THAT(derivative, IsNear(expected, 1e-6 * (1 + expected.cwiseAbs().maxCoeff())));
       };
-      expect(found->by_lens, at.lens);
-      expect(found->by_zenith, at.zenith);
-      expect(found->by_lamp, at.lamp(lamp));
-      const Eigen::Index own = problem.captures[capture].own;
+      expect(found->jacobian_wrt_lens, at.lens);
+      expect(found->jacobian_wrt_zenith, at.zenith);
+      expect(found->jacobian_wrt_lamp, at.lamp(lamp));
+      const Eigen::Index local = problem.captures[capture].local;
       if (capture == 0) {
-        expect(found->by_lever_arm, at.lever_arm);
-        expect(found->by_spot, at.spot(0));
-        expect(found->by_own.leftCols(2), own);
+        expect(found->jacobian_wrt_lever_arm, at.lever_arm);
+        expect(found->jacobian_wrt_spot, at.spot(0));
+        expect(found->jacobian_wrt_local.leftCols(2), local);
       } else {
-        expect(found->by_own, own);
+        expect(found->jacobian_wrt_local, local);
       }
     }
   }
@@ -333,16 +333,16 @@ TEST_F(AdjustmentDerivatives, LinearizeMatchesFiniteDifferences) {
 TEST_F(AdjustmentDerivatives, RotateByZenithMatchesFiniteDifferences) {
   const Eigen::Vector3d x(0.3, -0.5, 1.2);
   Eigen::Vector2d zenith(0.2, -0.1);
-  const ZenithTurn turn = turn_by_zenith(zenith, x);
+  const ZenithRotation turn = rotate_by_zenith(zenith, x);
   EXPECT_THAT(turn.x_in_camera,
               IsNear(level_from_zenith(zenith.homogeneous()).transpose() * x, 1e-15));
   EXPECT_THAT(turn.camera_from_level * x, IsNear(turn.x_in_camera, 1e-15));
   for (int i = 0; i < 2; ++i) {
     const Eigen::Vector2d step = 1e-6 * Eigen::Vector2d::Unit(i);
-    const Eigen::Vector3d difference = (turn_by_zenith(zenith + step, x).x_in_camera -
-                                        turn_by_zenith(zenith - step, x).x_in_camera) /
+    const Eigen::Vector3d difference = (rotate_by_zenith(zenith + step, x).x_in_camera -
+                                        rotate_by_zenith(zenith - step, x).x_in_camera) /
                                        2e-6;
-    EXPECT_THAT(turn.by_zenith.col(i), IsNear(difference, 1e-9));
+    EXPECT_THAT(turn.jacobian_wrt_zenith.col(i), IsNear(difference, 1e-9));
   }
 }
 

@@ -36,7 +36,7 @@ AdjustmentInput tracked_drive(const BodyRig& rig, const MovingCaptures& captures
 }
 
 /// Returns the errors of zenith point and lever arm.
-Eigen::Vector4d error_of(const AdjustmentResult& found, const BodyRig& rig) {
+Eigen::Vector4d compute_error(const AdjustmentResult& found, const BodyRig& rig) {
   Eigen::Vector4d error;
   error << zenith_point(found.center) - zenith_point(*rig.calibration.rotation_center),
       *found.center.lever_arm_m - kArm_m;
@@ -45,22 +45,22 @@ Eigen::Vector4d error_of(const AdjustmentResult& found, const BodyRig& rig) {
 
 TEST(AdjustCaptures, ReturnsExactResultForMovingCamera) {
   Random random(1);
-  const BodyRig rig = leaning_body();
-  const MovingCaptures captures = moving_captures(rig, 16, 2, random, 1e-3);
+  const BodyRig rig = make_tilted_body();
+  const MovingCaptures captures = make_moving_captures(rig, 16, 2, random, 1e-3);
   const AdjustmentResult known = adjust_captures(tracked_drive(rig, captures, captures.motions));
   ASSERT_TRUE(known.ok()) << known.undetermined;
   ASSERT_TRUE(known.center.lever_arm_m);
-  EXPECT_THAT(error_of(known, rig), IsNear(Eigen::Vector4d(0, 0, 0, 0), 1e-9));
+  EXPECT_THAT(compute_error(known, rig), IsNear(Eigen::Vector4d(0, 0, 0, 0), 1e-9));
   EXPECT_LT(known.residual_px, 1e-8);
   const std::vector<KnownMotion> unknown(16, KnownMotion::up_to(1e3, 1e3));
   const AdjustmentResult found = adjust_captures(tracked_drive(rig, captures, unknown));
   ASSERT_TRUE(found.ok()) << found.undetermined;
-  EXPECT_THAT(error_of(found, rig), IsNear(Eigen::Vector4d(0, 0, 0, 0), 1e-8));
+  EXPECT_THAT(compute_error(found, rig), IsNear(Eigen::Vector4d(0, 0, 0, 0), 1e-8));
 }
 
 /// Rotation in place without stops.
 TEST(AdjustCaptures, ReturnsAccurateResultForRotatingCamera) {
-  BodyRig rig = leaning_body();
+  BodyRig rig = make_tilted_body();
   const double rate_rad_per_s = 2;
   const auto turned = [&](double stated_rad_per_s) {
     AdjustmentInput input = tracked_drive(rig, {}, {});
@@ -86,14 +86,14 @@ TEST(AdjustCaptures, ReturnsAccurateResultForRotatingCamera) {
   };
   const AdjustmentResult known = turned(rate_rad_per_s);
   EXPECT_LT(known.residual_px, 0.01);
-  EXPECT_THAT(error_of(known, rig), IsNear(Eigen::Vector4d(0, 0, 0, 0), 1e-5));
+  EXPECT_THAT(compute_error(known, rig), IsNear(Eigen::Vector4d(0, 0, 0, 0), 1e-5));
   EXPECT_GT(turned(0).residual_px, 1) << "two degrees from the first row to the last";
 }
 
 TEST(AdjustCaptures, CountsIgnoredMotionAsNoise) {
   Random random(2);
-  const BodyRig rig = leaning_body();
-  MovingCaptures captures = moving_captures(rig, 16, 1, random, 0.05);
+  const BodyRig rig = make_tilted_body();
+  MovingCaptures captures = make_moving_captures(rig, 16, 1, random, 0.05);
   for (Frame& frame : captures.frames) frame.detections = with_noise(frame.detections, random);
   const AdjustmentResult known = adjust_captures(tracked_drive(rig, captures, captures.motions));
   const AdjustmentResult left_out = adjust_captures(tracked_drive(rig, captures, {}));
@@ -101,22 +101,22 @@ TEST(AdjustCaptures, CountsIgnoredMotionAsNoise) {
   EXPECT_FALSE(known.noise_is_contradicted);
   EXPECT_GT(left_out.noise_scale, 5);
   EXPECT_TRUE(left_out.noise_is_contradicted);
-  EXPECT_GT(error_of(left_out, rig).norm(), 3 * error_of(known, rig).norm());
+  EXPECT_GT(compute_error(left_out, rig).norm(), 3 * compute_error(known, rig).norm());
 }
 
 /// Mean normalized squared error e' cov^-1 e of zenith and lever arm per unknown; 60 draws
 /// determine it to 10 %.
 TEST(AdjustCaptures, ReportsConsistentCovarianceForMovingCamera) {
   constexpr int draws = 60;
-  const BodyRig rig = leaning_body();
+  const BodyRig rig = make_tilted_body();
   for (const bool odometry : {true, false}) {
     Random random(4);
-    const MovingCaptures exact = moving_captures(rig, 16, 1, random, 0.05);
+    const MovingCaptures exact = make_moving_captures(rig, 16, 1, random, 0.05);
     double sum = 0;
     for (int i = 0; i < draws; ++i) {
       MovingCaptures captures = exact;
       for (Frame& frame : captures.frames) frame.detections = with_noise(frame.detections, random);
-      const auto motions = odometry ? odometry_of(exact.motions, 0.05, 0.03, random)
+      const auto motions = odometry ? simulate_odometry(exact.motions, 0.05, 0.03, random)
                                     : std::vector<KnownMotion>(16, KnownMotion::up_to(2, 3));
       const auto judged = [&](AdjustmentInput input) {
         for (std::size_t k = 0; k < input.lamps.lamps.size(); ++k) {
@@ -130,7 +130,7 @@ TEST(AdjustCaptures, ReportsConsistentCovarianceForMovingCamera) {
         EXPECT_TRUE(found.ok() && found.center.lever_arm_m) << found.undetermined;
         const Eigen::Index zenith = std::ssize(rig.calibration.camera.intrinsics);
         const Eigen::Matrix4d covariance = found.refined_covariance.block<4, 4>(zenith, zenith);
-        const Eigen::Vector4d error = error_of(found, rig);
+        const Eigen::Vector4d error = compute_error(found, rig);
         return error.dot(covariance.ldlt().solve(error)) / 4;
       };
       sum += judged(tracked_drive(rig, captures, motions));

@@ -30,8 +30,8 @@ class RenderedDriveCalibration : public testing::Test {
     rig.camera.row_time_s = 55e-6;
     return rig;
   }();
-  const Calibration truth = true_calibration(scene);
-  const LampMap lamps = lamp_map_of(scene, false);
+  const Calibration truth = make_true_calibration(scene);
+  const LampMap lamps = make_lamp_map(scene, false);
 
   struct Drive {
     std::vector<Frame> frames;
@@ -42,12 +42,12 @@ class RenderedDriveCalibration : public testing::Test {
 
   Drive drive(double speed_m_per_s) const {
     const FrameRenderer renderer(scene);
-    const LightDetector detector(lamps, detector_camera(truth));
+    const LightDetector detector(lamps, make_detector_camera(truth));
     Random random(5);
     Drive drive;
     for (int i = 0; i < kCaptures; ++i) {
-      LampShot shot = lamp_shot(scene, scene.sets.at(0), static_cast<std::size_t>(i) % 12);
-      CarrierMotion& motion = shot.motion;
+      LampShot shot = make_lamp_shot(scene, scene.sets.at(0), static_cast<std::size_t>(i) % 12);
+      BaseMotion& motion = shot.motion;
       motion.axis_m = {random.uniform(-0.3, 0.3), random.uniform(-0.12, 0.12), i % 2 ? 0.3 : 0.0};
       motion.yaw_rad = random.uniform(-3.1, 3.1);
       const double direction_rad = random.uniform(-3.1, 3.1);
@@ -70,12 +70,12 @@ class RenderedDriveCalibration : public testing::Test {
     return drive;
   }
 
-  std::vector<KnownMotion> odometry_of(const Drive& drive, double share) const {
+  std::vector<KnownMotion> simulate_odometry(const Drive& drive, double relative_error) const {
     Random random(6);
     std::vector<KnownMotion> read = drive.motions;
     for (KnownMotion& motion : read) {
-      motion.velocity_sd_m_per_s = share * motion.velocity_m_per_s.norm();
-      motion.yaw_rate_sd_rad_per_s = share * std::abs(motion.yaw_rate_rad_per_s);
+      motion.velocity_sd_m_per_s = relative_error * motion.velocity_m_per_s.norm();
+      motion.yaw_rate_sd_rad_per_s = relative_error * std::abs(motion.yaw_rate_rad_per_s);
       for (double& one : motion.velocity_m_per_s)
         one += motion.velocity_sd_m_per_s * random.normal();
       motion.yaw_rate_rad_per_s += motion.yaw_rate_sd_rad_per_s * random.normal();
@@ -87,9 +87,10 @@ class RenderedDriveCalibration : public testing::Test {
     double zenith_rad, zenith_sd_rad, arm_m, arm_sd_m;
   };
   Found level(const Drive& drive, const std::vector<KnownMotion>& motions) const {
-    LevellingOptions options;
+    TiltCalibrationOptions options;
     options.motions = motions;
-    const Levelling found = level_by_lamps(drive.frames, lamps, scene.camera, options);
+    const TiltCalibration found =
+        estimate_tilt_from_lamps(drive.frames, lamps, scene.camera, options);
     EXPECT_EQ(found.undetermined, "");
     return {zenith_error(found.center), zenith_sd(found.center), 0, 0};
   }
@@ -130,7 +131,7 @@ constexpr double kFar = 3;
 TEST_F(RenderedDriveCalibration, EstimatesTiltOfMovingCamera) {
   const Drive standing = drive(0), driving = drive(1);
   const Found of_standing = level(standing, {});
-  const Found with_odometry = level(driving, odometry_of(driving, 0.01));
+  const Found with_odometry = level(driving, simulate_odometry(driving, 0.01));
   const Found unknown =
       level(driving, std::vector<KnownMotion>(kCaptures, KnownMotion::up_to(2, rad_from_deg(180))));
   const Found left_out = level(driving, {});
@@ -148,7 +149,7 @@ TEST_F(RenderedDriveCalibration, EstimatesTiltOfMovingCamera) {
 TEST_F(RenderedDriveCalibration, EstimatesTiltAndLeverArmFromKnownPositions) {
   const Drive standing = drive(0), driving = drive(1);
   const Found of_standing = adjust(standing, {});
-  const Found with_odometry = adjust(driving, odometry_of(driving, 0.01));
+  const Found with_odometry = adjust(driving, simulate_odometry(driving, 0.01));
   const Found unknown = adjust(
       driving, std::vector<KnownMotion>(kCaptures, KnownMotion::up_to(2, rad_from_deg(180))));
   const Found left_out = adjust(driving, {});

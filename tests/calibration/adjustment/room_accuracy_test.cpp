@@ -42,7 +42,7 @@ Means over_trials(double map_sd_m, bool places_are_wrong, int trials) {
       const Fix fix =
           positioner.locate(with_noise(seen_from(survey.truth, survey.sigma_px), random));
       EXPECT_TRUE(fix.ok());
-      const Eigen::Vector4d error = error_of(fix, survey.truth.camera);
+      const Eigen::Vector4d error = compute_pose_error(fix, survey.truth.camera);
       sums.fix_xy_m += error.head<2>().norm() / (trials * checks);
       sums.fix_z_m += std::abs(error[2]) / (trials * checks);
     }

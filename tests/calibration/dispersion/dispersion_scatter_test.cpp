@@ -20,7 +20,7 @@ namespace {
 constexpr int kStations = 600;
 constexpr double kStationTolerance = 0.09;
 
-void expect_consistent(const Station& station, const std::vector<StationCapture>& exact,
+void expect_consistent(const Station& station, const std::vector<ReferencePointCapture>& exact,
                        DispersionMethod method, bool stated) {
   Random random(41);
   const auto reference = fit_dispersion(exact, station.rig.map, station.believed, method);
@@ -104,7 +104,8 @@ TEST_P(FitDispersionWithFewCaptures, PaperMethodCoversErrorAtReportedRate) {
     auto captures = exact;
     for (auto& capture : captures) {
       capture.detections = with_noise(capture.detections, random);
-      capture.station_m += few.placement_sd_m * Eigen::Vector2d(random.normal(), random.normal());
+      capture.reference_point_m +=
+          few.placement_sd_m * Eigen::Vector2d(random.normal(), random.normal());
       for (auto& detection : capture.detections) {
         if (!few.noise_is_stated) detection.sigma_px.reset();
       }
@@ -154,12 +155,12 @@ struct Captures {
   bool has_tied_heights = false;
 };
 
-std::vector<StationCapture> make_captures(Station& station, const Captures& captures) {
+std::vector<ReferencePointCapture> make_captures(Station& station, const Captures& captures) {
   constexpr double noise_px = 0.3;
   if (captures.method == DispersionMethod::paper) {
     return station.captures_at(0.7, captures.count, noise_px);
   }
-  std::vector<StationCapture> made;
+  std::vector<ReferencePointCapture> made;
   for (int k = 0; k < captures.count; ++k) {
     const bool second = k % 2 == 1;
     const double yaw_rad =
@@ -286,10 +287,10 @@ LampMap draw_survey(const LampMap& truth, Random& random) {
   return surveyed;
 }
 
-std::vector<StationCapture> draw_captures(SyntheticRig& rig, DispersionMethod method,
-                                          Random& random) {
+std::vector<ReferencePointCapture> draw_captures(SyntheticRig& rig, DispersionMethod method,
+                                                 Random& random) {
   constexpr int captures = 8;
-  std::vector<StationCapture> drawn;
+  std::vector<ReferencePointCapture> drawn;
   drawn.reserve(captures);
   for (int k = 0; k < captures; ++k) {
     const bool turns = method == DispersionMethod::camera;

@@ -22,7 +22,7 @@ TEST(FitDispersion, SeparatesCameraAndWorldErrorsExactly) {
     const auto captures = station.captures(12, true, wrong_m);
     const auto fit =
         fit_dispersion(captures, station.rig.map, station.believed, DispersionMethod::camera);
-    ASSERT_EQ(fit.status, DispersionStatus::ok) << explanation_of(fit.status);
+    ASSERT_EQ(fit.status, DispersionStatus::ok) << describe(fit.status);
     EXPECT_THAT(*fit.world_offset_m, IsNear(wrong_m, 1e-9));
     EXPECT_LT(fit.after.radius, 1e-9);
     EXPECT_TRUE(error_rad == 0 || fit.before.radius > 0.005);
@@ -100,7 +100,7 @@ TEST(FitDispersion, PaperMethodAttributesReferencePointErrorToCamera) {
   station.rig.calibration.rotation_center.reset();
   for (const auto& [yaw_rad, sign] : {std::pair(0.0, 1.0), std::pair(M_PI, -1.0)}) {
     auto captures = station.captures_at(yaw_rad, 5);
-    for (auto& capture : captures) capture.station_m.x() -= 0.008;
+    for (auto& capture : captures) capture.reference_point_m.x() -= 0.008;
     const auto fit =
         fit_dispersion(captures, station.rig.map, station.believed, DispersionMethod::paper);
     EXPECT_NEAR(fit.dispersion.offset_px.x(), -sign * 520 * 0.008 / 1.6, 0.01);
@@ -116,7 +116,8 @@ TEST(FitDispersion, RejectsWrongFixes) {
     const auto clean = fit_dispersion(captures, station.rig.map, station.believed, method);
     for (std::size_t i = 0; i < 40; ++i) {
       captures[i].detections = with_noise(captures[i].detections, random);
-      if (i % 4 == 0) captures[i].station_m += Eigen::Vector2d(0.05 + 5e-4 * double(i), -0.05);
+      if (i % 4 == 0)
+        captures[i].reference_point_m += Eigen::Vector2d(0.05 + 5e-4 * double(i), -0.05);
     }
     const auto fit = fit_dispersion(captures, station.rig.map, station.believed, method);
     ASSERT_EQ(fit.status, DispersionStatus::ok);
@@ -139,24 +140,24 @@ TEST(FitDispersion, UsesInclinationSensor) {
 
 TEST(FitDispersion, ReportsStatusForInsufficientCaptures) {
   Station station(0.01);
-  const auto status_of = [&](const std::vector<StationCapture>& captures,
-                             DispersionMethod method = DispersionMethod::camera) {
+  const auto find_status = [&](const std::vector<ReferencePointCapture>& captures,
+                               DispersionMethod method = DispersionMethod::camera) {
     return fit_dispersion(captures, station.rig.map, station.believed, method).status;
   };
   const auto turned = station.captures(12, true, {0, 0});
-  EXPECT_EQ(status_of({}), DispersionStatus::no_fix);
-  EXPECT_EQ(status_of({turned[0]}), DispersionStatus::too_few_captures);
-  EXPECT_EQ(status_of({turned[0]}, DispersionMethod::paper), DispersionStatus::too_few_captures);
-  EXPECT_EQ(status_of(turned, DispersionMethod::paper), DispersionStatus::many_yaws);
-  EXPECT_EQ(status_of(station.captures_at(1, 20)), DispersionStatus::one_yaw);
+  EXPECT_EQ(find_status({}), DispersionStatus::no_fix);
+  EXPECT_EQ(find_status({turned[0]}), DispersionStatus::too_few_captures);
+  EXPECT_EQ(find_status({turned[0]}, DispersionMethod::paper), DispersionStatus::too_few_captures);
+  EXPECT_EQ(find_status(turned, DispersionMethod::paper), DispersionStatus::many_yaws);
+  EXPECT_EQ(find_status(station.captures_at(1, 20)), DispersionStatus::one_yaw);
   // A single capture at another yaw, with an error, must not decide.
   auto one_other = station.captures_at(1, 12);
   one_other.push_back(station.captures_at(2.5, 1)[0]);
-  one_other.back().station_m.x() += 0.05;
-  EXPECT_EQ(status_of(one_other), DispersionStatus::one_yaw);
+  one_other.back().reference_point_m.x() += 0.05;
+  EXPECT_EQ(find_status(one_other), DispersionStatus::one_yaw);
   auto far = turned;
-  for (auto& capture : far) capture.station_m.x() += 1;
-  EXPECT_EQ(status_of(far), DispersionStatus::station_far);
+  for (auto& capture : far) capture.reference_point_m.x() += 1;
+  EXPECT_EQ(find_status(far), DispersionStatus::station_far);
   auto other_map = turned;
   for (auto& capture : other_map) {
     for (auto& detection : capture.detections) detection.lamp += 50;

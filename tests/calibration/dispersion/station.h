@@ -17,22 +17,23 @@ struct Station {
 
   /// Returns captures at equally spaced yaws, optionally at two heights. The assumed reference
   /// point has the error -`wrong_m`.
-  std::vector<StationCapture> captures(int count, bool heights, const Eigen::Vector2d& wrong_m,
-                                       double sigma_px = 0.1) {
-    std::vector<StationCapture> captures;
+  std::vector<ReferencePointCapture> captures(int count, bool heights,
+                                              const Eigen::Vector2d& wrong_m,
+                                              double sigma_px = 0.1) {
+    std::vector<ReferencePointCapture> captures;
     for (int i = 0; i < count; ++i) {
       rig.camera = {{0.05, -0.1, heights && i % 2 ? 0.3 : 0.0}, 6.28 * i / count};
       captures.push_back({seen_from(rig, sigma_px), rig.camera.position_m.head<2>() - wrong_m});
     }
     return captures;
   }
-  std::vector<StationCapture> captures_at(double yaw_rad, int count, double sigma_px = 0.1) {
+  std::vector<ReferencePointCapture> captures_at(double yaw_rad, int count, double sigma_px = 0.1) {
     rig.camera = {{0.05, -0.1, 0}, yaw_rad};
     return {static_cast<std::size_t>(count),
             {seen_from(rig, sigma_px), rig.camera.position_m.head<2>()}};
   }
 
-  SyntheticRig rig = leaning_rig(0.05, 1);
+  SyntheticRig rig = make_tilted_rig(0.05, 1);
   Calibration believed;
 };
 

@@ -103,8 +103,8 @@ TEST_P(CheckBoard, ReportsLargerBoardFromForeignTags) {
   for (BoardView& view : seen_) {
     auto& tags = view.seen.tags;
     std::copy_if(tags.begin(), tags.end(), std::back_inserter(view.seen.foreign),
-                 [](const SeenTag& tag) { return tag.id >= 24; });
-    std::erase_if(tags, [](const SeenTag& tag) { return tag.id >= 24; });
+                 [](const TagDetection& tag) { return tag.id >= 24; });
+    std::erase_if(tags, [](const TagDetection& tag) { return tag.id >= 24; });
   }
   EXPECT_THAT(problem(board), HasSubstr("the images show cols 6, rows 5"));
   board.first_id = 100;
@@ -117,7 +117,7 @@ TEST_P(CheckBoard, IgnoresSingleForeignTags) {
   for (const int id : {100, 31}) {
     auto views = seen_;
     for (BoardView& view : views) {
-      SeenTag stray = view.seen.tags.front();
+      TagDetection stray = view.seen.tags.front();
       stray.id = id;
       for (auto& corner : stray.corners_px) corner += Eigen::Vector2d(-150, 40);
       view.seen.foreign.push_back(stray);
@@ -129,13 +129,13 @@ TEST_P(CheckBoard, IgnoresSingleForeignTags) {
 TEST_P(CheckBoard, IgnoresAdjacentBoard) {
   for (BoardView& view : seen_) {
     Eigen::Vector2d low(1e9, 1e9), high(-1e9, -1e9);
-    for (const SeenTag& tag : view.seen.tags) {
+    for (const TagDetection& tag : view.seen.tags) {
       for (const auto& corner : tag.corners_px) {
         low = low.cwiseMin(corner);
         high = high.cwiseMax(corner);
       }
     }
-    for (SeenTag tag : view.seen.tags) {
+    for (TagDetection tag : view.seen.tags) {
       tag.id += 30;
       for (auto& corner : tag.corners_px) corner.x() += 1.1 * (high - low).x();
       view.seen.foreign.push_back(tag);
@@ -146,7 +146,7 @@ TEST_P(CheckBoard, IgnoresAdjacentBoard) {
 
 TEST_P(CheckBoard, ReportsOtherBoardForPermutedIds) {
   for (BoardView& view : seen_) {
-    for (SeenTag& tag : view.seen.tags) tag.id = tag.id * 7 % 30;
+    for (TagDetection& tag : view.seen.tags) tag.id = tag.id * 7 % 30;
   }
   EXPECT_THAT(problem(views_.board), HasSubstr("is it another board?"));
 }

@@ -35,7 +35,8 @@ TEST_P(ComputePrintEffect, MatchesSolveOfWiderBoard) {
   ASSERT_TRUE(stated.ok() && wider.ok());
   const auto effect = compute_print_effect(stated, kPrintSd);
   ASSERT_TRUE(effect);
-  const auto expected = projection_difference(stated.lens(), wider.lens(), {800, 600}, even);
+  const auto expected =
+      compute_projection_difference(stated.lens(), wider.lens(), {800, 600}, even);
   ASSERT_TRUE(expected);
   EXPECT_GT(expected->rms_px, 0.01);
   // A full solve also estimates the shift of the edges, which a board that is wider changes.
@@ -83,7 +84,7 @@ TEST(EstimateLens, IncludesThePrintInTheUncertainty) {
     views.stretch = {1 + kPrintSd * random.normal(), 1 + kPrintSd * random.normal()};
     const IntrinsicsSolution solution = solve_intrinsics(views.input(20, random, noise_px));
     ASSERT_TRUE(solution.ok());
-    const auto error = projection_difference(solution.lens(), views.lens, {800, 600}, even);
+    const auto error = compute_projection_difference(solution.lens(), views.lens, {800, 600}, even);
     ASSERT_TRUE(error);
     squares += error->worst_px * error->worst_px / draws;
   }

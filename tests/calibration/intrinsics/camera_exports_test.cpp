@@ -20,7 +20,7 @@ const Camera kEight = camera_with(
     LensModel::opencv8, {500, 501, 400, 300, 0.1, -0.2, 0.003, 0.004, 0.05, 0.06, 0.07, 0.08});
 
 TEST(OpencvCamera, IsReadableByOpencv) {
-  const cv::FileStorage file(opencv_camera(kEight),
+  const cv::FileStorage file(format_opencv_camera(kEight),
                              cv::FileStorage::READ | cv::FileStorage::MEMORY);
   cv::Mat matrix, distortions;
   file["camera_matrix"] >> matrix;
@@ -33,29 +33,29 @@ TEST(OpencvCamera, IsReadableByOpencv) {
 }
 
 TEST(RosCameraInfo, ContainsDistortionModelAndCoefficients) {
-  const YAML::Node eight = YAML::Load(ros_camera_info(kEight));
+  const YAML::Node eight = YAML::Load(format_ros_camera_info(kEight));
   EXPECT_EQ(eight["distortion_model"].as<std::string>(), "rational_polynomial");
   EXPECT_EQ(eight["distortion_coefficients"]["data"].size(), 8U);
   EXPECT_EQ(eight["projection_matrix"]["data"][6].as<double>(), 300);
   EXPECT_EQ(eight["camera_name"].as<std::string>(), "007");
-  const YAML::Node four = YAML::Load(ros_camera_info(kFour));
+  const YAML::Node four = YAML::Load(format_ros_camera_info(kFour));
   EXPECT_EQ(four["distortion_model"].as<std::string>(), "plumb_bob");
   EXPECT_EQ(four["distortion_coefficients"]["data"][2].as<double>(), 1e-7);
   EXPECT_EQ(four["distortion_coefficients"]["data"].size(), 5U);
 }
 
 TEST(KalibrCamchain, ContainsIntrinsicsAndResolution) {
-  const YAML::Node camera = YAML::Load(kalibr_camchain(kFour))["cam0"];
+  const YAML::Node camera = YAML::Load(format_kalibr_camchain(kFour))["cam0"];
   EXPECT_EQ(camera["distortion_coeffs"].size(), 4U);
   EXPECT_EQ(camera["intrinsics"][3].as<double>(), 300);
   EXPECT_EQ(camera["resolution"][1].as<int>(), 600);
 }
 
 TEST(CameraExports, ThrowForUnsupportedLensModel) {
-  EXPECT_THROW(kalibr_camchain(kEight), std::invalid_argument);
+  EXPECT_THROW(format_kalibr_camchain(kEight), std::invalid_argument);
   const Camera round = camera_with(LensModel::stereographic, {500, 501, 400, 300});
-  EXPECT_THROW(ros_camera_info(round), std::invalid_argument);
-  EXPECT_THROW(opencv_camera(round), std::invalid_argument);
+  EXPECT_THROW(format_ros_camera_info(round), std::invalid_argument);
+  EXPECT_THROW(format_opencv_camera(round), std::invalid_argument);
 }
 
 }  // namespace

@@ -33,12 +33,12 @@ constexpr std::size_t kPoints = 1000;
 /// Tolerance of pixels up to 1000, for their rounding.
 constexpr double kExact_px = 1e-9;
 
-Lens lens_of(const Camera& camera) { return {camera.lens_model, camera.intrinsics}; }
+Lens make_lens(const Camera& camera) { return {camera.lens_model, camera.intrinsics}; }
 
 /// Returns points in the field of view, one to five meters away, up to `off_axis_deg` off the axis.
 std::vector<Eigen::Vector3d> points_before(const Camera& camera, double off_axis_deg = 180) {
-  const double least_cosine = std::cos(off_axis_deg * std::numbers::pi / 180);
-  const Lens lens = lens_of(camera);
+  const double min_cosine = std::cos(off_axis_deg * std::numbers::pi / 180);
+  const Lens lens = make_lens(camera);
   Random random(3);
   std::vector<Eigen::Vector3d> points;
   while (points.size() < kPoints) {
@@ -47,7 +47,7 @@ std::vector<Eigen::Vector3d> points_before(const Camera& camera, double off_axis
     const auto ray = lens.unproject({u, v});
     if (!ray) continue;
     const Eigen::Vector3d direction = ray->direction.normalized();
-    if (direction.z() >= least_cosine) points.push_back(random.uniform(1, 5) * direction);
+    if (direction.z() >= min_cosine) points.push_back(random.uniform(1, 5) * direction);
   }
   return points;
 }
@@ -57,7 +57,7 @@ using Project = std::function<Eigen::Vector2d(const Eigen::Vector3d& point)>;
 /// Returns the largest distance between the projections of the points by the lens and by `project`.
 double worst_px(const Camera& camera, const std::vector<Eigen::Vector3d>& points,
                 const Project& project) {
-  const Lens lens = lens_of(camera);
+  const Lens lens = make_lens(camera);
   double worst = 0;
   for (const Eigen::Vector3d& point : points) {
     const double off = (project(point) - lens.project(point).value()).norm();
@@ -115,7 +115,7 @@ void expect_same_pixels(const Camera& camera, const std::vector<Eigen::Vector3d>
   ASSERT_EQ(pixels.size(), points.size());
   std::size_t i = 0;
   EXPECT_LT(worst_px(camera, points, [&](const auto&) { return pixels[i++]; }), kExact_px)
-      << name_of(camera.lens_model);
+      << to_string(camera.lens_model);
 }
 
 constexpr LensModel kOfOpencv[] = {LensModel::pinhole, LensModel::opencv4,  LensModel::opencv5,
@@ -125,9 +125,9 @@ constexpr double kOpencvsWidest_deg = 89.9;
 
 TEST(OpencvCamera, MatchesProjectionOfOpencv) {
   for (const LensModel model : kOfOpencv) {
-    const Camera camera = camera_of(model);
+    const Camera camera = make_camera(model);
     const auto points = points_before(camera, kOpencvsWidest_deg);
-    const CvCamera read = read_by_opencv(opencv_camera(camera));
+    const CvCamera read = read_by_opencv(format_opencv_camera(camera));
     expect_same_pixels(camera, points,
                        projected_by_opencv(read, model == LensModel::fisheye, points));
   }
@@ -139,7 +139,7 @@ class ReadCameraFormats : public testing::Test {
     return read_any_camera(folder_.file("camera.txt", text));
   }
   std::string refusal(const std::string& text) const {
-    return refusal_of([&] { read(text); });
+    return rejection_message([&] { read(text); });
   }
 
   const TemporaryFolder folder_;
@@ -148,7 +148,7 @@ class ReadCameraFormats : public testing::Test {
 TEST_F(ReadCameraFormats, MatchesOpencvForFilesOfOpencv) {
   for (const LensModel model : kOfOpencv) {
     const bool fisheye = model == LensModel::fisheye;
-    const Camera camera = camera_of(model);
+    const Camera camera = make_camera(model);
     CvCamera cv{cv::Mat(cv::Mat_<double>(3, 3)), {}};
     const auto& p = camera.intrinsics;
     cv.matrix = (cv::Mat_<double>(3, 3) << p[0], 0, p[2], 0, p[1], p[3], 0, 0, 1);
@@ -204,8 +204,8 @@ Plane equidistant(const Plane& z, const std::vector<double>& k) {
   const double r = std::hypot(z.x, z.y), a = std::atan(r);
   const double distorted = a + k[0] * std::pow(a, 3) + k[1] * std::pow(a, 5) +
                            k[2] * std::pow(a, 7) + k[3] * std::pow(a, 9);
-  const double share = r > 0 ? distorted / r : 1;
-  return {z.x * share, z.y * share};
+  const double common_fraction = r > 0 ? distorted / r : 1;
+  return {z.x * common_fraction, z.y * common_fraction};
 }
 
 Plane undistorted(const Eigen::Vector3d& point) {
@@ -234,8 +234,8 @@ Eigen::Vector2d kalibr_pixel(const YAML::Node& cam, const Eigen::Vector3d& point
 TEST_F(ReadCameraFormats, MatchesRosFormulasForExportedFiles) {
   for (const LensModel model : {LensModel::pinhole, LensModel::opencv4, LensModel::opencv5,
                                 LensModel::opencv8, LensModel::fisheye}) {
-    const Camera camera = camera_of(model);
-    const std::string text = ros_camera_info(camera);
+    const Camera camera = make_camera(model);
+    const std::string text = format_ros_camera_info(camera);
     const YAML::Node info = YAML::Load(text);
     const auto points = points_before(camera, kOpencvsWidest_deg);
     const Project project = [&](const auto& point) { return ros_pixel(info, point); };
@@ -280,8 +280,8 @@ TEST_F(ReadCameraFormats, MatchesRosFormulasForFilesOfRos) {
 
 TEST_F(ReadCameraFormats, MatchesKalibrFormulasForExportedFiles) {
   for (const LensModel model : {LensModel::pinhole, LensModel::opencv4, LensModel::fisheye}) {
-    const Camera camera = camera_of(model);
-    const std::string text = kalibr_camchain(camera);
+    const Camera camera = make_camera(model);
+    const std::string text = format_kalibr_camchain(camera);
     const YAML::Node cam = YAML::Load(text)["cam0"];
     const auto points = points_before(camera, kOpencvsWidest_deg);
     const Project project = [&](const auto& point) { return kalibr_pixel(cam, point); };
@@ -369,11 +369,11 @@ TEST_F(MrcalCameramodel, MatchesMrcalAfterRoundTrip) {
   std::vector<Camera> cameras{splined_camera(), splined_camera({2, 20, 16, 170})};
   for (const LensModel model : {LensModel::pinhole, LensModel::stereographic, LensModel::opencv4,
                                 LensModel::opencv5, LensModel::opencv8, LensModel::opencv12}) {
-    cameras.push_back(camera_of(model));
+    cameras.push_back(make_camera(model));
   }
   for (const Camera& camera : cameras) {
-    SCOPED_TRACE(name_of(camera.lens_model));
-    const std::string text = mrcal_cameramodel(camera);
+    SCOPED_TRACE(to_string(camera.lens_model));
+    const std::string text = format_mrcal_cameramodel(camera);
     const auto points = points_before(camera);
     expect_same_pixels(camera, points, projected_by_mrcal(text, points));
     const auto [back, region] = written_by_mrcal(text);
@@ -399,10 +399,10 @@ TEST_F(MrcalCameramodel, ContainsRegionOfCalibration) {
   ASSERT_TRUE(solution.ok());
   const auto file = folder_ / "camera.cameramodel";
   write_cameramodel(file, solution);
-  const ImageRegion expected =
-      known_region(seen_px(solution.problem), input.imager_px, input.lens_model);
+  const ImageRegion expected = compute_known_region(collect_inlier_pixels(solution.problem),
+                                                    input.imager_px, input.lens_model);
   ASSERT_GT(expected.size(), 4U);
-  EXPECT_LT(share_of_image(expected, input.imager_px), 0.8);
+  EXPECT_LT(compute_image_fraction(expected, input.imager_px), 0.8);
 
   ImageRegion mrcals;
   std::istringstream numbers(printed(
@@ -415,7 +415,7 @@ TEST_F(MrcalCameramodel, ContainsRegionOfCalibration) {
 
   const AnyCamera ours = read_any_camera(file);
   EXPECT_EQ(ours.region, expected);
-  const AnyCamera theirs = written_by_mrcal(mrcal_cameramodel(ours.camera, ours.region));
+  const AnyCamera theirs = written_by_mrcal(format_mrcal_cameramodel(ours.camera, ours.region));
   ASSERT_EQ(theirs.region.size(), expected.size());
   for (std::size_t i = 0; i < expected.size(); ++i) {
     EXPECT_THAT(theirs.region[i], IsNear(expected[i], 1e-6));  // it writes 10 digits
@@ -423,9 +423,9 @@ TEST_F(MrcalCameramodel, ContainsRegionOfCalibration) {
 }
 
 TEST_F(ReadCameraFormats, ReturnsValidRegionOfCameramodel) {
-  const Camera camera = camera_of(LensModel::opencv8);
+  const Camera camera = make_camera(LensModel::opencv8);
   const ImageRegion bent{{10, 20}, {700, 15.5}, {420, 300}, {700, 590}, {12, 580}};
-  const std::string text = mrcal_cameramodel(camera, bent);
+  const std::string text = format_mrcal_cameramodel(camera, bent);
   EXPECT_EQ(read(text).region, bent);
   const std::string key = "'valid_intrinsics_region': ";
   const std::size_t from = text.find(key) + key.size(), to = text.find("]],") + 2;
@@ -440,13 +440,13 @@ TEST_F(ReadCameraFormats, ReturnsValidRegionOfCameramodel) {
 
 /// The lens has 130,000 parameters.
 TEST_F(ReadCameraFormats, ReturnsLargestSplinedLens) {
-  const LensModel model = splined_lens({3, 255, 255, 150});
-  Camera camera = camera_of(LensModel::stereographic);
+  const LensModel model = lens_model_for({3, 255, 255, 150});
+  Camera camera = make_camera(LensModel::stereographic);
   camera.lens_model = model;
   for (std::size_t i = 4; i < parameter_count(model); ++i) {
     camera.intrinsics.push_back(1 / (static_cast<double>(i) + 3));
   }
-  const AnyCamera back = read(mrcal_cameramodel(camera));
+  const AnyCamera back = read(format_mrcal_cameramodel(camera));
   EXPECT_EQ(back.camera.intrinsics, camera.intrinsics);
 }
 
@@ -457,16 +457,16 @@ TEST(FitLensModel, ReportsLargestDifference) {
     Camera from;
     LensModel to;
   };
-  const Fit fits[] = {{camera_of(LensModel::opencv8), LensModel::fisheye},
-                      {camera_of(LensModel::opencv12), LensModel::opencv4},
-                      {camera_of(LensModel::opencv5), LensModel::pinhole},
-                      {camera_of(LensModel::fisheye), splined_lens({3, 20, 16, 190})},
-                      {camera_of(LensModel::fisheye), splined_lens({2, 12, 10, 170})},
+  const Fit fits[] = {{make_camera(LensModel::opencv8), LensModel::fisheye},
+                      {make_camera(LensModel::opencv12), LensModel::opencv4},
+                      {make_camera(LensModel::opencv5), LensModel::pinhole},
+                      {make_camera(LensModel::fisheye), lens_model_for({3, 20, 16, 190})},
+                      {make_camera(LensModel::fisheye), lens_model_for({2, 12, 10, 170})},
                       {splined_camera(), LensModel::fisheye}};
   for (const auto& [from, to] : fits) {
-    SCOPED_TRACE(testing::Message() << name_of(from.lens_model) << " " << name_of(to));
-    const FittedCamera fitted = with_lens_model(from, to);
-    const Lens lens = lens_of(fitted.camera), was = lens_of(from);
+    SCOPED_TRACE(testing::Message() << to_string(from.lens_model) << " " << to_string(to));
+    const FittedCamera fitted = fit_lens_model(from, to);
+    const Lens lens = make_lens(fitted.camera), was = make_lens(from);
     Random random(6);
     double worst = 0;
     std::size_t both = 0;
@@ -482,7 +482,7 @@ TEST(FitLensModel, ReportsLargestDifference) {
     }
     EXPECT_LE(worst, fitted.worst_px);
     EXPECT_GE(worst, 0.8 * fitted.worst_px);
-    EXPECT_EQ(both < kPoints, fitted.share < 1);
+    EXPECT_EQ(both < kPoints, fitted.common_fraction < 1);
   }
 }
 

@@ -39,42 +39,46 @@ class ReadAnyCamera : public testing::Test {
 TEST_F(ReadAnyCamera, ReturnsExportedCameraExactly) {
   for (const LensModel model : {LensModel::pinhole, LensModel::opencv4, LensModel::opencv5,
                                 LensModel::opencv8, LensModel::opencv12, LensModel::fisheye}) {
-    const Camera camera = camera_of(model);
-    comes_back(camera, opencv_camera(camera), model);
-    if (model != LensModel::fisheye) comes_back(camera, mrcal_cameramodel(camera), model);
+    const Camera camera = make_camera(model);
+    comes_back(camera, format_opencv_camera(camera), model);
+    if (model != LensModel::fisheye) comes_back(camera, format_mrcal_cameramodel(camera), model);
     if (model == LensModel::opencv12) continue;
     const bool five = model == LensModel::opencv4;  // ROS writes k3, too
-    comes_back(camera, ros_camera_info(camera), five ? LensModel::opencv5 : model);
+    comes_back(camera, format_ros_camera_info(camera), five ? LensModel::opencv5 : model);
     if (model == LensModel::opencv5 || model == LensModel::opencv8) continue;
-    comes_back(camera, kalibr_camchain(camera), model);
+    comes_back(camera, format_kalibr_camchain(camera), model);
   }
 }
 
 TEST_F(ReadAnyCamera, ReturnsExportedSplinedLensExactly) {
   const Camera camera = splined_camera();
-  comes_back(camera, mrcal_cameramodel(camera), camera.lens_model);
-  for (const auto& text_of : {ros_camera_info, kalibr_camchain, opencv_camera}) {
-    EXPECT_THROW(text_of(camera), std::invalid_argument);
+  comes_back(camera, format_mrcal_cameramodel(camera), camera.lens_model);
+  for (const auto& format_camera :
+       {format_ros_camera_info, format_kalibr_camchain, format_opencv_camera}) {
+    EXPECT_THROW(format_camera(camera), std::invalid_argument);
   }
-  std::string short_one = mrcal_cameramodel(camera);
+  std::string short_one = format_mrcal_cameramodel(camera);
   short_one.replace(short_one.find("Nx=13"), 5, "Nx=14");
   EXPECT_THAT(refusal(short_one), testing::HasSubstr("takes 312 parameters, not 290"));
 }
 
 TEST(FitLensModel, ConvertsToSplinedLensAndBack) {
-  const auto wide = with_lens_model(camera_of(LensModel::fisheye), splined_lens({3, 20, 16, 190}));
+  const auto wide =
+      fit_lens_model(make_camera(LensModel::fisheye), lens_model_for({3, 20, 16, 190}));
   EXPECT_LT(wide.worst_px, 0.002);
-  EXPECT_EQ(wide.share, 1);
+  EXPECT_EQ(wide.common_fraction, 1);
   // The rays outside the grid do not count.
-  const auto part = with_lens_model(camera_of(LensModel::fisheye), splined_lens({3, 14, 12, 100}));
+  const auto part =
+      fit_lens_model(make_camera(LensModel::fisheye), lens_model_for({3, 14, 12, 100}));
   EXPECT_LT(part.worst_px, 0.01);
-  EXPECT_LT(part.share, 0.8);
-  const auto back = with_lens_model(wide.camera, LensModel::fisheye);
+  EXPECT_LT(part.common_fraction, 0.8);
+  const auto back = fit_lens_model(wide.camera, LensModel::fisheye);
   EXPECT_LT(back.worst_px, 0.005);
   for (std::size_t i = 0; i < 4; ++i) {
-    EXPECT_NEAR(back.camera.intrinsics[i], camera_of(LensModel::fisheye).intrinsics[i], 0.01);
+    EXPECT_NEAR(back.camera.intrinsics[i], make_camera(LensModel::fisheye).intrinsics[i], 0.01);
   }
-  const auto near = with_lens_model(camera_of(LensModel::opencv8), splined_lens({2, 20, 16, 100}));
+  const auto near =
+      fit_lens_model(make_camera(LensModel::opencv8), lens_model_for({2, 20, 16, 100}));
   EXPECT_LT(near.worst_px, 0.2);  // quadratic pieces
 }
 
@@ -83,19 +87,19 @@ TEST(FitLensModel, ConvertsToSplinedLensAndBack) {
 TEST(FitLensModel, RecommendsFinerGridWhenGridIsTooWide) {
   const auto expect_other = [](const Camera& camera, const SplineGrid& grid) {
     const std::string words =
-        "the control points of " + name_of(grid) + " are too few where the lens sees, ";
+        "the control points of " + to_string(grid) + " are too few where the lens sees, ";
     std::string said;
     try {
-      with_lens_model(camera, splined_lens(grid));
+      fit_lens_model(camera, lens_model_for(grid));
     } catch (const std::invalid_argument& error) {
       said = error.what();
     }
     ASSERT_THAT(said, testing::StartsWith(words)) << camera.intrinsics[2];
     const auto model = lens_model_from_name(said.substr(said.find("LENSMODEL", words.size())));
     ASSERT_TRUE(model) << said;
-    const FittedCamera fitted = with_lens_model(camera, *model);
+    const FittedCamera fitted = fit_lens_model(camera, *model);
     EXPECT_LT(fitted.worst_px, 0.01) << said;
-    EXPECT_EQ(fitted.share, 1) << said;
+    EXPECT_EQ(fitted.common_fraction, 1) << said;
   };
   for (const double center_px : {399.5, 380.0, 250.0}) {
     const Camera narrow{
@@ -118,7 +122,7 @@ TEST_F(ReadAnyCamera, RejectsUnknownFormatsAndModels) {
                       "'intrinsics': [ 1, 2, 3 ] }"),
               testing::HasSubstr("takes 4 parameters, not 3"));
   EXPECT_THAT(refusal("cam0: {camera_model: omni}\n"), testing::HasSubstr("omni is not known"));
-  std::string skewed = opencv_camera(camera_of(LensModel::opencv5));
+  std::string skewed = format_opencv_camera(make_camera(LensModel::opencv5));
   skewed.replace(skewed.find("[520.25, 0,"), 11, "[520.25, 3,");
   EXPECT_THAT(refusal(skewed), testing::HasSubstr("camera_matrix is skewed"));
 }
@@ -138,17 +142,17 @@ TEST_F(ReadAnyCamera, IgnoresCommentsInCameramodel) {
 
 TEST(FitLensModel, ReportsDifferenceAndCommonFraction) {
   // A model that includes the other fits exactly, another one approximately.
-  const auto exact = with_lens_model(camera_of(LensModel::opencv4), LensModel::opencv8);
+  const auto exact = fit_lens_model(make_camera(LensModel::opencv4), LensModel::opencv8);
   EXPECT_LT(exact.worst_px, 1e-6);
-  EXPECT_EQ(exact.share, 1);
-  const auto near = with_lens_model(camera_of(LensModel::opencv8), LensModel::fisheye);
+  EXPECT_EQ(exact.common_fraction, 1);
+  const auto near = fit_lens_model(make_camera(LensModel::opencv8), LensModel::fisheye);
   EXPECT_LT(near.worst_px, 1);
   EXPECT_GT(near.worst_px, 1e-6);
-  const auto same = with_lens_model(camera_of(LensModel::opencv8), LensModel::opencv8);
-  EXPECT_EQ(same.camera.intrinsics, camera_of(LensModel::opencv8).intrinsics);
+  const auto same = fit_lens_model(make_camera(LensModel::opencv8), LensModel::opencv8);
+  EXPECT_EQ(same.camera.intrinsics, make_camera(LensModel::opencv8).intrinsics);
   // Perspective models have no rays beyond 90 degrees.
-  const auto half = with_lens_model(camera_of(LensModel::fisheye), LensModel::opencv4);
-  EXPECT_LT(half.share, 1);
+  const auto half = fit_lens_model(make_camera(LensModel::fisheye), LensModel::opencv4);
+  EXPECT_LT(half.common_fraction, 1);
 }
 
 }  // namespace

@@ -45,7 +45,7 @@ struct CodedCamera {
   std::vector<BoardView> views(int count, std::uint64_t seed) const {
     auto views = uncoded(count, seed);
     for (BoardView& view : views) {
-      for (SeenTag& tag : view.seen.tags) tag = coded(tag);
+      for (TagDetection& tag : view.seen.tags) tag = coded(tag);
       for (const double each : kGammas) {
         view.seen.curve_costs.push_back(500 * std::pow(std::log(each / levels_gamma), 2));
       }
@@ -54,13 +54,13 @@ struct CodedCamera {
   }
 
  private:
-  SeenTag coded(const SeenTag& truth) const {
-    SeenTag tag = shrunk(truth, shift_px(truth.id, 1));
-    tag.sds_px.fill(kCornerNoise_px);
+  TagDetection coded(const TagDetection& truth) const {
+    TagDetection tag = shrunk(truth, shift_px(truth.id, 1));
+    tag.corner_sds_px.fill(kCornerNoise_px);
     for (const double each : kGammas) {
       if (each == 1) continue;
-      tag.behind_curves.push_back(
-          {shrunk(truth, shift_px(truth.id, each)).corners_px, {}, tag.sds_px});
+      tag.tone_curve_fits.push_back(
+          {shrunk(truth, shift_px(truth.id, each)).corners_px, {}, tag.corner_sds_px});
     }
     return tag;
   }
@@ -87,9 +87,10 @@ TEST(EstimateToneCurve, MatchesTrueGammaDespiteBiasedLevels) {
     auto views = camera.views(count, 1);
     const auto truth = camera.uncoded(count, 1);
     EXPECT_GT(worst_px(views, truth), 0.2);
-    EXPECT_NEAR(std::log(take_common_curve(views, synthetic_board(false)) / gamma), 0, 0.04);
+    EXPECT_NEAR(std::log(estimate_and_apply_tone_curve(views, synthetic_board(false)) / gamma), 0,
+                0.04);
     EXPECT_LT(worst_px(views, truth), 0.05);
-    EXPECT_TRUE(views[0].seen.tags[0].behind_curves.empty());
+    EXPECT_TRUE(views[0].seen.tags[0].tone_curve_fits.empty());
   }
 }
 
@@ -97,13 +98,13 @@ TEST(EstimateToneCurve, MatchesTrueGammaDespiteBiasedLevels) {
 TEST(EstimateToneCurve, IgnoresViewsWithoutBoard) {
   auto views = CodedCamera{2, 1.5}.views(12, 1);
   views.resize(30, {"none", {800, 600}, {}});
-  EXPECT_NEAR(std::log(take_common_curve(views, synthetic_board(false)) / 2), 0, 0.04);
+  EXPECT_NEAR(std::log(estimate_and_apply_tone_curve(views, synthetic_board(false)) / 2), 0, 0.04);
 }
 
 TEST(EstimateToneCurve, ReturnsOneWhenOnlyLevelsShowCurve) {
   auto views = CodedCamera{1, 1.46}.views(16, 2);
   const auto before = views;
-  EXPECT_EQ(take_common_curve(views, synthetic_board(false)), 1);
+  EXPECT_EQ(estimate_and_apply_tone_curve(views, synthetic_board(false)), 1);
   EXPECT_EQ(views[5].seen.tags[3].corners_px, before[5].seen.tags[3].corners_px);
 }
 
@@ -111,28 +112,28 @@ TEST(EstimateToneCurve, ReturnsOneWhenOnlyLevelsShowCurve) {
 TEST(EstimateToneCurve, MatchesLevelsWhenAllEdgesShiftEqually) {
   for (const double levels_gamma : {1.4, 2.2}) {
     auto views = CodedCamera{1.8, levels_gamma, 0}.views(16, 3);
-    const double gamma = take_common_curve(views, synthetic_board(false));
+    const double gamma = estimate_and_apply_tone_curve(views, synthetic_board(false));
     EXPECT_NEAR(std::log(gamma / levels_gamma), 0, 0.05) << gamma;
   }
 }
 
 TEST(EstimateToneCurve, MatchesLevelsWithoutLensOrCornerNoise) {
   const Board board = synthetic_board(false);
-  auto untold = CodedCamera{2, 1.5}.views(8, 4), of_another = untold;
-  for (BoardView& view : untold) {
-    for (SeenTag& tag : view.seen.tags) {
-      tag.sds_px.fill(0);
-      for (auto& outline : tag.behind_curves) outline.sds_px.fill(0);
+  auto without_noise = CodedCamera{2, 1.5}.views(8, 4), of_another = without_noise;
+  for (BoardView& view : without_noise) {
+    for (TagDetection& tag : view.seen.tags) {
+      tag.corner_sds_px.fill(0);
+      for (auto& outline : tag.tone_curve_fits) outline.corner_sds_px.fill(0);
     }
   }
-  EXPECT_NEAR(take_common_curve(untold, board), 1.5, 1e-9);
+  EXPECT_NEAR(estimate_and_apply_tone_curve(without_noise, board), 1.5, 1e-9);
   Board other = board;
   other.tag_spacing = 0.7;
-  EXPECT_NEAR(take_common_curve(of_another, other), 1.5, 1e-9);
+  EXPECT_NEAR(estimate_and_apply_tone_curve(of_another, other), 1.5, 1e-9);
   auto few = CodedCamera{1, 1.5}.views(2, 4);
-  EXPECT_NEAR(take_common_curve(few, board), 1.5, 1e-9);
+  EXPECT_NEAR(estimate_and_apply_tone_curve(few, board), 1.5, 1e-9);
   std::vector<BoardView> none;
-  EXPECT_EQ(take_common_curve(none, board), 1);
+  EXPECT_EQ(estimate_and_apply_tone_curve(none, board), 1);
 }
 
 TEST(EstimateToneCurve, MatchesLevelsWhenHalfOfViewsHaveNoCurve) {
@@ -140,18 +141,18 @@ TEST(EstimateToneCurve, MatchesLevelsWhenHalfOfViewsHaveNoCurve) {
   for (const BoardView& view : CodedCamera{1, 1}.views(4, 6)) {
     views.push_back(view);
     views.back().seen.curve_costs = {0, 40};
-    for (SeenTag& tag : views.back().seen.tags) tag.behind_curves.clear();
+    for (TagDetection& tag : views.back().seen.tags) tag.tone_curve_fits.clear();
   }
-  const double by_levels = gamma_of(costs_of_levels(views));
+  const double by_levels = estimate_gamma(sum_tone_curve_costs(views));
   EXPECT_GT(by_levels, 1.2);
-  EXPECT_NEAR(take_common_curve(views, synthetic_board(false)), by_levels, 1e-9);
+  EXPECT_NEAR(estimate_and_apply_tone_curve(views, synthetic_board(false)), by_levels, 1e-9);
 }
 
 TEST(EstimateToneCurve, ReturnsOneForCorrectedViews) {
   auto views = CodedCamera{2, 2}.views(8, 7);
-  take_common_curve(views, synthetic_board(false));
+  estimate_and_apply_tone_curve(views, synthetic_board(false));
   const auto once = views[0].seen.tags[0].corners_px;
-  EXPECT_EQ(take_common_curve(views, synthetic_board(false)), 1);
+  EXPECT_EQ(estimate_and_apply_tone_curve(views, synthetic_board(false)), 1);
   EXPECT_EQ(views[0].seen.tags[0].corners_px, once);
 }
 
@@ -159,7 +160,7 @@ TEST(EstimateLens, AppliesToneCurveToAllViews) {
   const Board board = synthetic_board(false);
   const std::vector<BoardView> views = CodedCamera{1.8, 1.8}.views(12, 3);
   std::vector<BoardView> expected = views;
-  const double gamma = take_common_curve(expected, board);
+  const double gamma = estimate_and_apply_tone_curve(expected, board);
   LensViews input;
   input.views = views;
   input.board = board;

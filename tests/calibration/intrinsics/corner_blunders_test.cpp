@@ -21,13 +21,13 @@ TEST(FindCornerOutliers, ReturnsSingleDisplacedCorner) {
     Random random(11);
     for (int view = 0; view < 40; ++view) {
       const auto seen = lattice.corners(views.random_view(random, noise_px));
-      ASSERT_THAT(corner_blunders(seen), IsEmpty());
+      ASSERT_THAT(find_corner_outliers(seen), IsEmpty());
       auto spoilt = seen;
       const std::size_t wrong = random.index(seen.size());
       const double v = random.uniform(0, 600), u = random.uniform(0, 800);
       if ((Eigen::Vector2d(u, v) - seen[wrong].pixel).norm() < apart_px) continue;
       spoilt[wrong].pixel = {u, v};
-      EXPECT_THAT(corner_blunders(spoilt), ElementsAre(wrong)) << view;
+      EXPECT_THAT(find_corner_outliers(spoilt), ElementsAre(wrong)) << view;
     }
   }
 }
@@ -38,8 +38,8 @@ TEST(FindCornerOutliers, ReturnsNoneForRandomCorners) {
   Random random(12);
   auto corners = BoardLattice(views.board).corners(views.random_view(random, 0));
   for (auto& corner : corners) corner.pixel = {random.uniform(0, 800), random.uniform(0, 600)};
-  EXPECT_THAT(corner_blunders(corners), IsEmpty());
-  EXPECT_THAT(corner_blunders({}), IsEmpty());
+  EXPECT_THAT(find_corner_outliers(corners), IsEmpty());
+  EXPECT_THAT(find_corner_outliers({}), IsEmpty());
 }
 
 }  // namespace

@@ -15,12 +15,13 @@ namespace vlp {
 namespace {
 
 /// Returns errors of corners with standard deviations from pixel noise of 0.01 to 0.1 px.
-std::vector<CornerError> errors_of(const CornerVariance& truth, Random& random) {
+std::vector<CornerError> simulate_errors(const CornerVariance& truth, Random& random) {
   std::vector<CornerError> errors;
   for (int i = 0; i < 4000; ++i) {
     const double sd_px = 0.01 * std::pow(10, random.uniform(0, 1));
-    const double off_px = std::sqrt(truth.of(sd_px));
-    const Eigen::Vector2d residual = off_px * Eigen::Vector2d(random.normal(), random.normal());
+    const double unweighted_rms_px = std::sqrt(truth.at(sd_px));
+    const Eigen::Vector2d residual =
+        unweighted_rms_px * Eigen::Vector2d(random.normal(), random.normal());
     errors.push_back({residual.squaredNorm() / 2, sd_px});
   }
   return errors;
@@ -31,9 +32,9 @@ TEST(EstimateCornerVariance, MatchesSimulatedVariance) {
   for (const auto& [rest_px, scale] :
        {std::pair{0.02, 1.2}, {0.0, 1.0}, {0.05, 0.0}, {0.2, 1.0}, {0.005, 2.0}}) {
     const CornerVariance truth{rest_px * rest_px, scale * scale};
-    const CornerVariance found = corner_variance(errors_of(truth, random));
+    const CornerVariance found = estimate_corner_variance(simulate_errors(truth, random));
     for (const double sd_px : {0.01, 0.03, 0.1}) {
-      EXPECT_NEAR(std::sqrt(found.of(sd_px) / truth.of(sd_px)), 1, 0.08)
+      EXPECT_NEAR(std::sqrt(found.at(sd_px) / truth.at(sd_px)), 1, 0.08)
           << rest_px << " " << scale << " " << sd_px;
     }
   }
@@ -42,11 +43,11 @@ TEST(EstimateCornerVariance, MatchesSimulatedVariance) {
 TEST(EstimateCornerVariance, IsRobustToOutliers) {
   Random random(2);
   const CornerVariance truth{1e-4, 1};
-  auto errors = errors_of(truth, random);
+  auto errors = simulate_errors(truth, random);
   for (std::size_t i = 0; i < errors.size(); i += 100) errors[i].square_px2 = 4;
-  const CornerVariance found = corner_variance(errors);
+  const CornerVariance found = estimate_corner_variance(errors);
   for (const double sd_px : {0.01, 0.1}) {
-    EXPECT_NEAR(std::sqrt(found.of(sd_px) / truth.of(sd_px)), 1, 0.15);
+    EXPECT_NEAR(std::sqrt(found.at(sd_px) / truth.at(sd_px)), 1, 0.15);
   }
 }
 
@@ -54,18 +55,18 @@ TEST(EstimateCornerVariance, IsRobustToOneWrongDeviation) {
   Random random(2);
   const CornerVariance truth{1e-4, 1};
   for (const double sd_px : {0.5, 1.0, 1e9}) {
-    auto errors = errors_of(truth, random);
+    auto errors = simulate_errors(truth, random);
     errors[3].sd_px = sd_px;
-    const CornerVariance found = corner_variance(errors);
+    const CornerVariance found = estimate_corner_variance(errors);
     for (const double known_px : {0.01, 0.1}) {
-      EXPECT_NEAR(std::sqrt(found.of(known_px) / truth.of(known_px)), 1, 0.08) << sd_px;
+      EXPECT_NEAR(std::sqrt(found.at(known_px) / truth.at(known_px)), 1, 0.08) << sd_px;
     }
   }
 }
 
 TEST(EstimateCornerVariance, ReturnsMeanSquareForEqualDeviations) {
   const std::vector<CornerError> errors{{4e-4, 0.01}, {1e-4, 0.01}, {1e-4, 0.01}};
-  EXPECT_NEAR(corner_variance(errors).of(0.01), 2e-4, 1e-9);
+  EXPECT_NEAR(estimate_corner_variance(errors).at(0.01), 2e-4, 1e-9);
 }
 
 /// Returns corners of 16 views with known standard deviations, ten times as large at the rim of the
@@ -85,9 +86,9 @@ IntrinsicsInput uneven_input(const SyntheticViews& views, Random& random) {
 }
 
 /// Returns the unweighted RMS residual per axis of the corners that are not outliers.
-double off_px(const IntrinsicsSolution& solution) {
+double unweighted_rms_px(const IntrinsicsSolution& solution) {
   double squares = 0, count = 0;
-  const auto residuals = residuals_of(solution.problem);
+  const auto residuals = compute_residuals(solution.problem);
   for (std::size_t i = 0; i < residuals.size(); ++i) {
     if (!(solution.problem.points[i].z() > 0)) continue;
     squares += residuals[i].squaredNorm();
@@ -99,7 +100,7 @@ double off_px(const IntrinsicsSolution& solution) {
 /// Compares solves with and without known standard deviations.
 TEST(CornerWeights, ReducesProjectionErrorOfSolve) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
-  double told_px2 = 0, untold_px2 = 0;
+  double known_px2 = 0, unknown_px2 = 0;
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
     Random random(seed);
     IntrinsicsInput input = uneven_input(views, random);
@@ -107,17 +108,17 @@ TEST(CornerWeights, ReducesProjectionErrorOfSolve) {
       const IntrinsicsSolution solution = solve_intrinsics(input);
       EXPECT_TRUE(solution.ok());
       const auto difference =
-          projection_difference(views.lens, solution.lens(), views.imager_px, even);
+          compute_projection_difference(views.lens, solution.lens(), views.imager_px, even);
       return std::pow(difference->rms_px, 2);
     };
-    told_px2 += square_px2();
+    known_px2 += square_px2();
     for (auto& view : input.views) {
       for (auto& corner : view) corner.sd_px = 0;
     }
-    untold_px2 += square_px2();
+    unknown_px2 += square_px2();
   }
-  EXPECT_LT(std::sqrt(told_px2 / untold_px2), 0.85);
-  RecordProperty("told_over_untold", std::to_string(std::sqrt(told_px2 / untold_px2)));
+  EXPECT_LT(std::sqrt(known_px2 / unknown_px2), 0.85);
+  RecordProperty("told_over_untold", std::to_string(std::sqrt(known_px2 / unknown_px2)));
 }
 
 TEST(CornerWeights, KeepsRmsOfSolveInPixels) {
@@ -125,7 +126,7 @@ TEST(CornerWeights, KeepsRmsOfSolveInPixels) {
   Random random(3);
   const IntrinsicsSolution solution = solve_intrinsics(uneven_input(views, random));
   ASSERT_TRUE(solution.ok());
-  EXPECT_NEAR(solution.rms_px, off_px(solution), 0.05 * off_px(solution));
+  EXPECT_NEAR(solution.rms_px, unweighted_rms_px(solution), 0.05 * unweighted_rms_px(solution));
 }
 
 /// Some corners have no standard deviation and much larger errors than the others.
@@ -144,25 +145,26 @@ TEST(CornerWeights, LimitsEffectOfCornersWithoutDeviation) {
   const IntrinsicsSolution with = solve_intrinsics(input);
   ASSERT_TRUE(without.ok() && with.ok());
   EXPECT_LT(with.outliers, without.outliers + unknown / 4);
-  const auto apart = projection_difference(without.lens(), with.lens(), views.imager_px, even);
+  const auto apart =
+      compute_projection_difference(without.lens(), with.lens(), views.imager_px, even);
   EXPECT_LT(apart->rms_px, 0.02);
 }
 
 TEST(CornerWeights, MatchesVariancesAndMeanSquare) {
   Random random(5);
   const CornerVariance truth{1e-4, 1};
-  const auto told = errors_of(truth, random);
-  const CornerWeights weights(told, {});
-  EXPECT_NEAR(weights.of(0.01) / weights.of(0.1), std::sqrt(truth.of(0.1) / truth.of(0.01)), 0.3);
+  const auto known = simulate_errors(truth, random);
+  const CornerWeights weights(known, {});
+  EXPECT_NEAR(weights.at(0.01) / weights.at(0.1), std::sqrt(truth.at(0.1) / truth.at(0.01)), 0.3);
   double squares = 0, weighted = 0;
-  for (const auto& [square_px2, sd_px] : told) {
+  for (const auto& [square_px2, sd_px] : known) {
     squares += square_px2;
-    weighted += std::pow(weights.of(sd_px), 2) * square_px2;
+    weighted += std::pow(weights.at(sd_px), 2) * square_px2;
   }
   EXPECT_NEAR(std::sqrt(weighted / squares), 1, 0.03);
   // A few corners without a deviation that fit by chance get no larger weight than the others.
-  const std::vector<CornerError> untold{{1e-8, 0}, {2e-8, 0}};
-  EXPECT_LT(CornerWeights(told, untold).of(0), weights.of(0.01));
+  const std::vector<CornerError> unknown{{1e-8, 0}, {2e-8, 0}};
+  EXPECT_LT(CornerWeights(known, unknown).at(0), weights.at(0.01));
 }
 
 }  // namespace

@@ -23,8 +23,8 @@ constexpr double kReach = 0.8;
 
 /// Fits the parabola a + b w + c w^2 off the chord, by least squares, to the image of the straight
 /// line between two pixels, up to kReach along it.
-Eigen::Vector3d parabola_of(const Lens& lens, const Eigen::Vector2d& from,
-                            const Eigen::Vector2d& to, const Eigen::Vector2d& outwards) {
+Eigen::Vector3d fit_parabola(const Lens& lens, const Eigen::Vector2d& from,
+                             const Eigen::Vector2d& to, const Eigen::Vector2d& outwards) {
   constexpr int steps = 2000;
   const auto a = lens.unproject(from), b = lens.unproject(to);
   const Eigen::Vector2d length = to - from;
@@ -67,7 +67,7 @@ Tag tag_with_errors(const std::array<double, 4>& error_px) {
   for (std::size_t k = 0; k < 4; ++k) {
     const std::size_t previous = (k + 3) % 4, next = (k + 1) % 4;
     const auto fitted = [&](std::size_t edge, std::size_t other) {
-      Eigen::Vector3d abc = parabola_of(lens, tag.truth[edge], tag.truth[other], outwards[edge]);
+      Eigen::Vector3d abc = fit_parabola(lens, tag.truth[edge], tag.truth[other], outwards[edge]);
       abc += error_px[edge] * Eigen::Vector3d(kReach * kReach / 3, 0, -1);
       return abc;
     };
@@ -86,13 +86,13 @@ TEST(ApplyLensEdgeCurvature, MovesCornersToTruePositions) {
   for (const std::array<double, 4> errors_px :
        {std::array{0.0, 0.0, 0.0, 0.0}, {0.1, 0.0, 0.0, 0.0}, {0.06, -0.1, 0.03, 0.08}}) {
     Tag tag = tag_with_errors(errors_px);
-    take_bows_of_lens(tag.seen, synthetic_lens());
+    apply_lens_edge_curvature(tag.seen, synthetic_lens());
     for (std::size_t k = 0; k < 4; ++k) {
       // The errors rotate the chords.
       EXPECT_LT((tag.seen[k].pixel - tag.truth[k]).norm(), 1e-3);
     }
     // The corners now have the curvature of the lens.
-    EXPECT_LT(take_bows_of_lens(tag.seen, synthetic_lens()), 1e-3);
+    EXPECT_LT(apply_lens_edge_curvature(tag.seen, synthetic_lens()), 1e-3);
   }
 }
 
@@ -100,7 +100,7 @@ TEST(ApplyLensEdgeCurvature, KeepsTagsWithoutMeasuredCurvature) {
   Tag tag = tag_with_errors({0.1, 0.1, 0.1, 0.1});
   tag.seen[2].bow.reach = 0;
   const auto before = tag.seen;
-  EXPECT_EQ(take_bows_of_lens(tag.seen, synthetic_lens()), 0);
+  EXPECT_EQ(apply_lens_edge_curvature(tag.seen, synthetic_lens()), 0);
   for (std::size_t k = 0; k < 4; ++k) EXPECT_EQ(tag.seen[k].pixel, before[k].pixel);
 }
 
@@ -116,12 +116,12 @@ TEST(ApplyLensEdgeCurvature, ReducesCornerNoise) {
   double stated = 0;
   std::size_t corners = 0;
   for (std::size_t index = 0; index < 8; ++index) {
-    const BoardShot shot = board_shot(scene, views, index);
-    std::map<int, SeenTag::Corners> truth;
-    for (const auto& [tag, corner, pixel] : true_corners(scene, renderer, shot)) {
+    const BoardShot shot = make_board_shot(scene, views, index);
+    std::map<int, TagDetection::Corners> truth;
+    for (const auto& [tag, corner, pixel] : find_true_corners(scene, renderer, shot)) {
       truth[*tag][static_cast<std::size_t>(corner)] = pixel;
     }
-    const SeenBoard seen =
+    const BoardDetection seen =
         detector.detect(expose(scene.sensor, renderer.board_electrons(shot), index));
     auto all = lattice.corners(seen);
     for (const std::size_t pass : {0U, 1U}) {
@@ -134,7 +134,7 @@ TEST(ApplyLensEdgeCurvature, ReducesCornerNoise) {
         }
         of_tags[pass] += sum.squaredNorm();
       }
-      take_bows_of_lens(all, lens);
+      apply_lens_edge_curvature(all, lens);
     }
     for (const auto& corner : all) stated += 2 * corner.sd_px * corner.sd_px;
     corners += all.size();

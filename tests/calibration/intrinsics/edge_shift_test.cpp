@@ -27,14 +27,14 @@ class EstimateEdgeShifts : public testing::TestWithParam<double> {
     Random random(31);
     std::vector<BoardView> seen;
     while (static_cast<int>(seen.size()) < count) {
-      SeenBoard view = views.random_view(random, noise_px);
-      if (!lattice.enough(view)) continue;
-      for (SeenTag& tag : view.tags) tag = shrunk(tag, shift_px);
+      BoardDetection view = views.random_view(random, noise_px);
+      if (!lattice.sufficient(view)) continue;
+      for (TagDetection& tag : view.tags) tag = shrunk(tag, shift_px);
       seen.push_back({"", views.imager_px, view});
     }
     return seen;
   }
-  IntrinsicsInput input_of(const std::vector<BoardView>& seen) const {
+  IntrinsicsInput make_input(const std::vector<BoardView>& seen) const {
     IntrinsicsInput input{BoardLattice(board()), {}, {800, 600}, LensModel::opencv8};
     for (const BoardView& view : seen) input.views.push_back(input.lattice.corners(view.seen));
     return input;
@@ -42,25 +42,25 @@ class EstimateEdgeShifts : public testing::TestWithParam<double> {
 };
 
 TEST_P(EstimateEdgeShifts, ReturnsShiftOfEachView) {
-  const auto input = input_of(shrunk_views(6, 0, 0.3));
-  for (const EdgeShift& shift : edge_shifts(input.views, synthetic_lens())) {
+  const auto input = make_input(shrunk_views(6, 0, 0.3));
+  for (const EdgeShift& shift : estimate_edge_shifts(input.views, synthetic_lens())) {
     EXPECT_NEAR(shift.at(shift.middle), 0.3, 0.005);
   }
   for (const EdgeShift& shift :
-       edge_shifts(input_of(shrunk_views(6, 0, 0)).views, synthetic_lens())) {
+       estimate_edge_shifts(make_input(shrunk_views(6, 0, 0)).views, synthetic_lens())) {
     EXPECT_NEAR(shift.at(shift.middle), 0, 1e-6);
   }
 }
 
 TEST_P(EstimateEdgeShifts, CorrectsLensOfSolve) {
-  const auto input = input_of(shrunk_views(16, 0.03, 0.35));
+  const auto input = make_input(shrunk_views(16, 0.03, 0.35));
   const IntrinsicsSolution solution = solve_intrinsics(input);
   ASSERT_TRUE(solution.ok());
   ASSERT_EQ(solution.edge_shifts_px.size(), 16U);
   for (const double shift_px : solution.edge_shifts_px) EXPECT_NEAR(shift_px, 0.35, 0.03);
   EXPECT_NEAR(solution.rms_px, 0.03, 0.004);
   const auto difference =
-      projection_difference(synthetic_lens(), solution.lens(), {800, 600}, even);
+      compute_projection_difference(synthetic_lens(), solution.lens(), {800, 600}, even);
   ASSERT_TRUE(difference);
   EXPECT_LT(difference->mean_px, 0.03);
 }
@@ -68,16 +68,16 @@ TEST_P(EstimateEdgeShifts, CorrectsLensOfSolve) {
 TEST_P(EstimateEdgeShifts, DistinguishesVaryingShiftFromWarp) {
   auto seen = shrunk_views(16, 0.03, 0);
   for (BoardView& view : seen) {
-    for (SeenTag& tag : view.seen.tags) {
+    for (TagDetection& tag : view.seen.tags) {
       tag = shrunk(tag, 0.3 + 0.1 * (tag.corners_px[0].x() - 400) / 400);
     }
   }
-  const IntrinsicsSolution solution = solve_intrinsics(input_of(seen));
+  const IntrinsicsSolution solution = solve_intrinsics(make_input(seen));
   ASSERT_TRUE(solution.ok());
   EXPECT_FALSE(solution.solved_for.warp);
   EXPECT_NEAR(solution.rms_px, 0.03, 0.004);
   const auto difference =
-      projection_difference(synthetic_lens(), solution.lens(), {800, 600}, even);
+      compute_projection_difference(synthetic_lens(), solution.lens(), {800, 600}, even);
   ASSERT_TRUE(difference);
   EXPECT_LT(difference->mean_px, 0.03);
 }
@@ -104,7 +104,8 @@ TEST(EdgeShift, DoesNotAbsorbBoardWarp) {
   ASSERT_TRUE(solution.ok());
   EXPECT_TRUE(solution.solved_for.warp);
   EXPECT_NEAR(solution.rms_px, 0.0165, 0.0005);  // 0.0176 with such shifts left in
-  const auto difference = projection_difference(wide_lens(), solution.lens(), kWideImager, even);
+  const auto difference =
+      compute_projection_difference(wide_lens(), solution.lens(), kWideImager, even);
   ASSERT_TRUE(difference);
   EXPECT_LT(difference->rms_px, 0.006);  // 0.0144
 }
@@ -113,8 +114,8 @@ TEST(EdgeShift, IsZeroForTouchingSquares) {
   const SyntheticViews views{synthetic_board(true), synthetic_lens()};
   Random random(3);
   const auto input = views.input(4, random, 0.1);
-  for (const EdgeShift& shift : edge_shifts(input.views, views.lens)) {
-    EXPECT_TRUE(shift.by.isZero(0));
+  for (const EdgeShift& shift : estimate_edge_shifts(input.views, views.lens)) {
+    EXPECT_TRUE(shift.coefficients.isZero(0));
   }
 }
 

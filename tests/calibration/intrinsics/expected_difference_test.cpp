@@ -17,7 +17,7 @@ constexpr double kNoise = 0.1;
 
 /// Mean squares, over the seeds, of the differences from the truth and of the expected differences.
 struct Scatter {
-  double found = 0, by_noise = 0, by_views = 0, freedoms = 0;
+  double found = 0, by_noise = 0, by_views = 0, degrees_of_freedom = 0;
   double worst_found = 0, worst_by_noise = 0;
 };
 
@@ -35,16 +35,17 @@ Scatter scatter(double bent_m) {
     const IntrinsicsSolution solution = solve_intrinsics(input);
     EXPECT_TRUE(solution.ok());
     const Lens lens = solution.lens();
-    const auto difference =
-        projection_difference(views.lens, lens, views.imager_px, [](const auto&) { return 1; });
-    const auto noise = expected_difference(lens, views.imager_px,
-                                           ProjectionUncertainty(solution).intrinsics_covariance());
-    const auto by_views = expected_difference(lens, views.imager_px, covariance_by_views(solution));
+    const auto difference = compute_projection_difference(views.lens, lens, views.imager_px,
+                                                          [](const auto&) { return 1; });
+    const auto noise = compute_expected_difference(
+        lens, views.imager_px, ProjectionUncertainty(solution).intrinsics_covariance());
+    const auto by_views =
+        compute_expected_difference(lens, views.imager_px, estimate_covariance_by_views(solution));
     sum.found += difference->rms_px * difference->rms_px / kSeeds;
     sum.by_noise += noise.rms_px * noise.rms_px / kSeeds;
     sum.by_views += by_views.rms_px * by_views.rms_px / kSeeds;
-    sum.freedoms += noise.freedoms;
-    const double worst_px = expected_worst_px(
+    sum.degrees_of_freedom += noise.degrees_of_freedom;
+    const double worst_px = estimate_expected_worst_px(
         lens, views.imager_px, ProjectionUncertainty(solution).intrinsics_covariance());
     sum.worst_found += difference->worst_px * difference->worst_px / kSeeds;
     sum.worst_by_noise += worst_px * worst_px / kSeeds;
@@ -56,7 +57,7 @@ Scatter scatter(double bent_m) {
 // times that.
 TEST(ExpectedDifference, MatchesDifferenceFromTruth) {
   const Scatter of = scatter(0);
-  const double sd = std::sqrt(2 / of.freedoms);
+  const double sd = std::sqrt(2 / of.degrees_of_freedom);
   EXPECT_LT(sd, 0.3);
   EXPECT_NEAR(of.found / of.by_noise, 1, 3 * sd);
   // A single pixel has fewer independent terms: as many as there are lenses.
@@ -69,7 +70,7 @@ TEST(ExpectedDifference, MatchesDifferenceFromTruth) {
 
 TEST(EstimateCovarianceByViews, IncludesErrorsCommonToView) {
   const Scatter of = scatter(0.0005);
-  const double sd = std::sqrt(2 / of.freedoms);
+  const double sd = std::sqrt(2 / of.degrees_of_freedom);
   EXPECT_GT(of.found / of.by_noise, 1 + 3 * sd);  // noise alone does not explain it
   EXPECT_LT(of.found / of.by_views, 1 + 3 * sd);
   EXPECT_GT(of.found / of.by_views, 0.3);

@@ -18,13 +18,13 @@ TEST_P(SolveWideLens, MatchesTruthForExactCorners) {
   Random random(17);
   const auto input = wide_input(GetParam(), 20, random, 0, {0.0004, -0.0003});
   const IntrinsicsSolution solution = solve_intrinsics(input);
-  ASSERT_TRUE(solution.ok()) << explanation_of(solution.status);
+  ASSERT_TRUE(solution.ok()) << describe(solution.status);
   EXPECT_EQ(solution.views.size(), 20U);
   // The shift of the edges is estimated on a flat board.
   EXPECT_LT(solution.rms_px, GetParam() ? 1e-3 : 0.02);
   EXPECT_LT(up_to(94, solution.lens()).worst_px, GetParam() ? 1e-3 : 0.03);
   const Eigen::Vector2d warp_m =
-      solution.problem.warp_m.cwiseProduct(input.lattice.warp_of_board());
+      solution.problem.warp_m.cwiseProduct(input.lattice.board_warp_ratio());
   EXPECT_LT((warp_m - Eigen::Vector2d(0.0004, -0.0003)).norm(), 1e-5);
 }
 
@@ -36,7 +36,7 @@ TEST_P(SolveWideLens, MatchesTruthBeyondNinetyDegrees) {
   EXPECT_NEAR(solution.rms_px, 0.05, 0.005);
   EXPECT_LT(up_to(90, solution.lens()).mean_px, 0.03);
   EXPECT_LT(up_to(94, solution.lens()).worst_px, 0.1);
-  const CalibrationReport report = report_on(solution, input);
+  const CalibrationReport report = compute_report(solution, input);
   EXPECT_LT(report.uncertainty_worst_px, 0.4);  // at the rim, beyond 94 degrees
   ASSERT_TRUE(report.halves);
   EXPECT_LT(report.halves->rms_px, 0.1);
@@ -80,8 +80,9 @@ TEST(ProjectionUncertainty, MatchesScatterWithCorrelatedTagErrors) {
       std::map<std::size_t, Eigen::Vector2d> errors_px;
       for (auto& corner : view) {
         const double u = random.normal(), v = random.normal();
-        corner.pixel += errors_px.try_emplace(input.lattice.tag_of(corner.point), 0.1 * u, 0.1 * v)
-                            .first->second;
+        corner.pixel +=
+            errors_px.try_emplace(input.lattice.tag_index(corner.point), 0.1 * u, 0.1 * v)
+                .first->second;
       }
     }
     const IntrinsicsSolution solution = solve_intrinsics(input);

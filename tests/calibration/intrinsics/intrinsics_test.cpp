@@ -11,7 +11,7 @@ namespace vlp {
 namespace {
 
 ProjectionDifference difference(const IntrinsicsSolution& solution, const SyntheticViews& views) {
-  return *projection_difference(views.lens, solution.lens(), views.imager_px, even);
+  return *compute_projection_difference(views.lens, solution.lens(), views.imager_px, even);
 }
 
 class SolveIntrinsics : public testing::TestWithParam<bool> {
@@ -25,13 +25,13 @@ TEST_P(SolveIntrinsics, MatchesTruthForExactCorners) {
   views_.warp_m = {0.0004, -0.0003};
   const IntrinsicsInput input = views_.input(20, random_, 0);
   const IntrinsicsSolution solution = solve_intrinsics(input);
-  ASSERT_TRUE(solution.ok()) << explanation_of(solution.status);
+  ASSERT_TRUE(solution.ok()) << describe(solution.status);
   EXPECT_EQ(solution.views.size(), 20U);
   EXPECT_LT(solution.rms_px, 0.001);
   EXPECT_LT(difference(solution, views_).mean_px, 0.002);
   EXPECT_LT(difference(solution, views_).worst_px, 0.05);
   const Eigen::Vector2d warp_m =
-      solution.problem.warp_m.cwiseProduct(input.lattice.warp_of_board());
+      solution.problem.warp_m.cwiseProduct(input.lattice.board_warp_ratio());
   EXPECT_LT((warp_m - views_.warp_m).norm(), 2e-6);
 }
 
@@ -40,7 +40,7 @@ TEST_P(SolveIntrinsics, ConvergesForAnyFocalLength) {
     const std::array parameters{focal_px, focal_px, 390.0, 310.0};
     SyntheticViews views{synthetic_board(GetParam()), Lens(LensModel::pinhole, parameters)};
     const IntrinsicsSolution solution = solve_intrinsics(views.input(15, random_, 0.05));
-    ASSERT_TRUE(solution.ok()) << focal_px << explanation_of(solution.status);
+    ASSERT_TRUE(solution.ok()) << focal_px << describe(solution.status);
     EXPECT_NEAR(solution.problem.intrinsics[0] / focal_px, 1, 0.01) << focal_px;
     EXPECT_NEAR(solution.rms_px, 0.05, 0.01) << focal_px;
   }
@@ -85,7 +85,7 @@ TEST_P(SolveIntrinsics, ReportsTooFewViews) {
 TEST_P(SolveIntrinsics, ReportsIdenticalViews) {
   IntrinsicsInput input = views_.input(1, random_, 0);
   input.views.resize(8, input.views[0]);
-  EXPECT_EQ(solve_intrinsics(input).status, IntrinsicsStatus::all_alike);
+  EXPECT_EQ(solve_intrinsics(input).status, IntrinsicsStatus::all_parallel);
 }
 
 INSTANTIATE_TEST_SUITE_P(Boards, SolveIntrinsics, testing::Bool(),

@@ -38,9 +38,9 @@ Lens fisheye_lens() {
   return {LensModel::fisheye, std::array{290.0, 291.0, 402.0, 297.0, 0.03, -0.012, 0.004, -0.0006}};
 }
 
-double rms_of(const LensChoice& choice, LensModel model) {
+double find_rms(const LensChoice& choice, LensModel model) {
   return std::find_if(choice.tried.begin(), choice.tried.end(),
-                      [model](const TriedLens& tried) { return tried.model == model; })
+                      [model](const LensCandidate& tried) { return tried.model == model; })
       ->rms_px;
 }
 
@@ -48,11 +48,11 @@ void expect_chosen(const Lens& lens) {
   constexpr int count = 30;
   const auto choice = choose_lens(seen_through(lens, count));
   ASSERT_TRUE(choice);
-  EXPECT_EQ(name_of(choice->model), name_of(lens.model())) << words_of(*choice);
+  EXPECT_EQ(to_string(choice->model), to_string(lens.model())) << describe(*choice);
   // Noise, and errors outside the region of the other views.
-  EXPECT_NEAR(rms_of(*choice, choice->model), kNoise_px, 0.25 * kNoise_px);
+  EXPECT_NEAR(find_rms(*choice, choice->model), kNoise_px, 0.25 * kNoise_px);
   EXPECT_EQ(choice->tried.size(), 5U);
-  EXPECT_TRUE(words_of(*choice).starts_with(name_of(lens.model()))) << words_of(*choice);
+  EXPECT_TRUE(describe(*choice).starts_with(to_string(lens.model()))) << describe(*choice);
 }
 
 TEST(ChooseLens, ReturnsOpencv4ForRadialLens) { expect_chosen(radial_lens()); }
@@ -69,8 +69,8 @@ TEST(ChooseLens, IgnoresBadView) {
   }
   const auto choice = choose_lens(input);
   ASSERT_TRUE(choice);
-  EXPECT_EQ(name_of(choice->model), name_of(LensModel::opencv8)) << words_of(*choice);
-  EXPECT_NEAR(rms_of(*choice, choice->model), kNoise_px, 0.4 * kNoise_px);
+  EXPECT_EQ(to_string(choice->model), to_string(LensModel::opencv8)) << describe(*choice);
+  EXPECT_NEAR(find_rms(*choice, choice->model), kNoise_px, 0.4 * kNoise_px);
 }
 
 TEST(ChooseLens, UsesFewViewsFarFromCenter) {
@@ -82,8 +82,8 @@ TEST(ChooseLens, UsesFewViewsFarFromCenter) {
   IntrinsicsInput input = views.input(0, random, kNoise_px);
   const Eigen::Vector2d middle = rational_lens().center_px();
   while (input.views.size() < all) {
-    const SeenBoard seen = views.random_view(random, kNoise_px);
-    if (!input.lattice.enough(seen)) continue;
+    const BoardDetection seen = views.random_view(random, kNoise_px);
+    if (!input.lattice.sufficient(seen)) continue;
     auto corners = input.lattice.corners(seen);
     const bool inner = std::all_of(corners.begin(), corners.end(), [&](const auto& corner) {
       return (corner.pixel - middle).norm() < inner_px;
@@ -93,8 +93,8 @@ TEST(ChooseLens, UsesFewViewsFarFromCenter) {
   }
   const auto choice = choose_lens(input);
   ASSERT_TRUE(choice);
-  EXPECT_NE(name_of(choice->model), name_of(LensModel::opencv4)) << words_of(*choice);
-  EXPECT_LT(rms_of(*choice, choice->model), 2 * kNoise_px);
+  EXPECT_NE(to_string(choice->model), to_string(LensModel::opencv4)) << describe(*choice);
+  EXPECT_LT(find_rms(*choice, choice->model), 2 * kNoise_px);
 }
 
 TEST(ChooseLens, ReturnsNulloptForFewerThanSixViews) {
@@ -109,7 +109,7 @@ TEST(ChooseLens, SkipsOpencvModelsBeyondRightAngle) {
   EXPECT_EQ(choice->model, LensModel::fisheye);
   EXPECT_GT(choice->beyond_rad, 1.58);
   EXPECT_LT(choice->beyond_rad, 2);
-  for (const TriedLens& tried : choice->tried) {
+  for (const LensCandidate& tried : choice->tried) {
     EXPECT_EQ(std::isfinite(tried.rms_px), tried.model == LensModel::fisheye);
   }
   EXPECT_EQ(choose_lens(seen_through(fisheye_lens(), 8))->beyond_rad, 0);
@@ -118,14 +118,14 @@ TEST(ChooseLens, SkipsOpencvModelsBeyondRightAngle) {
 TEST(DescribeLensChoice, ExplainsFisheyeBeyondRightAngle) {
   const LensChoice choice{
       LensModel::fisheye, {{LensModel::opencv4}, {LensModel::fisheye, 0.0512}}, 1.7};
-  EXPECT_EQ(words_of(choice),
+  EXPECT_EQ(describe(choice),
             "OPENCV_FISHEYE, 0.051 px rms in views left out; the board is seen up to 97 degrees "
             "off the axis, where no LENSMODEL_OPENCVn has rays");
 }
 
 TEST(DescribeLensChoice, ListsModelsWithoutLens) {
   const LensChoice choice{LensModel::fisheye, {{LensModel::opencv4}, {LensModel::fisheye, 0.0512}}};
-  EXPECT_EQ(words_of(choice),
+  EXPECT_EQ(describe(choice),
             "OPENCV_FISHEYE, 0.051 px rms in views left out; LENSMODEL_OPENCV4 no lens");
 }
 

@@ -30,7 +30,8 @@ std::vector<BoardView> make_views(const StepAt& step_at, int count = 24) {
     BoardView& added = views.emplace_back(BoardView{"view", kSharpnessImager_px, {}});
     for (int i = 0; i < 16 * 12; ++i) {
       const double size_px = 25, x = 50 * (i % 16) + view % 5 * 5, y = 50 * (i / 16) + view % 7 * 3;
-      SeenTag tag{i, {{{x, y + size_px}, {x + size_px, y + size_px}, {x + size_px, y}, {x, y}}}};
+      TagDetection tag{i,
+                       {{{x, y + size_px}, {x + size_px, y + size_px}, {x + size_px, y}, {x, y}}}};
       for (std::size_t k = 0; k < 4; ++k) {
         const Eigen::Vector2d at_px = (tag.corners_px[k] + tag.corners_px[(k + 1) % 4]) / 2;
         tag.steps[k] = step_at(at_px, view);
@@ -48,7 +49,7 @@ LensSharpness measured(const StepAt& step_at) {
 
 TEST(MeasureSharpness, ReturnsMtf50OfEvenLens) {
   const LensSharpness even = measured(even_step);
-  EXPECT_NEAR(even.mean_mtf50, mtf50_from_blur(kLensBlur_px), 0.02 * even.mean_mtf50);
+  EXPECT_NEAR(even.mean_mtf50, compute_mtf50(kLensBlur_px), 0.02 * even.mean_mtf50);
   EXPECT_GT(even.worst_ratio, 0.97);
   EXPECT_LT(even.asymmetry, 0.02);
   EXPECT_LT(even.local_loss, 0.03);
@@ -143,7 +144,7 @@ TEST(MeasureSharpness, ReportsUnknownShadowForFewTagsPerView) {
   std::vector<BoardView> views;
   for (std::size_t i = 0; i < dense.size(); ++i) {
     BoardView& view = views.emplace_back(dense[i]);
-    std::erase_if(view.seen.tags, [&](const SeenTag& tag) {
+    std::erase_if(view.seen.tags, [&](const TagDetection& tag) {
       return static_cast<std::size_t>(tag.id) % 28 != i % 28;
     });
     ASSERT_LT(view.seen.tags.size(), 8U);
@@ -157,16 +158,16 @@ TEST(MeasureSharpness, ReportsUnknownShadowForFewTagsPerView) {
 TEST(MeasureSharpness, ReturnsNulloptWithoutEdges) {
   auto views = make_views(even_step, 6);
   for (BoardView& view : views) {
-    for (SeenTag& tag : view.seen.tags) tag.steps = {};
+    for (TagDetection& tag : view.seen.tags) tag.steps = {};
   }
   EXPECT_FALSE(measure_sharpness(views, kSharpnessImager_px));
 }
 
 TEST(Mtf50OfView, ReturnsMedianOfEdges) {
   const auto views = make_views(even_step, 1);
-  const auto found = mtf50_of_view(views[0].seen);
+  const auto found = compute_view_mtf50(views[0].seen);
   ASSERT_TRUE(found);
-  EXPECT_NEAR(*found, mtf50_from_blur(kLensBlur_px), 0.01 * *found);
+  EXPECT_NEAR(*found, compute_mtf50(kLensBlur_px), 0.01 * *found);
 }
 
 }  // namespace

@@ -20,7 +20,7 @@ TEST(SolveByMrcal, SuppressesOnlyMessagesOfMrcal) {
   IntrinsicsInput input = views.input(15, random, 0.05);
   for (std::size_t i = 0; i < 10; ++i) input.views[i][3 * i].pixel.y() += 1.5;
   IntrinsicsSolution solution;
-  std::string told;
+  std::string written;
   testing::internal::CaptureStderr();
   {
     std::atomic<bool> solved = false;
@@ -29,13 +29,13 @@ TEST(SolveByMrcal, SuppressesOnlyMessagesOfMrcal) {
       solved = true;
     });
     while (!solved) {
-      const std::string line = std::to_string(told.size()) + "\n";
+      const std::string line = std::to_string(written.size()) + "\n";
       std::fputs(line.c_str(), stderr);
-      told += line;
+      written += line;
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
   }
-  EXPECT_EQ(testing::internal::GetCapturedStderr(), told);
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), written);
   ASSERT_TRUE(solution.ok());
   EXPECT_GE(solution.outliers, 10);
 }

@@ -13,7 +13,8 @@ namespace {
 
 constexpr std::array kImager_px{800, 600};
 
-IntrinsicsInput input_of(const Board& board, const std::vector<BoardView>& views, LensModel model) {
+IntrinsicsInput make_input(const Board& board, const std::vector<BoardView>& views,
+                           LensModel model) {
   IntrinsicsInput input{BoardLattice(board), {}, kImager_px, model};
   for (const BoardView& view : views) input.views.push_back(input.lattice.corners(view.seen));
   return input;
@@ -43,9 +44,11 @@ TEST_P(WriteCorners, KeepsSolutionAfterRoundTrip) {
   }
   EXPECT_EQ(corners, static_cast<std::size_t>(solution.corners));
   const IntrinsicsSolution again =
-      solve_intrinsics(input_of(views.board, read, LensModel::opencv8));
+      solve_intrinsics(make_input(views.board, read, LensModel::opencv8));
   ASSERT_TRUE(again.ok());
-  EXPECT_LT(projection_difference(solution.lens(), again.lens(), kImager_px, even)->worst_px, 1e-3);
+  EXPECT_LT(
+      compute_projection_difference(solution.lens(), again.lens(), kImager_px, even)->worst_px,
+      1e-3);
   EXPECT_NEAR(again.rms_px, solution.rms_px, 1e-5);
 }
 
@@ -110,7 +113,7 @@ TEST(ReadCorners, ComputesWeightsFromLevels) {
 TEST(ReadCorners, ThrowsForExcessiveWeight) {
   const TemporaryFolder folder;
   const auto file = folder.file("corners.vnl", "# filename x y weight\n" + row("100 100", "1e7"));
-  EXPECT_EQ(refusal_of([&] { read_corners(file, chessboard(), kImager_px); }),
+  EXPECT_EQ(rejection_message([&] { read_corners(file, chessboard(), kImager_px); }),
             file.string() + ":2: a weight of 1e+07: weights go up to 1000");
 }
 
@@ -131,7 +134,7 @@ TEST(ReadCorners, ReturnsWrittenWeights) {
     write_corners(file, solution, names);
     std::size_t corners = 0;
     for (const BoardView& view : read_corners(file, views.board, kImager_px)) {
-      for (const SeenPoint& point : view.seen.points) {
+      for (const PointDetection& point : view.seen.points) {
         EXPECT_TRUE(point.weight == most || point.weight == most / 4) << point.weight;
         ++corners;
       }
@@ -144,7 +147,7 @@ TEST(ReadCorners, ReturnsWrittenWeights) {
 TEST(CornerWeight, ScalesInfluenceOnSolve) {
   const std::array fisheye{450.0, 451.0, 402.0, 297.0, 0.02, -0.01, 0.003, -0.0004};
   for (const Lens& lens : {synthetic_lens(), Lens(LensModel::fisheye, fisheye)}) {
-    SCOPED_TRACE(name_of(lens.model()));
+    SCOPED_TRACE(to_string(lens.model()));
     const SyntheticViews views{synthetic_board(false), lens};
     Random random(5);
     IntrinsicsInput input = views.input(16, random, 0.05);
@@ -169,7 +172,7 @@ TEST(CornerWeight, ScalesInfluenceOnSolve) {
     }
     const IntrinsicsSolution spoilt = solve_intrinsics(input);
     ASSERT_TRUE(spoilt.ok());
-    EXPECT_LT(projection_difference(lens, spoilt.lens(), kImager_px, even)->mean_px, 0.1);
+    EXPECT_LT(compute_projection_difference(lens, spoilt.lens(), kImager_px, even)->mean_px, 0.1);
   }
 }
 

@@ -13,10 +13,10 @@ namespace vlp {
 namespace {
 
 TEST(Base85, MatchesPython) {
-  EXPECT_EQ(base85(""), "");
-  EXPECT_EQ(base85("hello"), "Xk~0{Zv");
-  EXPECT_EQ(base85(std::string("\0\0\0\0", 4)), "00000");
-  EXPECT_EQ(base85("abcd"), "VPa!s");
+  EXPECT_EQ(encode_base85(""), "");
+  EXPECT_EQ(encode_base85("hello"), "Xk~0{Zv");
+  EXPECT_EQ(encode_base85(std::string("\0\0\0\0", 4)), "00000");
+  EXPECT_EQ(encode_base85("abcd"), "VPa!s");
 }
 
 // Checked by the program unzip, which fails for a wrong CRC.

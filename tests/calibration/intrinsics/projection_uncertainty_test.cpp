@@ -37,7 +37,7 @@ TEST(ProjectionUncertainty, ReportsRegularizationBias) {
   const auto solution = solve_intrinsics(views.input(30, random, 0.02));
   ASSERT_TRUE(solution.ok());
   const ProjectionUncertainty uncertainty(solution);
-  const Eigen::VectorXd& pull = uncertainty.intrinsics_pull();
+  const Eigen::VectorXd& pull = uncertainty.regularization_bias();
   const double focal_off_px = solution.problem.intrinsics[0] - wide[0];
   const double noise_px = std::sqrt(uncertainty.intrinsics_covariance()(0, 0));
   EXPECT_GT(std::abs(focal_off_px), 5 * noise_px);
@@ -51,7 +51,7 @@ TEST(ProjectionUncertainty, ReportsNoBiasWithoutRegularization) {
   input.lens_model = LensModel::fisheye;
   const auto solution = solve_intrinsics(input);
   ASSERT_TRUE(solution.ok());
-  EXPECT_EQ(ProjectionUncertainty(solution).intrinsics_pull(), Eigen::VectorXd::Zero(8));
+  EXPECT_EQ(ProjectionUncertainty(solution).regularization_bias(), Eigen::VectorXd::Zero(8));
 }
 
 TEST(ProjectionUncertainty, MatchesMrcalForIndependentCorners) {
@@ -97,7 +97,7 @@ TEST(CalibrationReport, HalvesAgreeWithReportedUncertainty) {
   const IntrinsicsInput input = views.input(24, random, 0.1);
   const IntrinsicsSolution solution = solve_intrinsics(input);
   ASSERT_TRUE(solution.ok());
-  const CalibrationReport report = report_on(solution, input);
+  const CalibrationReport report = compute_report(solution, input);
   ASSERT_TRUE(report.halves);
   // Twice the difference from the truth, within a factor for the few degrees of freedom.
   EXPECT_LT(report.halves->rms_px, 2.5 * 2 * report.expected_rms_px);
@@ -110,7 +110,7 @@ TEST(ComputeHeldOutFit, MatchesNoiseOfSolvedViews) {
   Random random(6);
   const IntrinsicsSolution solution = solve_intrinsics(views.input(20, random, 0.05));
   ASSERT_TRUE(solution.ok());
-  const HeldOut held_out = held_out_fit(solution, views.input(6, random, 0.05));
+  const HeldOut held_out = compute_held_out_fit(solution, views.input(6, random, 0.05));
   EXPECT_EQ(held_out.views, 6);
   EXPECT_NEAR(held_out.rms_px, 0.05, 0.006);
 }
@@ -119,7 +119,7 @@ TEST(RecommendNextView, ReturnsEmptiestPartAndLeastTiltedSide) {
   ViewCoverage coverage;
   coverage.corners = {9, 9, 9, 9, 9, 2, 9, 9, 9};
   coverage.tilts_rad = {0.5, 0.6, 0.1, 0.5};
-  EXPECT_EQ(next_view(coverage),
+  EXPECT_EQ(recommend_next_view(coverage),
             "the board in the right middle of the image, its upper side 30 to 40 degrees nearer to "
             "the camera");
 }
@@ -132,7 +132,7 @@ TEST(ComputeViewCoverage, ReportsTiltOfNearerSide) {
   ASSERT_TRUE(solution.ok());
   solution.problem.poses.resize(1);
   solution.problem.poses[0].rotation = {0, 0.3, 0};  // its right comes nearer
-  const auto [left, right, upper, lower] = coverage_of(solution, input).tilts_rad;
+  const auto [left, right, upper, lower] = compute_view_coverage(solution, input).tilts_rad;
   EXPECT_EQ(left, 0);
   EXPECT_NEAR(right, 0.3, 1e-9);
   EXPECT_NEAR(upper, 0, 1e-9);

@@ -10,7 +10,7 @@
 namespace vlp {
 
 /// Returns a camera of 800 x 600 px with any model that is not splined.
-inline Camera camera_of(LensModel model) {
+inline Camera make_camera(LensModel model) {
   const std::vector<double> distortions{-0.2,   0.05,  1e-4, -2e-4, 0.01,  0.02,
                                         -0.003, 0.001, 1e-4, 2e-5,  -1e-4, 3e-5};
   Camera camera{"camera", {800, 600}, model, {520.25, 521, 402.3, 297.4}, {}, {}, {}};
@@ -26,7 +26,7 @@ inline Camera camera_of(LensModel model) {
 
 /// Returns a camera with a splined lens like one of 150 degrees.
 inline Camera splined_camera(const SplineGrid& grid = {3, 13, 11, 150}) {
-  return with_lens_model(camera_of(LensModel::fisheye), splined_lens(grid)).camera;
+  return fit_lens_model(make_camera(LensModel::fisheye), lens_model_for(grid)).camera;
 }
 
 }  // namespace vlp

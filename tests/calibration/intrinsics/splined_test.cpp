@@ -17,7 +17,7 @@
 namespace vlp {
 namespace {
 
-constexpr LensModel kSplined = splined_lens({3, 14, 14, 205});
+constexpr LensModel kSplined = lens_model_for({3, 14, 14, 205});
 
 /// Returns boards all over the image of a lens with rays up to 100 degrees off its axis.
 IntrinsicsInput splined_input(int count, Random& random, double noise_px) {
@@ -32,19 +32,20 @@ TEST(SolveSplinedLens, MatchesTruthBeyondNinetyDegrees) {
   Random random(18);
   const auto input = splined_input(40, random, noise_px);
   const IntrinsicsSolution solution = solve_intrinsics(input);
-  ASSERT_TRUE(solution.ok()) << explanation_of(solution.status);
+  ASSERT_TRUE(solution.ok()) << describe(solution.status);
   EXPECT_EQ(solution.views.size(), 40U);
   EXPECT_FALSE(solution.solved_for.core);
   EXPECT_NEAR(solution.rms_px, noise_px, 0.003);
   EXPECT_NEAR(solution.problem.noise_px, noise_px, 0.005);
   EXPECT_LT(up_to(90, solution.lens()).mean_px, 0.03);
   EXPECT_LT(up_to(94, solution.lens()).worst_px, 0.1);
-  const CalibrationReport report = report_on(solution, input);
+  const CalibrationReport report = compute_report(solution, input);
   EXPECT_LT(report.uncertainty_mean_px, 0.05);
   ASSERT_TRUE(report.halves);
   EXPECT_LT(report.halves->mean_px, 0.1);
   // The frame is that of the true lens, which is symmetric.
-  const auto turn = b_from_a(wide_lens(), solution.lens(), seen_px(solution.problem));
+  const auto turn =
+      fit_rotation(wide_lens(), solution.lens(), collect_inlier_pixels(solution.problem));
   ASSERT_TRUE(turn);
   EXPECT_LT(Eigen::AngleAxisd(*turn).angle() * 180 / std::numbers::pi, 0.02);
   EXPECT_NEAR(solution.lens().center_px().x(), 501, 0.2);
@@ -56,8 +57,8 @@ TEST(SolveSplinedLens, MatchesTruthBeyondNinetyDegrees) {
 // The edge of a tag at a slant may be misdetected. Near the rim, where corners are sparse, a
 // splined lens would overfit it.
 TEST(SolveSplinedLens, RejectsTagsWithDisplacedEdge) {
-  constexpr double noise_px = 0.02, slip_px = 2.5;
-  constexpr std::size_t count = 40, of_tag = 4;
+  constexpr double noise_px = 0.02, displacement_px = 2.5;
+  constexpr std::size_t count = 40, corners_per_tag = 4;
   Random random(18);
   auto input = splined_input(count, random, noise_px);
   for (std::size_t view = 0; view < count; view += 8) {
@@ -67,14 +68,14 @@ TEST(SolveSplinedLens, RejectsTagsWithDisplacedEdge) {
     const auto off_axis_px = [&](std::size_t k) {
       return (corners[k].pixel - wide_lens().center_px()).norm();
     };
-    for (std::size_t k = 0; k < corners.size(); k += of_tag) {
+    for (std::size_t k = 0; k < corners.size(); k += corners_per_tag) {
       if (off_axis_px(k) > off_axis_px(farthest)) farthest = k;
     }
-    corners[farthest].pixel.x() += slip_px;
-    corners[farthest + 1].pixel.x() += slip_px;
+    corners[farthest].pixel.x() += displacement_px;
+    corners[farthest + 1].pixel.x() += displacement_px;
   }
   const IntrinsicsSolution solution = solve_intrinsics(input);
-  ASSERT_TRUE(solution.ok()) << explanation_of(solution.status);
+  ASSERT_TRUE(solution.ok()) << describe(solution.status);
   EXPECT_GE(solution.outliers, 20);  // the tags whole
   EXPECT_LT(up_to(90, solution.lens()).mean_px, 0.03);
   EXPECT_LT(up_to(94, solution.lens()).worst_px, 0.15);
@@ -83,7 +84,7 @@ TEST(SolveSplinedLens, RejectsTagsWithDisplacedEdge) {
 TEST(SolveSplinedLens, FailsWhenGridIsTooNarrow) {
   Random random(19);
   IntrinsicsInput input = splined_input(12, random, 0.05);
-  input.lens_model = splined_lens({3, 10, 10, 120});
+  input.lens_model = lens_model_for({3, 10, 10, 120});
   const IntrinsicsSolution solution = solve_intrinsics(input);
   EXPECT_FALSE(solution.ok());
 }
@@ -91,14 +92,14 @@ TEST(SolveSplinedLens, FailsWhenGridIsTooNarrow) {
 // Outliers are found with OPENCV_FISHEYE, which does not quite fit this lens. That alone rejects no
 // tag. Tags with a displaced edge are rejected, by that test or as outliers of mrcal.
 TEST(SolveSplinedLens, KeepsTagsThatFisheyeFitsPoorly) {
-  constexpr double noise_px = 0.02, slip_px = 2.5;
-  constexpr std::size_t count = 40, of_tag = 4;
+  constexpr double noise_px = 0.02, displacement_px = 2.5;
+  constexpr std::size_t count = 40, corners_per_tag = 4;
   Random random(18);
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   IntrinsicsInput input = views.input(count, random, noise_px);
-  input.lens_model = splined_lens({3, 14, 11, 90});
+  input.lens_model = lens_model_for({3, 14, 11, 90});
   const IntrinsicsSolution good = solve_intrinsics(input);
-  ASSERT_TRUE(good.ok()) << explanation_of(good.status);
+  ASSERT_TRUE(good.ok()) << describe(good.status);
   EXPECT_EQ(good.outliers, 0);
   for (std::size_t view = 0; view < count; view += 8) {
     auto& corners = input.views[view];
@@ -106,18 +107,18 @@ TEST(SolveSplinedLens, KeepsTagsThatFisheyeFitsPoorly) {
       return (corners[k].pixel - views.lens.center_px()).norm();
     };
     std::size_t farthest = 0;
-    for (std::size_t k = 0; k < corners.size(); k += of_tag) {
+    for (std::size_t k = 0; k < corners.size(); k += corners_per_tag) {
       if (off_axis_px(k) > off_axis_px(farthest)) farthest = k;
     }
-    corners[farthest].pixel.x() += slip_px;
-    corners[farthest + 1].pixel.x() += slip_px;
+    corners[farthest].pixel.x() += displacement_px;
+    corners[farthest + 1].pixel.x() += displacement_px;
   }
   const IntrinsicsSolution slipped = solve_intrinsics(input);
-  ASSERT_TRUE(slipped.ok()) << explanation_of(slipped.status);
+  ASSERT_TRUE(slipped.ok()) << describe(slipped.status);
   EXPECT_GE(slipped.outliers, 20);  // the tags whole
-  const ImageRegion region =
-      known_region(seen_px(slipped.problem), input.imager_px, input.lens_model);
-  const auto difference = projection_difference(
+  const ImageRegion region = compute_known_region(collect_inlier_pixels(slipped.problem),
+                                                  input.imager_px, input.lens_model);
+  const auto difference = compute_projection_difference(
       views.lens, slipped.lens(), input.imager_px, [&](const Eigen::Vector2d& pixel) {
         return polygon_contains(region, pixel) ? 1.0 : INFINITY;
       });
@@ -143,7 +144,7 @@ TEST(ProjectionUncertainty, MatchesScatterOfSplinedLens) {
   constexpr double noise_px = 0.1;
   Random of_boards(41);
   IntrinsicsInput exact = splined_input(16, of_boards, 0);
-  exact.lens_model = splined_lens({3, 10, 10, 205});
+  exact.lens_model = lens_model_for({3, 10, 10, 205});
   exact.warp = WarpChoice::off;
   const auto solved = [&](std::uint64_t seed) {
     IntrinsicsInput input = exact;
@@ -166,7 +167,7 @@ TEST(ProjectionUncertainty, MatchesScatterOfSplinedLens) {
   const ProjectionUncertainty uncertainty(first);
   const Lens lens = first.lens();
   double squares = 0, freedoms = 0;
-  for (const Eigen::Vector2d& pixel : pixel_grid(kWideImager)) {
+  for (const Eigen::Vector2d& pixel : make_pixel_grid(kWideImager)) {
     const auto ray = lens.unproject(pixel);
     if (!ray || ray->direction.normalized().z() < 0) continue;
     std::vector<Eigen::Vector2d> seen;

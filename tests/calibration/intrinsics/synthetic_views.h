@@ -24,7 +24,7 @@ inline Board synthetic_board(bool kalibr) {
           {false, BoardCorner::bottom_left}};
 }
 
-/// Uniform standard deviation for projection_difference().
+/// Uniform standard deviation for compute_projection_difference().
 inline double even(const Eigen::Vector2d&) { return 1; }
 
 /// Returns a lens with strong distortion, for 800 x 600 px.
@@ -36,8 +36,8 @@ inline Lens synthetic_lens() {
 
 /// Returns a tag with its edges moved inwards, as by tone curves; its corners are the intersections
 /// of the moved lines.
-inline SeenTag shrunk(const SeenTag& tag, double shift_px) {
-  SeenTag result = tag;
+inline TagDetection shrunk(const TagDetection& tag, double shift_px) {
+  TagDetection result = tag;
   Eigen::Vector2d middle = Eigen::Vector2d::Zero();
   for (const auto& corner : tag.corners_px) middle += corner / 4;
   for (std::size_t k = 0; k < 4; ++k) {
@@ -69,7 +69,7 @@ struct SyntheticViews {
   Eigen::Vector2d stretch{1, 1};
 
   /// Returns the tags completely in the image of a board at a random pose in front of the camera.
-  SeenBoard random_view(Random& random, double noise_px) const {
+  BoardDetection random_view(Random& random, double noise_px) const {
     const Eigen::Vector2d field_m = tag_field_m(board);
     const double fill_m = lens.focal_px().x() * field_m.x() / imager_px[0];
     for (;;) {
@@ -80,18 +80,18 @@ struct SyntheticViews {
       const double z_m = fill_m * random.uniform(0.8, farthest);
       const double v = random.uniform(-0.5, 0.5), u = random.uniform(-0.5, 0.5);
       const Eigen::Vector3d middle(u * imager_px[0], v * imager_px[1], lens.focal_px().x());
-      const SeenBoard seen = view(rotation, middle * (z_m / middle.z()), random, noise_px);
+      const BoardDetection seen = view(rotation, middle * (z_m / middle.z()), random, noise_px);
       if (seen.tags.size() >= 8) return seen;
     }
   }
 
   /// `rotation`: camera from board; `middle_m`: middle of the board in the camera frame.
-  SeenBoard view(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& middle_m, Random& random,
-                 double noise_px) const {
+  BoardDetection view(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& middle_m,
+                      Random& random, double noise_px) const {
     const Eigen::Vector2d field_m = tag_field_m(board);
-    SeenBoard seen;
-    for (const BoardTag& place : board_layout(board)) {
-      SeenTag tag{place.id, {}};
+    BoardDetection seen;
+    for (const BoardTag& place : compute_board_layout(board)) {
+      TagDetection tag{place.id, {}};
       bool whole = true;
       for (std::size_t k = 0; k < 4; ++k) {
         const Eigen::Array2d share = 2 * place.corners_m[k].array() / field_m.array() - 1;
@@ -114,8 +114,8 @@ struct SyntheticViews {
   IntrinsicsInput input(int views, Random& random, double noise_px) const {
     IntrinsicsInput input{BoardLattice(board), {}, imager_px, lens.model()};
     while (static_cast<int>(input.views.size()) < views) {
-      const SeenBoard seen = random_view(random, noise_px);
-      if (input.lattice.enough(seen)) input.views.push_back(input.lattice.corners(seen));
+      const BoardDetection seen = random_view(random, noise_px);
+      if (input.lattice.sufficient(seen)) input.views.push_back(input.lattice.corners(seen));
     }
     return input;
   }

@@ -33,8 +33,8 @@ inline SyntheticViews wide_views(bool kalibr, const Eigen::Vector2d& warp_m = {0
 
 /// Returns the board at a random position up to 85 degrees off the axis, its outer tags beyond 90;
 /// often with too few tags.
-inline SeenBoard wide_view(const SyntheticViews& views, Random& random, double noise_px,
-                           const WideBoards& boards = {}) {
+inline BoardDetection wide_view(const SyntheticViews& views, Random& random, double noise_px,
+                                const WideBoards& boards = {}) {
   const double share = random.uniform(0, 1);
   const double off_axis = 1.5 * (boards.all_over ? std::sqrt(share) : share);
   const double around = random.uniform(-3.14, 3.14);
@@ -48,8 +48,8 @@ inline SeenBoard wide_view(const SyntheticViews& views, Random& random, double n
       towards * Eigen::AngleAxisd(lean, Eigen::Vector3d::UnitX()).toRotationMatrix() *
       Eigen::AngleAxisd(lean_y, Eigen::Vector3d::UnitY()) *
       Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitZ());
-  SeenBoard seen = views.view(rotation, distance_m * towards.col(2), random, noise_px);
-  std::erase_if(seen.tags, [&](const SeenTag& tag) {
+  BoardDetection seen = views.view(rotation, distance_m * towards.col(2), random, noise_px);
+  std::erase_if(seen.tags, [&](const TagDetection& tag) {
     return std::ranges::any_of(tag.corners_px, [&](const Eigen::Vector2d& pixel) {
       const auto ray = views.lens.unproject(pixel);
       return !ray || std::acos(ray->direction.normalized().z()) > boards.reach_rad;
@@ -58,8 +58,8 @@ inline SeenBoard wide_view(const SyntheticViews& views, Random& random, double n
   return seen;
 }
 
-inline bool enough_of(const SeenBoard& seen, const BoardLattice& lattice) {
-  return seen.tags.size() > 5 && lattice.enough(seen);
+inline bool has_enough_tags(const BoardDetection& seen, const BoardLattice& lattice) {
+  return seen.tags.size() > 5 && lattice.sufficient(seen);
 }
 
 inline IntrinsicsInput wide_input(bool kalibr, int count, Random& random, double noise_px,
@@ -68,15 +68,15 @@ inline IntrinsicsInput wide_input(bool kalibr, int count, Random& random, double
   const SyntheticViews views = wide_views(kalibr, warp_m);
   IntrinsicsInput input{BoardLattice(views.board), {}, kWideImager, LensModel::fisheye};
   while (static_cast<int>(input.views.size()) < count) {
-    const SeenBoard seen = wide_view(views, random, noise_px, boards);
-    if (enough_of(seen, input.lattice)) input.views.push_back(input.lattice.corners(seen));
+    const BoardDetection seen = wide_view(views, random, noise_px, boards);
+    if (has_enough_tags(seen, input.lattice)) input.views.push_back(input.lattice.corners(seen));
   }
   return input;
 }
 
 /// Computes the difference from wide_lens() over the pixels up to `degrees` off the axis.
 inline ProjectionDifference up_to(double degrees, const Lens& found) {
-  return *projection_difference(wide_lens(), found, kWideImager, [&](const auto& pixel) {
+  return *compute_projection_difference(wide_lens(), found, kWideImager, [&](const auto& pixel) {
     const auto ray = wide_lens().unproject(pixel);
     const double cosine = ray ? ray->direction.normalized().z() : -1;
     return cosine > std::cos(degrees * std::numbers::pi / 180) ? 1.0 : INFINITY;

@@ -4,7 +4,7 @@
 
 namespace vlp {
 
-SyntheticRig leaning_rig(double tilt_rad, double azimuth_rad) {
+SyntheticRig make_tilted_rig(double tilt_rad, double azimuth_rad) {
   SyntheticRig rig{synthetic_lamps(), {synthetic_camera(), {}, {}, {}, {}}, {{0, 0, 0}, 0}, {}};
   rig.calibration.rotation_center = tilted_by(rig.calibration.camera, tilt_rad, azimuth_rad);
   return rig;

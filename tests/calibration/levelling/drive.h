@@ -11,7 +11,7 @@
 namespace vlp {
 
 /// Returns eight lamps and a tilted camera.
-SyntheticRig leaning_rig(double tilt_rad, double azimuth_rad);
+SyntheticRig make_tilted_rig(double tilt_rad, double azimuth_rad);
 
 /// Returns captures at random positions and yaws under the lamps, at two heights.
 std::vector<Frame> drive(SyntheticRig rig, int captures, Random& random, double sigma_px = 1);

@@ -22,9 +22,9 @@ constexpr double kDriveTolerance = 0.08;
 void expect_consistent(const std::vector<Frame>& exact, const SyntheticRig& rig,
                        const LampMap& surveyed, bool refine_map, bool stated) {
   Random random(21);
-  LevellingOptions options;
+  TiltCalibrationOptions options;
   options.refine_map = refine_map;
-  const auto reference = level_by_lamps(exact, surveyed, rig.calibration.camera, options);
+  const auto reference = estimate_tilt_from_lamps(exact, surveyed, rig.calibration.camera, options);
   ASSERT_EQ(reference.undetermined, "");
   Matrix2 scatter = Matrix2::Zero(), reported = Matrix2::Zero();
   Eigen::ArrayXd lamp_scatter = Eigen::ArrayXd::Zero(24), lamp_reported = lamp_scatter;
@@ -35,7 +35,7 @@ void expect_consistent(const std::vector<Frame>& exact, const SyntheticRig& rig,
         if (!stated) detection.sigma_px.reset();
       }
     }
-    const auto result = level_by_lamps(frames, surveyed, rig.calibration.camera, options);
+    const auto result = estimate_tilt_from_lamps(frames, surveyed, rig.calibration.camera, options);
     ASSERT_EQ(result.undetermined, "");
     const Eigen::Vector2d error = result.center.center_px - reference.center.center_px;
     scatter += error * error.transpose() / kDrives;
@@ -61,13 +61,13 @@ void expect_consistent(const std::vector<Frame>& exact, const SyntheticRig& rig,
 
 TEST(EstimateTiltFromLamps, CovarianceMatchesScatter) {
   Random random(22);
-  const auto rig = leaning_rig(0.05, 1);
+  const auto rig = make_tilted_rig(0.05, 1);
   expect_consistent(drive(rig, 12, random, 0.1), rig, rig.map, false, true);
 }
 
 TEST(EstimateTiltFromLamps, CovarianceMatchesScatterForThreeLamps) {
   Random random(23);
-  const auto rig = leaning_rig(0.05, 1);
+  const auto rig = make_tilted_rig(0.05, 1);
   auto exact = drive(rig, 30, random, 0.1);
   for (Frame& frame : exact) frame.detections.resize(3);
   expect_consistent(exact, rig, rig.map, false, true);
@@ -75,7 +75,7 @@ TEST(EstimateTiltFromLamps, CovarianceMatchesScatterForThreeLamps) {
 
 TEST(EstimateTiltFromLamps, CovarianceMatchesScatterWithoutGivenNoise) {
   Random random(24);
-  auto rig = leaning_rig(0.05, 1);
+  auto rig = make_tilted_rig(0.05, 1);
   rig.calibration.camera.lens_model = LensModel::pinhole;  // equal noise in the undistorted image
   rig.calibration.camera.intrinsics = {520, 520, 400, 300};
   expect_consistent(drive(rig, 12, random, 0.1), rig, rig.map, false, false);
@@ -83,7 +83,7 @@ TEST(EstimateTiltFromLamps, CovarianceMatchesScatterWithoutGivenNoise) {
 
 TEST(EstimateTiltFromLamps, CovarianceMatchesScatterWhenRefiningMap) {
   Random random(25);
-  auto rig = leaning_rig(0.05, 1);
+  auto rig = make_tilted_rig(0.05, 1);
   const LampMap surveyed = rig.map;
   for (Lamp& lamp : rig.map.lamps) lamp.position_m.x() += random.uniform(-0.002, 0.002);
   expect_consistent(drive(rig, 16, random, 0.1), rig, surveyed, true, true);
@@ -108,7 +108,7 @@ TEST_P(EstimateTiltFromLampsWithMapErrors, ReportsConsistentZenithCovariance) {
   Random random(26);
   double squares = 0, worst_rad = 0, reported_rad2 = 0;
   for (int i = 0; i < maps; ++i) {
-    auto rig = leaning_rig(0.05, 1);
+    auto rig = make_tilted_rig(0.05, 1);
     std::vector<Frame> frames;
     for (int k = 0; k < errors.captures; ++k) {
       rig.camera = {{random.uniform(-0.5, 0.5), random.uniform(-0.3, 0.3), 0},
@@ -123,7 +123,7 @@ TEST_P(EstimateTiltFromLampsWithMapErrors, ReportsConsistentZenithCovariance) {
       lamp.sd_m = errors.map_sd_m;
       for (double& coordinate : lamp.position_m) coordinate += errors.map_sd_m * random.normal();
     }
-    const auto result = level_by_lamps(frames, surveyed, rig.calibration.camera);
+    const auto result = estimate_tilt_from_lamps(frames, surveyed, rig.calibration.camera);
     ASSERT_EQ(result.undetermined, "");
     ASSERT_TRUE(result.center.covariance);
     const Eigen::Vector2d error =

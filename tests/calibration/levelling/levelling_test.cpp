@@ -16,7 +16,7 @@ namespace vlp {
 namespace {
 
 /// Returns the map with each lamp moved by up to `size_m` along each axis.
-LampMap shaken(LampMap map, double size_m, Random& random) {
+LampMap perturb_lamps(LampMap map, double size_m, Random& random) {
   for (Lamp& lamp : map.lamps) {
     lamp.position_m +=
         Eigen::Vector3d(random.uniform(-size_m, size_m), random.uniform(-size_m, size_m),
@@ -27,7 +27,7 @@ LampMap shaken(LampMap map, double size_m, Random& random) {
 
 /// Returns the largest distance of a lamp from its true position, after the best fit of
 /// translation, yaw and scale.
-double misshape_m(const LampMap& found, const LampMap& truth) {
+double compute_shape_error_m(const LampMap& found, const LampMap& truth) {
   const auto lamp = [](const LampMap& map, std::size_t i) { return map.lamps[i].position_m; };
   const auto fit = fit_similarity(
       truth.lamps.size(), [&](std::size_t i) { return Eigen::Vector2d(lamp(found, i).head<2>()); },
@@ -50,14 +50,14 @@ TEST(EstimateTiltFromLamps, ReturnsExactTiltWithoutNoise) {
   Random random(1);
   for (const double tilt_deg : {0.0, 0.5, 3.0, 6.0, 10.0}) {
     for (const bool stated : {true, false}) {
-      const auto rig = leaning_rig(rad_from_deg(tilt_deg), random.uniform(-3, 3));
+      const auto rig = make_tilted_rig(rad_from_deg(tilt_deg), random.uniform(-3, 3));
       auto frames = drive(rig, 8, random);
       for (Frame& frame : frames) {
         for (auto& detection : frame.detections) {
           if (!stated) detection.sigma_px.reset();
         }
       }
-      const auto result = level_by_lamps(frames, rig.map, rig.calibration.camera);
+      const auto result = estimate_tilt_from_lamps(frames, rig.map, rig.calibration.camera);
       ASSERT_EQ(result.undetermined, "") << tilt_deg;
       const auto& truth = *rig.calibration.rotation_center;
       EXPECT_LT(angle_between(result.center.zenith_in_camera, truth.zenith_in_camera), 1e-10);
@@ -73,11 +73,11 @@ TEST(EstimateTiltFromLamps, ReturnsExactTiltWithoutNoise) {
 
 TEST(EstimateTiltFromLamps, ReturnsExactTiltFromThreeLampsPerCapture) {
   Random random(2);
-  const auto rig = leaning_rig(0.05, 1);
+  const auto rig = make_tilted_rig(0.05, 1);
   auto frames = drive(rig, 10, random);
   for (Frame& frame : frames) frame.detections.resize(3);
   frames[4].detections.resize(2);
-  const auto result = level_by_lamps(frames, rig.map, rig.calibration.camera);
+  const auto result = estimate_tilt_from_lamps(frames, rig.map, rig.calibration.camera);
   ASSERT_EQ(result.undetermined, "");
   EXPECT_LT(angle_between(result.center.zenith_in_camera,
                           rig.calibration.rotation_center->zenith_in_camera),
@@ -88,19 +88,19 @@ TEST(EstimateTiltFromLamps, ReturnsExactTiltFromThreeLampsPerCapture) {
 
 TEST(EstimateTiltFromLamps, RecoversMapShapeWhenRefiningMap) {
   Random random(3);
-  auto rig = leaning_rig(0.05, 2);
+  auto rig = make_tilted_rig(0.05, 2);
   const LampMap surveyed = rig.map;
-  rig.map = shaken(surveyed, 0.005, random);
+  rig.map = perturb_lamps(surveyed, 0.005, random);
   const auto frames = drive(rig, 12, random);
-  LevellingOptions options;
+  TiltCalibrationOptions options;
   options.refine_map = true;
-  const auto result = level_by_lamps(frames, surveyed, rig.calibration.camera, options);
+  const auto result = estimate_tilt_from_lamps(frames, surveyed, rig.calibration.camera, options);
   ASSERT_EQ(result.undetermined, "");
   EXPECT_LT(angle_between(result.center.zenith_in_camera,
                           rig.calibration.rotation_center->zenith_in_camera),
             1e-8);
-  EXPECT_GT(misshape_m(surveyed, rig.map), 0.003);
-  EXPECT_LT(misshape_m(result.map, rig.map), 1e-8);
+  EXPECT_GT(compute_shape_error_m(surveyed, rig.map), 0.003);
+  EXPECT_LT(compute_shape_error_m(result.map, rig.map), 1e-8);
 
   Eigen::Vector3d mean_m = Eigen::Vector3d::Zero(), moved = mean_m;
   for (const Lamp& lamp : surveyed.lamps) mean_m += lamp.position_m / 8;
@@ -120,14 +120,14 @@ TEST(EstimateTiltFromLamps, RecoversMapShapeWhenRefiningMap) {
 
 TEST(EstimateTiltFromLamps, KeepsUndetectedLampsWhenRefiningMap) {
   Random random(4);
-  const auto rig = leaning_rig(0.03, 2);
+  const auto rig = make_tilted_rig(0.03, 2);
   auto frames = drive(rig, 12, random);
   for (Frame& frame : frames) {
     std::erase_if(frame.detections, [](const Detection& seen) { return seen.lamp == 3; });
   }
-  LevellingOptions options;
+  TiltCalibrationOptions options;
   options.refine_map = true;
-  const auto result = level_by_lamps(frames, rig.map, rig.calibration.camera, options);
+  const auto result = estimate_tilt_from_lamps(frames, rig.map, rig.calibration.camera, options);
   ASSERT_EQ(result.undetermined, "");
   EXPECT_EQ(result.corrections.size(), 7);
   EXPECT_EQ(result.map.lamps[2].position_m, rig.map.lamps[2].position_m);
@@ -135,7 +135,7 @@ TEST(EstimateTiltFromLamps, KeepsUndetectedLampsWhenRefiningMap) {
 
 TEST(EstimateTiltFromLamps, RejectsWrongDetections) {
   Random random(5);
-  const auto rig = leaning_rig(0.08, -1);
+  const auto rig = make_tilted_rig(0.08, -1);
   auto frames = with_noise(drive(rig, 40, random, 0.05), random);
   for (std::size_t i = 0; i < 40; i += 4) {
     auto& detections = frames[i].detections;
@@ -145,7 +145,7 @@ TEST(EstimateTiltFromLamps, RejectsWrongDetections) {
       detections[2].pixel += Eigen::Vector2d(random.uniform(2, 10), random.uniform(2, 10));
     }
   }
-  const auto result = level_by_lamps(frames, rig.map, rig.calibration.camera);
+  const auto result = estimate_tilt_from_lamps(frames, rig.map, rig.calibration.camera);
   ASSERT_EQ(result.undetermined, "");
   EXPECT_GE(result.detections_rejected, 15);
   EXPECT_LE(result.detections_rejected, 20);

@@ -13,10 +13,9 @@
 namespace vlp {
 namespace {
 
-std::vector<LampOffset> offsets_of_lamps(const LampMap& map,
-                                         const std::vector<CeilingView>& views) {
+std::vector<LampOffset> compute_offsets(const LampMap& map, const std::vector<CeilingView>& views) {
   const auto found = estimate_lamp_displacements(map, views);
-  return found ? offsets_from_other_lamps(*found) : std::vector<LampOffset>();
+  return found ? compute_offsets_from_others(*found) : std::vector<LampOffset>();
 }
 
 /// Captures of eight lamps from twelve positions, with wrong fixes: position, yaw and height have
@@ -44,7 +43,7 @@ class EstimateLampDisplacements : public testing::Test {
       views.push_back(view);
     }
     if (misidentified_) std::swap(views[5].lamps[2].lamp, views[5].lamps[6].lamp);
-    return offsets_of_lamps(lamps_, views);
+    return compute_offsets(lamps_, views);
   }
 
   LampMap lamps_ = synthetic_lamps();
@@ -117,17 +116,17 @@ TEST_F(EstimateLampDisplacements, ReturnsNoOffsetsForUnconnectedLamps) {
     const auto& lamp = lamps_.lamps[static_cast<std::size_t>(id - 1)];
     view.lamps.push_back({id, lamp.position_m.head<2>(), 1.6});
   }
-  EXPECT_THAT(offsets_of_lamps(lamps_, {}), testing::IsEmpty());
-  EXPECT_THAT(offsets_of_lamps(lamps_, {view}), testing::IsEmpty()) << "seen once";
+  EXPECT_THAT(compute_offsets(lamps_, {}), testing::IsEmpty());
+  EXPECT_THAT(compute_offsets(lamps_, {view}), testing::IsEmpty()) << "seen once";
   CeilingView other{{0, 0}, {}};
   for (int id = 4; id <= 7; ++id) {
     const auto& lamp = lamps_.lamps[static_cast<std::size_t>(id - 1)];
     other.lamps.push_back({id, lamp.position_m.head<2>(), 1.6});
   }
-  EXPECT_THAT(offsets_of_lamps(lamps_, {view, view, view, view, other, other, other, other}),
+  EXPECT_THAT(compute_offsets(lamps_, {view, view, view, view, other, other, other, other}),
               testing::IsEmpty())
       << "two rooms in one";
-  EXPECT_THAT(offsets_of_lamps(lamps_, {other, other}), testing::SizeIs(4));
+  EXPECT_THAT(compute_offsets(lamps_, {other, other}), testing::SizeIs(4));
 }
 
 }  // namespace

@@ -20,17 +20,17 @@ using testing::SizeIs;
 class FindMapErrors : public testing::Test {
  protected:
   Random random{41};
-  SyntheticRig rig = leaning_rig(0.05, 1);
+  SyntheticRig rig = make_tilted_rig(0.05, 1);
   std::vector<Frame> frames = noisy_drive();
   LampMap map = rig.map;
 
-  Calibration camera_alone() const {
+  Calibration extract_camera() const {
     Calibration camera;
     camera.camera = rig.calibration.camera;
     return camera;
   }
   std::vector<MapError> errors() const {
-    return find_map_errors(frames, map, camera_alone()).errors;
+    return find_map_errors(frames, map, extract_camera()).errors;
   }
   std::string found() const { return describe(errors()); }
   std::vector<Frame> noisy_drive() {
@@ -94,7 +94,7 @@ TEST_F(FindMapErrors, RequiresLargerOffsetsForFewLamps) {
   use_lamps(3);
   place(0).x() += 0.05;
   EXPECT_THAT(errors(), IsEmpty());
-  rig = leaning_rig(0.05, 1);
+  rig = make_tilted_rig(0.05, 1);
   use_lamps(4);
   survey(1e-3);
   place(0).x() += 0.03;
@@ -154,7 +154,7 @@ TEST_F(FindMapErrors, DetectsMirroredMapOfLargeRoom) {
 TEST_F(FindMapErrors, KeepsFalseAlarmRateBelowLimit) {
   constexpr int maps = 400, max_alarms = 10;  // p = 0.01: 4 are expected
   for (const std::size_t lamps : {5U, 8U}) {
-    rig = leaning_rig(0.05, 1);
+    rig = make_tilted_rig(0.05, 1);
     use_lamps(lamps);
     for (const bool is_stated : {false, true}) {
       int alarms = 0;

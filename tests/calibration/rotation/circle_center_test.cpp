@@ -18,30 +18,30 @@ namespace vlp {
 namespace {
 
 /// Returns a scene with a pinhole camera, so that formulas are in pixels.
-SpotScene pinhole_scene() {
-  SpotScene scene;
+RotationScene pinhole_scene() {
+  RotationScene scene;
   scene.camera.lens_model = LensModel::pinhole;
   scene.camera.intrinsics = {520, 522, 403, 296};
   return scene;
 }
 
-SpotCaptures captures_of(const SpotScene& scene) {
-  SpotCaptures spot = spot_captures(scene.frames(), scene.map, scene.camera);
-  EXPECT_EQ(spot.status, SpotStatus::ok);
-  return spot;
+RotationCaptures find_captures(const RotationScene& scene) {
+  RotationCaptures rotation = find_rotation_captures(scene.frames(), scene.map, scene.camera);
+  EXPECT_EQ(rotation.status, RotationStatus::ok);
+  return rotation;
 }
 
 /// Returns the image point zeta - e/H of the axis of a level camera.
-Eigen::Vector2d center_of_level_camera(const SpotScene& scene) {
+Eigen::Vector2d center_of_level_camera(const RotationScene& scene) {
   const auto& f = scene.camera.intrinsics;
   const Eigen::Vector2d z = -scene.lever_arm_m / (1.6 - scene.heights_m[0]);
   return {f[2] + f[0] * z.x(), f[3] + f[1] * z.y()};
 }
 
 TEST(FitCircleCenters, ReturnsLeverArmPointOfLevelCamera) {
-  SpotScene scene;
+  RotationScene scene;
   scene.lever_arm_m = {0.05, -0.02};
-  const CircleCenters found = fit_circle_centers(captures_of(scene), scene.camera);
+  const CircleCenters found = fit_circle_centers(find_captures(scene), scene.camera);
   ASSERT_TRUE(found.mean.converged);
   EXPECT_THAT(found.mean.center.center_px, IsNear(center_of_level_camera(scene), 1e-6));
   EXPECT_LT(found.spread_px, 1e-6);
@@ -56,18 +56,18 @@ TEST(FitCircleCenters, ReturnsLeverArmPointOfLevelCamera) {
 TEST(FitCircleCenters, BiasMatchesFormulaForTiltedCamera) {
   for (const double tilt_deg : {0.5, 1.0, 2.0}) {
     SCOPED_TRACE(tilt_deg);
-    SpotScene scene = pinhole_scene();
+    RotationScene scene = pinhole_scene();
     scene.tilt_rad = rad_from_deg(tilt_deg);
     scene.axis_m = {0, 0};
     scene.captures = 72;
     scene.arc_rad = 2 * M_PI * (72 - 0.7) / 72;
     scene.only_in_image = false;
-    const SpotCaptures spot = captures_of(scene);
-    const CircleCenters found = fit_circle_centers(spot, scene.camera);
+    const RotationCaptures rotation = find_captures(scene);
+    const CircleCenters found = fit_circle_centers(rotation, scene.camera);
     ASSERT_EQ(found.circles.size(), scene.map.lamps.size());
     const double t = scene.tilt_rad;
     for (const auto& [lamp, height, fit] : found.circles) {
-      const double phi = std::atan(spot.lamps[lamp].position_m.head<2>().norm() / 1.6);
+      const double phi = std::atan(rotation.lamps[lamp].position_m.head<2>().norm() / 1.6);
       const double formula =
           std::sin(t) * std::cos(t) / (std::pow(std::cos(t), 2) - std::pow(std::sin(phi), 2));
       EXPECT_NEAR(fit.circle.center.norm() / formula, 1, 0.01) << deg_from_rad(phi);
@@ -78,23 +78,23 @@ TEST(FitCircleCenters, BiasMatchesFormulaForTiltedCamera) {
 }
 
 TEST(FitCircleCenters, RejectsOutlier) {
-  const SpotScene scene;
+  const RotationScene scene;
   std::vector<Frame> frames = scene.frames();
   frames[3].detections[2].pixel += Eigen::Vector2d(12, -9);
-  const SpotCaptures spot = spot_captures(frames, scene.map, scene.camera);
-  ASSERT_EQ(spot.status, SpotStatus::ok);
-  const CircleCenters found = fit_circle_centers(spot, scene.camera);
+  const RotationCaptures rotation = find_rotation_captures(frames, scene.map, scene.camera);
+  ASSERT_EQ(rotation.status, RotationStatus::ok);
+  const CircleCenters found = fit_circle_centers(rotation, scene.camera);
   EXPECT_THAT(found.mean.center.center_px, IsNear(center_of_level_camera(scene), 1e-6));
   ASSERT_EQ(found.mean.outliers.size(), 1U);
-  const SpotObservation& outlier = spot.sightings[found.mean.outliers[0].sighting];
-  EXPECT_EQ(spot.captures[outlier.capture].image, "3.png");
-  EXPECT_EQ(spot.lamps[outlier.lamp].id, frames[3].detections[2].lamp);
-  EXPECT_EQ(found.mean.used_sightings.size(), spot.sightings.size() - 1);
+  const RotationObservation& outlier = rotation.observations[found.mean.outliers[0].observation];
+  EXPECT_EQ(rotation.captures[outlier.capture].image, "3.png");
+  EXPECT_EQ(rotation.lamps[outlier.lamp].id, frames[3].detections[2].lamp);
+  EXPECT_EQ(found.mean.used_observations.size(), rotation.observations.size() - 1);
 }
 
 /// Returns frames of a camera at these yaws and one height, with noise of 0.3 px.
-std::vector<Frame> frames_at(SpotScene scene, const std::vector<double>& yaws_rad, double height_m,
-                             Random& random) {
+std::vector<Frame> frames_at(RotationScene scene, const std::vector<double>& yaws_rad,
+                             double height_m, Random& random) {
   scene.captures = 1;
   scene.heights_m = {height_m};
   std::vector<Frame> frames;
@@ -108,18 +108,18 @@ std::vector<Frame> frames_at(SpotScene scene, const std::vector<double>& yaws_ra
 }
 
 /// Returns captures of a level camera at these yaws, with noise of 0.3 px.
-SpotCaptures captures_at(const std::vector<double>& yaws_rad, bool noise_is_stated,
-                         Random& random) {
-  const SpotScene scene;
+RotationCaptures captures_at(const std::vector<double>& yaws_rad, bool noise_is_stated,
+                             Random& random) {
+  const RotationScene scene;
   std::vector<Frame> frames = frames_at(scene, yaws_rad, 0, random);
   for (Frame& frame : frames) {
     for (Detection& detection : frame.detections) {
       if (!noise_is_stated) detection.sigma_px.reset();
     }
   }
-  SpotCaptures spot = spot_captures(frames, scene.map, scene.camera);
-  EXPECT_EQ(spot.status, SpotStatus::ok);
-  return spot;
+  RotationCaptures rotation = find_rotation_captures(frames, scene.map, scene.camera);
+  EXPECT_EQ(rotation.status, RotationStatus::ok);
+  return rotation;
 }
 
 /// With captures at two opposite yaws, only noise makes a triangle of the positions of a lamp.
@@ -132,9 +132,9 @@ TEST(FitCircleCenters, DoesNotConvergeAtTwoOppositeYaws) {
         const double yaw_rad = random.uniform(-M_PI, M_PI);
         std::vector<double> yaws_rad;
         for (int k = 0; k < count; ++k) yaws_rad.push_back(yaw_rad + k % 2 * M_PI);
-        const SpotCaptures spot = captures_at(yaws_rad, noise_is_stated, random);
-        ASSERT_EQ(spot.status, SpotStatus::ok);
-        const CircleCenters found = fit_circle_centers(spot, SpotScene().camera);
+        const RotationCaptures rotation = captures_at(yaws_rad, noise_is_stated, random);
+        ASSERT_EQ(rotation.status, RotationStatus::ok);
+        const CircleCenters found = fit_circle_centers(rotation, RotationScene().camera);
         EXPECT_FALSE(found.mean.converged) << count << " captures, draw " << i;
         EXPECT_GT(found.undetermined, 0);
       }
@@ -146,15 +146,15 @@ TEST(FitCircleCenters, DoesNotConvergeAtTwoOppositeYaws) {
 TEST(FitCircleCenters, DoesNotConvergeAtTwoOppositeYawsWhenTilted) {
   constexpr int draws = 25;
   Random random(33);
-  const SpotScene scene = tilted_scene();
+  const RotationScene scene = tilted_scene();
   for (int i = 0; i < draws; ++i) {
     const double yaw_rad = random.uniform(-M_PI, M_PI);
     std::vector<double> yaws_rad;
     for (int k = 0; k < 12; ++k) yaws_rad.push_back(yaw_rad + k % 2 * M_PI);
-    const SpotCaptures spot =
-        spot_captures(frames_at(scene, yaws_rad, 0, random), scene.map, scene.camera);
-    ASSERT_EQ(spot.status, SpotStatus::ok);
-    EXPECT_FALSE(fit_circle_centers(spot, scene.camera).mean.converged) << "draw " << i;
+    const RotationCaptures rotation =
+        find_rotation_captures(frames_at(scene, yaws_rad, 0, random), scene.map, scene.camera);
+    ASSERT_EQ(rotation.status, RotationStatus::ok);
+    EXPECT_FALSE(fit_circle_centers(rotation, scene.camera).mean.converged) << "draw " << i;
   }
 }
 
@@ -162,7 +162,7 @@ TEST(FitCircleCenters, DoesNotConvergeAtTwoOppositeYawsWhenTilted) {
 TEST(FitCircleCenters, IgnoresHeightWithTwoOppositeYaws) {
   constexpr int draws = 25;
   Random random(34);
-  const SpotScene scene;
+  const RotationScene scene;
   for (int i = 0; i < draws; ++i) {
     const double yaw_rad = random.uniform(-M_PI, M_PI);
     std::vector<double> all, opposite;
@@ -173,10 +173,10 @@ TEST(FitCircleCenters, IgnoresHeightWithTwoOppositeYaws) {
     const std::vector<Frame> below = frames_at(scene, all, 0, random);
     std::vector<Frame> both = below;
     for (Frame& frame : frames_at(scene, opposite, 0.3, random)) both.push_back(std::move(frame));
-    const SpotCaptures spot_below = spot_captures(below, scene.map, scene.camera);
-    const SpotCaptures spot_both = spot_captures(both, scene.map, scene.camera);
-    ASSERT_EQ(spot_below.status, SpotStatus::ok);
-    ASSERT_EQ(spot_both.status, SpotStatus::ok);
+    const RotationCaptures spot_below = find_rotation_captures(below, scene.map, scene.camera);
+    const RotationCaptures spot_both = find_rotation_captures(both, scene.map, scene.camera);
+    ASSERT_EQ(spot_below.status, RotationStatus::ok);
+    ASSERT_EQ(spot_both.status, RotationStatus::ok);
     ASSERT_EQ(spot_both.heights.size(), 2U);
     const CircleCenters expected = fit_circle_centers(spot_below, scene.camera);
     const CircleCenters found = fit_circle_centers(spot_both, scene.camera);
@@ -184,7 +184,7 @@ TEST(FitCircleCenters, IgnoresHeightWithTwoOppositeYaws) {
     ASSERT_TRUE(found.mean.converged);
     EXPECT_THAT(found.mean.center.center_px, IsNear(expected.mean.center.center_px, 1e-9));
     EXPECT_EQ(found.circles.size(), expected.circles.size());
-    EXPECT_EQ(found.mean.used_sightings, expected.mean.used_sightings);
+    EXPECT_EQ(found.mean.used_observations, expected.mean.used_observations);
     EXPECT_GT(found.undetermined, 0);
   }
 }
@@ -194,21 +194,21 @@ TEST(FitCircleCenters, ConvergesWithThirdYaw) {
   Random random(32);
   for (int i = 0; i < draws; ++i) {
     const double yaw_rad = random.uniform(-M_PI, M_PI);
-    const SpotCaptures spot = captures_at(
+    const RotationCaptures rotation = captures_at(
         {yaw_rad, yaw_rad + M_PI, yaw_rad, yaw_rad + M_PI, yaw_rad + M_PI / 2, yaw_rad + M_PI / 2},
         true, random);
-    ASSERT_EQ(spot.status, SpotStatus::ok);
-    const CircleCenters found = fit_circle_centers(spot, SpotScene().camera);
+    ASSERT_EQ(rotation.status, RotationStatus::ok);
+    const CircleCenters found = fit_circle_centers(rotation, RotationScene().camera);
     ASSERT_TRUE(found.mean.converged);
     ASSERT_TRUE(found.mean.center.covariance);
-    EXPECT_THAT(found.mean.center.center_px, IsNear(center_of_level_camera(SpotScene()), 2));
+    EXPECT_THAT(found.mean.center.center_px, IsNear(center_of_level_camera(RotationScene()), 2));
   }
 }
 
 TEST(FitJointCenter, ReturnsLeverArmPointOfLevelCamera) {
-  SpotScene scene;
+  RotationScene scene;
   scene.lever_arm_m = {0.05, -0.02};
-  const RotationFit found = fit_joint_center(captures_of(scene), scene.camera);
+  const RotationFit found = fit_joint_center(find_captures(scene), scene.camera);
   ASSERT_TRUE(found.converged);
   EXPECT_THAT(found.center.center_px, IsNear(center_of_level_camera(scene), 1e-6));
   EXPECT_LT(found.residual_px, 1e-7);
@@ -216,20 +216,20 @@ TEST(FitJointCenter, ReturnsLeverArmPointOfLevelCamera) {
 }
 
 TEST(FitJointCenter, ReturnsSameCenterAtAllHeightsWithoutLeverArm) {
-  SpotScene scene;
+  RotationScene scene;
   scene.heights_m = {0, 0.3};
-  const RotationFit found = fit_joint_center(captures_of(scene), scene.camera);
+  const RotationFit found = fit_joint_center(find_captures(scene), scene.camera);
   ASSERT_TRUE(found.converged);
   EXPECT_THAT(found.center.center_px, IsNear(center_of_level_camera(scene), 1e-6));
 }
 
 TEST(FitJointCenter, RejectsOutlier) {
-  const SpotScene scene;
+  const RotationScene scene;
   std::vector<Frame> frames = scene.frames();
   frames[3].detections[2].pixel += Eigen::Vector2d(12, -9);
-  const SpotCaptures spot = spot_captures(frames, scene.map, scene.camera);
-  ASSERT_EQ(spot.status, SpotStatus::ok);
-  const RotationFit found = fit_joint_center(spot, scene.camera);
+  const RotationCaptures rotation = find_rotation_captures(frames, scene.map, scene.camera);
+  ASSERT_EQ(rotation.status, RotationStatus::ok);
+  const RotationFit found = fit_joint_center(rotation, scene.camera);
   EXPECT_THAT(found.center.center_px, IsNear(center_of_level_camera(scene), 1e-6));
   ASSERT_EQ(found.outliers.size(), 1U);
   EXPECT_NEAR(found.outliers[0].distance_px, 15, 0.3);

@@ -29,7 +29,7 @@ class PlanarScatter {
   /// Returns the ratios of observed to reported standard deviations minus one, along the axes in
   /// which the reported covariance is the unit matrix. If both are near zero, the covariances agree
   /// in size and direction.
-  Eigen::Vector2d excess() const {
+  Eigen::Vector2d relative_sd_error() const {
     const Eigen::Matrix2d found = squares_ / count_ - mean() * mean().transpose();
     const Eigen::Matrix2d root = Eigen::LLT<Eigen::Matrix2d>(reported_ / count_).matrixL();
     const Eigen::Matrix2d white = root.inverse() * found * root.inverse().transpose();
@@ -41,7 +41,7 @@ class PlanarScatter {
     return mean().array() / (reported_.diagonal().array() / count_ / count_).sqrt();
   }
   /// Returns the fraction of the estimates outside the 95 % region.
-  double share_beyond_95() const { return beyond_95_ / count_; }
+  double fraction_beyond_95() const { return beyond_95_ / count_; }
 
  private:
   Eigen::Vector2d mean() const { return sum_ / count_; }

@@ -22,41 +22,41 @@ namespace {
 constexpr int kDraws = 300;
 constexpr double kNoise_px = 0.3;
 
-RotationFit mean_circle(const SpotCaptures& spot, const Camera& camera) {
-  return fit_circle_centers(spot, camera).mean;
+RotationFit mean_circle(const RotationCaptures& rotation, const Camera& camera) {
+  return fit_circle_centers(rotation, camera).mean;
 }
 
-using Method = RotationFit (*)(const SpotCaptures&, const Camera&);
+using Method = RotationFit (*)(const RotationCaptures&, const Camera&);
 
-RotationFit drawn(const SpotScene& scene, const std::vector<Frame>& frames, Method method,
-                  Random& random, bool noise_is_stated = true) {
+RotationFit draw_fit(const RotationScene& scene, const std::vector<Frame>& frames, Method method,
+                     Random& random, bool noise_is_stated = true) {
   std::vector<Frame> noisy = with_noise(frames, random);
   for (Frame& frame : noisy) {
     for (Detection& detection : frame.detections) {
       if (!noise_is_stated) detection.sigma_px.reset();
     }
   }
-  const SpotCaptures spot = spot_captures(noisy, scene.map, scene.camera);
-  EXPECT_EQ(spot.status, SpotStatus::ok);
-  const RotationFit fit = method(spot, scene.camera);
+  const RotationCaptures rotation = find_rotation_captures(noisy, scene.map, scene.camera);
+  EXPECT_EQ(rotation.status, RotationStatus::ok);
+  const RotationFit fit = method(rotation, scene.camera);
   EXPECT_TRUE(fit.converged && fit.center.covariance);
   return fit;
 }
 
 /// 300 draws determine standard deviations to 4 %, and the fraction of 5 % outside to 1.3 %.
 void expect_consistent(const PlanarScatter& scatter) {
-  EXPECT_THAT(scatter.excess(), IsNear(Eigen::Vector2d::Zero(), 0.14));
-  EXPECT_NEAR(scatter.share_beyond_95(), 0.05, 0.04);
+  EXPECT_THAT(scatter.relative_sd_error(), IsNear(Eigen::Vector2d::Zero(), 0.14));
+  EXPECT_NEAR(scatter.fraction_beyond_95(), 0.05, 0.04);
 }
 
-void expect_consistent(const SpotScene& scene, Method method, bool unbiased) {
+void expect_consistent(const RotationScene& scene, Method method, bool unbiased) {
   Random random(7);
   const auto frames = scene.frames(kNoise_px);
-  const SpotCaptures exact = spot_captures(frames, scene.map, scene.camera);
-  ASSERT_EQ(exact.status, SpotStatus::ok);
+  const RotationCaptures exact = find_rotation_captures(frames, scene.map, scene.camera);
+  ASSERT_EQ(exact.status, RotationStatus::ok);
   PlanarScatter scatter(method(exact, scene.camera).center.center_px);
   for (int i = 0; i < kDraws; ++i) {
-    const RotationFit fit = drawn(scene, frames, method, random);
+    const RotationFit fit = draw_fit(scene, frames, method, random);
     scatter.add(fit.center.center_px, *fit.center.covariance);
   }
   expect_consistent(scatter);
@@ -65,8 +65,8 @@ void expect_consistent(const SpotScene& scene, Method method, bool unbiased) {
   }
 }
 
-SpotScene level_scene() {
-  SpotScene scene;
+RotationScene level_scene() {
+  RotationScene scene;
   scene.lever_arm_m = {0.012, -0.009};
   return scene;
 }
@@ -74,18 +74,18 @@ SpotScene level_scene() {
 /// Pinhole lens, for which the undistorted image used by `circle` is the image. 300 draws of 24
 /// degrees of freedom or more determine a standard deviation to 1 %.
 TEST(RotationFit, ResidualMatchesNoisePerAxis) {
-  SpotScene scene;  // no lever arm, which `axis` at one height cannot separate from a tilt
+  RotationScene scene;  // no lever arm, which `axis` at one height cannot separate from a tilt
   scene.camera.lens_model = LensModel::pinhole;
   scene.camera.intrinsics.resize(4);
   scene.captures = 5;           // few, so that degrees of freedom count
   scene.only_in_image = false;  // or some circle has three points
   scene.arc_rad = 5;
-  for (const Method method : {&mean_circle, &fit_joint_center, &fit_turning_axis}) {
+  for (const Method method : {&mean_circle, &fit_joint_center, &fit_rotation_axis}) {
     Random random(9);
     const auto frames = scene.frames(kNoise_px);
     double squares = 0;
     for (int i = 0; i < kDraws; ++i) {
-      const RotationFit fit = drawn(scene, frames, method, random);
+      const RotationFit fit = draw_fit(scene, frames, method, random);
       squares += fit.residual_px * fit.residual_px / kDraws;
     }
     EXPECT_NEAR(std::sqrt(squares) / kNoise_px, 1, 0.05);
@@ -109,7 +109,7 @@ class FitRotationAxisWithMapErrors : public testing::TestWithParam<TurnUnderMap>
 TEST_P(FitRotationAxisWithMapErrors, ReportsConsistentCovariances) {
   constexpr int maps = 300;
   const TurnUnderMap& turn = GetParam();
-  SpotScene scene = tilted_scene(turn.lever_arm_m, turn.heights_m);
+  RotationScene scene = tilted_scene(turn.lever_arm_m, turn.heights_m);
   scene.only_in_image = false;
   for (std::size_t i = 0; i < scene.map.lamps.size(); i += 2) {
     scene.map.lamps[i].position_m.z() += turn.step_m;
@@ -123,9 +123,10 @@ TEST_P(FitRotationAxisWithMapErrors, ReportsConsistentCovariances) {
       lamp.sd_m = turn.map_sd_m;
       for (double& coordinate : lamp.position_m) coordinate += turn.map_sd_m * random.normal();
     }
-    const SpotCaptures spot = spot_captures(with_noise(frames, random), surveyed, scene.camera);
-    ASSERT_EQ(spot.status, SpotStatus::ok);
-    const RotationFit fit = fit_turning_axis(spot, scene.camera);
+    const RotationCaptures rotation =
+        find_rotation_captures(with_noise(frames, random), surveyed, scene.camera);
+    ASSERT_EQ(rotation.status, RotationStatus::ok);
+    const RotationFit fit = fit_rotation_axis(rotation, scene.camera);
     ASSERT_TRUE(fit.converged && fit.center.covariance && fit.center.lever_arm_covariance);
     for (int axis = 0; axis < 2; ++axis) {
       const double zenith_px = fit.center.center_px[axis] - scene.truth().center_px[axis];
@@ -161,14 +162,14 @@ class RotationFitWithFewCaptures : public testing::TestWithParam<SmallTurn> {};
 
 TEST_P(RotationFitWithFewCaptures, KeepsInliersAndConsistentCovariance) {
   constexpr int runs = 400;
-  for (const Method method : {&fit_joint_center, &fit_turning_axis}) {
-    SpotScene scene = method == &fit_joint_center ? level_scene() : tilted_scene({0, 0});
+  for (const Method method : {&fit_joint_center, &fit_rotation_axis}) {
+    RotationScene scene = method == &fit_joint_center ? level_scene() : tilted_scene({0, 0});
     scene.map.lamps.resize(static_cast<std::size_t>(GetParam().lamps));
     scene.captures = GetParam().captures;
     scene.only_in_image = false;
     const auto frames = scene.frames(kNoise_px);
-    const SpotCaptures exact = spot_captures(frames, scene.map, scene.camera);
-    ASSERT_EQ(exact.status, SpotStatus::ok);
+    const RotationCaptures exact = find_rotation_captures(frames, scene.map, scene.camera);
+    ASSERT_EQ(exact.status, RotationStatus::ok);
     const Eigen::Vector2d truth = method(exact, scene.camera).center.center_px;
     const double unknowns = 2 + 2 * GetParam().lamps + GetParam().captures - 1;
     const double freedom = 2 * GetParam().lamps * GetParam().captures - unknowns;
@@ -176,7 +177,7 @@ TEST_P(RotationFitWithFewCaptures, KeepsInliersAndConsistentCovariance) {
     double distance = 0;
     int with_outliers = 0;
     for (int i = 0; i < runs; ++i) {
-      const RotationFit fit = drawn(scene, frames, method, random, false);
+      const RotationFit fit = draw_fit(scene, frames, method, random, false);
       ASSERT_TRUE(fit.center.covariance);
       const Eigen::Vector2d error = fit.center.center_px - truth;
       distance += error.dot(fit.center.covariance->inverse() * error) / runs;
@@ -202,14 +203,14 @@ INSTANTIATE_TEST_SUITE_P(RotationScatter, RotationFitWithFewCaptures,
 TEST(FitCircleCenters, KeepsInliersOfFewCaptures) {
   constexpr int runs = 200;
   for (const int captures : {8, 9, 12, 24}) {
-    SpotScene scene = level_scene();
+    RotationScene scene = level_scene();
     scene.captures = captures;
     scene.only_in_image = false;
     const auto frames = scene.frames(kNoise_px);
     Random random(12);
     int with_outliers = 0;
     for (int i = 0; i < runs; ++i) {
-      with_outliers += drawn(scene, frames, mean_circle, random, false).outliers.empty() ? 0 : 1;
+      with_outliers += draw_fit(scene, frames, mean_circle, random, false).outliers.empty() ? 0 : 1;
     }
     std::printf("%d captures: %d of %d runs with outliers\n", captures, with_outliers, runs);
     EXPECT_LE(with_outliers, runs / 100) << captures;
@@ -224,8 +225,8 @@ TEST(RotationFit, RejectsOutlierAmongFewCaptures) {
     int captures;
   };
   for (const auto& [method, captures] :
-       {Case{mean_circle, 12}, Case{fit_joint_center, 4}, Case{fit_turning_axis, 4}}) {
-    SpotScene scene = method == &fit_turning_axis ? tilted_scene({0, 0}) : level_scene();
+       {Case{mean_circle, 12}, Case{fit_joint_center, 4}, Case{fit_rotation_axis, 4}}) {
+    RotationScene scene = method == &fit_rotation_axis ? tilted_scene({0, 0}) : level_scene();
     scene.map.lamps.resize(5);
     scene.captures = captures;
     scene.only_in_image = false;
@@ -236,13 +237,14 @@ TEST(RotationFit, RejectsOutlierAmongFewCaptures) {
     Random random(12);
     int found = 0, others = 0;
     for (int i = 0; i < runs; ++i) {
-      const SpotCaptures spot = spot_captures(with_noise(frames, random), scene.map, scene.camera);
-      ASSERT_EQ(spot.status, SpotStatus::ok);
-      const RotationFit fit = method(spot, scene.camera);
-      for (const SpotOutlier& outlier : fit.outliers) {
-        const SpotObservation& at = spot.sightings[outlier.sighting];
-        const bool is_wrong = spot.captures[at.capture].image == frames[1].image &&
-                              spot.lamps[at.lamp].id == frames[1].detections[2].lamp;
+      const RotationCaptures rotation =
+          find_rotation_captures(with_noise(frames, random), scene.map, scene.camera);
+      ASSERT_EQ(rotation.status, RotationStatus::ok);
+      const RotationFit fit = method(rotation, scene.camera);
+      for (const RotationOutlier& outlier : fit.outliers) {
+        const RotationObservation& at = rotation.observations[outlier.observation];
+        const bool is_wrong = rotation.captures[at.capture].image == frames[1].image &&
+                              rotation.lamps[at.lamp].id == frames[1].detections[2].lamp;
         ++(is_wrong ? found : others);
       }
     }
@@ -261,31 +263,31 @@ TEST(FitJointCenter, CovarianceMatchesScatter) {
 }
 
 TEST(FitRotationAxis, CovarianceMatchesScatter) {
-  expect_consistent(tilted_scene({0, 0}), fit_turning_axis, true);
+  expect_consistent(tilted_scene({0, 0}), fit_rotation_axis, true);
 }
 
 TEST(FitRotationAxis, CovarianceMatchesScatterForHalfRotation) {
-  SpotScene scene = tilted_scene({0, 0});
+  RotationScene scene = tilted_scene({0, 0});
   scene.arc_rad = 3;
-  expect_consistent(scene, fit_turning_axis, true);
+  expect_consistent(scene, fit_rotation_axis, true);
 }
 
 TEST(FitRotationAxis, CovarianceMatchesScatterForTwoLamps) {
-  SpotScene scene = tilted_scene({0, 0});
+  RotationScene scene = tilted_scene({0, 0});
   scene.map.lamps.resize(2);
   scene.map.lamps[1].position_m = {0.5, 0.4, 1.6};
-  expect_consistent(scene, fit_turning_axis, true);
+  expect_consistent(scene, fit_rotation_axis, true);
 }
 
 TEST(FitRotationAxis, CovariancesMatchScatterForTwoHeights) {
-  SpotScene scene = tilted_scene({0, 0});
+  RotationScene scene = tilted_scene({0, 0});
   scene.heights_m = {0, 0.3};
   scene.lever_arm_m = {0.012, -0.009};
   Random random(8);
   const auto frames = scene.frames(kNoise_px);
   PlanarScatter center(scene.truth().center_px), lever_arm(scene.lever_arm_m);
   for (int i = 0; i < kDraws; ++i) {
-    const RotationFit fit = drawn(scene, frames, fit_turning_axis, random);
+    const RotationFit fit = draw_fit(scene, frames, fit_rotation_axis, random);
     ASSERT_TRUE(fit.center.lever_arm_covariance);
     center.add(fit.center.center_px, *fit.center.covariance);
     lever_arm.add(*fit.center.lever_arm_m, *fit.center.lever_arm_covariance);

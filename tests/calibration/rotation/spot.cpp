@@ -11,7 +11,7 @@
 
 namespace vlp {
 
-std::vector<Frame> SpotScene::frames(double sigma_px) const {
+std::vector<Frame> RotationScene::frames(double sigma_px) const {
   std::vector<Frame> frames;
   for (std::size_t height = 0; height < heights_m.size(); ++height) {
     for (int k = 0; k < captures; ++k) {
@@ -37,18 +37,20 @@ std::vector<Frame> SpotScene::frames(double sigma_px) const {
   return frames;
 }
 
-SpotScene tilted_scene(const Eigen::Vector2d& lever_arm_m, const std::vector<double>& heights_m) {
-  SpotScene scene;
+RotationScene tilted_scene(const Eigen::Vector2d& lever_arm_m,
+                           const std::vector<double>& heights_m) {
+  RotationScene scene;
   scene.tilt_rad = rad_from_deg(1.5);
   scene.lever_arm_m = lever_arm_m;
   scene.heights_m = heights_m;
   return scene;
 }
 
-RotationFit fit_of(const SpotScene& scene, const std::vector<Frame>& frames) {
-  const SpotCaptures spot = spot_captures(frames, scene.map, scene.camera);
-  EXPECT_EQ(spot.status, SpotStatus::ok) << explanation_of(spot.status);
-  return spot.status == SpotStatus::ok ? fit_turning_axis(spot, scene.camera) : RotationFit();
+RotationFit fit_axis(const RotationScene& scene, const std::vector<Frame>& frames) {
+  const RotationCaptures rotation = find_rotation_captures(frames, scene.map, scene.camera);
+  EXPECT_EQ(rotation.status, RotationStatus::ok) << describe(rotation.status);
+  return rotation.status == RotationStatus::ok ? fit_rotation_axis(rotation, scene.camera)
+                                               : RotationFit();
 }
 
 std::vector<Frame> with_noise(std::vector<Frame> frames, Random& random) {

@@ -11,7 +11,7 @@
 namespace vlp {
 
 /// Simulated camera that rotates in place.
-struct SpotScene {
+struct RotationScene {
   LampMap map = synthetic_lamps();
   Camera camera = synthetic_camera();
   double tilt_rad = 0;
@@ -32,11 +32,11 @@ struct SpotScene {
 };
 
 /// Returns a scene with a tilt of 1.5 degrees.
-SpotScene tilted_scene(const Eigen::Vector2d& lever_arm_m = {0.012, -0.009},
-                       const std::vector<double>& heights_m = {0});
+RotationScene tilted_scene(const Eigen::Vector2d& lever_arm_m = {0.012, -0.009},
+                           const std::vector<double>& heights_m = {0});
 
 /// Returns the fitted axis; fails the test if the captures are rejected.
-RotationFit fit_of(const SpotScene& scene, const std::vector<Frame>& frames);
+RotationFit fit_axis(const RotationScene& scene, const std::vector<Frame>& frames);
 
 /// Returns the frames with noise according to sigma_px.
 std::vector<Frame> with_noise(std::vector<Frame> frames, Random& random);

@@ -14,7 +14,7 @@
 namespace vlp {
 namespace {
 
-void expect_axis(const RotationFit& found, const SpotScene& scene, double within_deg) {
+void expect_axis(const RotationFit& found, const RotationScene& scene, double within_deg) {
   ASSERT_TRUE(found.converged);
   EXPECT_LT(
       deg_from_rad(angle_between(found.center.zenith_in_camera, scene.truth().zenith_in_camera)),
@@ -22,60 +22,60 @@ void expect_axis(const RotationFit& found, const SpotScene& scene, double within
 }
 
 TEST(FindRotationCaptures, EstimatesHeightsYawsAndAxes) {
-  const SpotScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
-  const SpotCaptures spot = spot_captures(scene.frames(), scene.map, scene.camera);
-  ASSERT_EQ(spot.status, SpotStatus::ok);
-  ASSERT_EQ(spot.captures.size(), 24U);
-  ASSERT_EQ(spot.heights.size(), 2U);
+  const RotationScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
+  const RotationCaptures rotation = find_rotation_captures(scene.frames(), scene.map, scene.camera);
+  ASSERT_EQ(rotation.status, RotationStatus::ok);
+  ASSERT_EQ(rotation.captures.size(), 24U);
+  ASSERT_EQ(rotation.heights.size(), 2U);
   for (std::size_t i = 0; i < 2; ++i) {
-    EXPECT_NEAR(spot.heights[i].z_m, scene.heights_m[i], 1e-3);
-    EXPECT_THAT(spot.heights[i].axis_m, IsNear(scene.axis_m, 1e-3));
-    EXPECT_EQ(spot.heights[i].captures, 12);
-    EXPECT_GT(deg_from_rad(spot.heights[i].arc_rad), 300);
+    EXPECT_NEAR(rotation.heights[i].z_m, scene.heights_m[i], 1e-3);
+    EXPECT_THAT(rotation.heights[i].axis_m, IsNear(scene.axis_m, 1e-3));
+    EXPECT_EQ(rotation.heights[i].captures, 12);
+    EXPECT_GT(deg_from_rad(rotation.heights[i].arc_rad), 300);
   }
-  EXPECT_EQ(spot.captures[0].height, 0U);
-  EXPECT_EQ(spot.captures[23].height, 1U);
-  EXPECT_NEAR(spot.captures[0].yaw_rad, scene.first_rad, 1e-3);
-  EXPECT_THAT(spot.lever_arm_m, IsNear(scene.lever_arm_m, 1e-4));
-  EXPECT_TRUE(spot.left_out.empty());
+  EXPECT_EQ(rotation.captures[0].height, 0U);
+  EXPECT_EQ(rotation.captures[23].height, 1U);
+  EXPECT_NEAR(rotation.captures[0].yaw_rad, scene.first_rad, 1e-3);
+  EXPECT_THAT(rotation.lever_arm_m, IsNear(scene.lever_arm_m, 1e-4));
+  EXPECT_TRUE(rotation.rejected.empty());
 }
 
 TEST(FindRotationCaptures, AcceptsTwoLampsAndThreeCaptures) {
-  SpotScene scene;
+  RotationScene scene;
   scene.tilt_rad = rad_from_deg(10);
-  scene.map = lamp_map_of({{-0.3, -0.35, 1.6}, {0.5, 0.2, 1.6}});
+  scene.map = make_lamp_map({{-0.3, -0.35, 1.6}, {0.5, 0.2, 1.6}});
   scene.captures = 3;
   scene.arc_rad = 4;
-  expect_axis(fit_of(scene, scene.frames()), scene, 1e-6);
+  expect_axis(fit_axis(scene, scene.frames()), scene, 1e-6);
 }
 
 TEST(FindRotationCaptures, AcceptsLampsAtSeveralHeights) {
-  SpotScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
+  RotationScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
   scene.map =
-      lamp_map_of({{-0.5, -0.35, 1.6}, {0.5, 0.2, 1.4}, {-0.4, 0.3, 1.8}, {0.1, -0.4, 1.5}});
-  expect_axis(fit_of(scene, scene.frames()), scene, 1e-6);
+      make_lamp_map({{-0.5, -0.35, 1.6}, {0.5, 0.2, 1.4}, {-0.4, 0.3, 1.8}, {0.1, -0.4, 1.5}});
+  expect_axis(fit_axis(scene, scene.frames()), scene, 1e-6);
 }
 
 TEST(FindRotationCaptures, AcceptsQuarterRotation) {
-  SpotScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
+  RotationScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
   scene.arc_rad = rad_from_deg(105);  // minus the uneven steps at the ends
-  expect_axis(fit_of(scene, scene.frames()), scene, 1e-6);
+  expect_axis(fit_axis(scene, scene.frames()), scene, 1e-6);
 }
 
 TEST(FindRotationCaptures, RejectsHeightWithTooFewCaptures) {
-  const SpotScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
+  const RotationScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
   auto frames = scene.frames();
   frames.resize(14);
-  const SpotCaptures spot = spot_captures(frames, scene.map, scene.camera);
-  ASSERT_EQ(spot.status, SpotStatus::ok);
-  EXPECT_EQ(spot.heights.size(), 1U);
-  ASSERT_EQ(spot.left_out.size(), 2U);
-  EXPECT_EQ(spot.left_out[1].image, "13.png");
+  const RotationCaptures rotation = find_rotation_captures(frames, scene.map, scene.camera);
+  ASSERT_EQ(rotation.status, RotationStatus::ok);
+  EXPECT_EQ(rotation.heights.size(), 1U);
+  ASSERT_EQ(rotation.rejected.size(), 2U);
+  EXPECT_EQ(rotation.rejected[1].image, "13.png");
 }
 
 /// One third of the captures with a large error of one lamp and the noise of a poor detector.
 TEST(FitRotationAxis, RejectsOutliers) {
-  const SpotScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
+  const RotationScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
   Random random(5);
   auto frames = with_noise(scene.frames(0.05), random);
   std::vector<std::pair<std::string, int>> wrong;
@@ -84,37 +84,38 @@ TEST(FitRotationAxis, RejectsOutliers) {
     one.pixel += Eigen::Vector2d(random.uniform(2, 60), random.uniform(-60, -2));
     wrong.emplace_back(frames[i].image, one.lamp);
   }
-  const SpotCaptures spot = spot_captures(frames, scene.map, scene.camera);
-  ASSERT_EQ(spot.status, SpotStatus::ok);
-  EXPECT_TRUE(spot.left_out.empty());
-  const RotationFit found = fit_turning_axis(spot, scene.camera);
+  const RotationCaptures rotation = find_rotation_captures(frames, scene.map, scene.camera);
+  ASSERT_EQ(rotation.status, RotationStatus::ok);
+  EXPECT_TRUE(rotation.rejected.empty());
+  const RotationFit found = fit_rotation_axis(rotation, scene.camera);
   expect_axis(found, scene, 0.01);
   std::vector<std::pair<std::string, int>> named;
   for (const auto& outlier : found.outliers) {
-    const SpotObservation& sighting = spot.sightings[outlier.sighting];
-    named.emplace_back(spot.captures[sighting.capture].image, spot.lamps[sighting.lamp].id);
+    const RotationObservation& observation = rotation.observations[outlier.observation];
+    named.emplace_back(rotation.captures[observation.capture].image,
+                       rotation.lamps[observation.lamp].id);
   }
   EXPECT_THAT(named, testing::IsSupersetOf(wrong));
   EXPECT_LE(named.size(), wrong.size() + 1);
 }
 
 TEST(FindRotationCaptures, RejectsCaptureWithMisidentifiedLamp) {
-  SpotScene scene;
+  RotationScene scene;
   scene.tilt_rad = rad_from_deg(1.5);
-  scene.map = lamp_map_of({{-0.3, -0.35, 1.6}, {0.5, 0.2, 1.6}, {0.1, 0.4, 1.6}});
+  scene.map = make_lamp_map({{-0.3, -0.35, 1.6}, {0.5, 0.2, 1.6}, {0.1, 0.4, 1.6}});
   auto frames = scene.frames();
   for (Frame& frame : frames) frame.detections.resize(2);
   frames[4].detections[1].lamp = 3;
-  const SpotCaptures spot = spot_captures(frames, scene.map, scene.camera);
-  ASSERT_EQ(spot.status, SpotStatus::ok);
-  ASSERT_EQ(spot.left_out.size(), 1U);
-  EXPECT_EQ(spot.left_out[0].image, "4.png");
-  expect_axis(fit_turning_axis(spot, scene.camera), scene, 1e-6);
+  const RotationCaptures rotation = find_rotation_captures(frames, scene.map, scene.camera);
+  ASSERT_EQ(rotation.status, RotationStatus::ok);
+  ASSERT_EQ(rotation.rejected.size(), 1U);
+  EXPECT_EQ(rotation.rejected[0].image, "4.png");
+  expect_axis(fit_rotation_axis(rotation, scene.camera), scene, 1e-6);
 }
 
 /// The fit uses the heights of the map, but not its horizontal positions.
 TEST(FitRotationAxis, ToleratesHorizontalMapErrors) {
-  SpotScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
+  RotationScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
   scene.arc_rad = 2.5;
   const auto frames = scene.frames();
   Random random(6);
@@ -122,7 +123,7 @@ TEST(FitRotationAxis, ToleratesHorizontalMapErrors) {
     lamp.position_m.head<2>() +=
         Eigen::Vector2d(random.uniform(-5e-3, 5e-3), random.uniform(-5e-3, 5e-3));
   }
-  expect_axis(fit_of(scene, frames), scene, 0.01);
+  expect_axis(fit_axis(scene, frames), scene, 0.01);
 }
 
 }  // namespace

@@ -17,28 +17,28 @@ constexpr int kSeeds = 20;
 
 /// Returns a scene with a ceiling of 2.6 m, where 10 cm are less than 4 % of the distance from the
 /// lamps.
-SpotScene high_scene() {
-  SpotScene scene = tilted_scene();
+RotationScene high_scene() {
+  RotationScene scene = tilted_scene();
   for (Lamp& lamp : scene.map.lamps) lamp.position_m *= 2.6 / 1.6;
   return scene;
 }
 
-SpotCaptures captures_of(const SpotScene& scene, const std::vector<Frame>& frames) {
-  SpotCaptures spot = spot_captures(frames, scene.map, scene.camera);
-  EXPECT_EQ(spot.status, SpotStatus::ok) << explanation_of(spot.status);
-  return spot;
+RotationCaptures find_captures(const RotationScene& scene, const std::vector<Frame>& frames) {
+  RotationCaptures rotation = find_rotation_captures(frames, scene.map, scene.camera);
+  EXPECT_EQ(rotation.status, RotationStatus::ok) << describe(rotation.status);
+  return rotation;
 }
 
 TEST(FindRotationCaptures, SeparatesHeightsTenCentimetersApart) {
-  SpotScene scene = high_scene();
+  RotationScene scene = high_scene();
   scene.heights_m = {0, 0.1};
   for (int seed = 0; seed < kSeeds; ++seed) {
     SCOPED_TRACE(seed);
     Random random(static_cast<unsigned>(seed));
-    const SpotCaptures spot = captures_of(scene, with_noise(scene.frames(0.1), random));
-    ASSERT_EQ(spot.heights.size(), 2U);
-    EXPECT_EQ(spot.captures.size(), 24U);
-    const RotationFit found = fit_turning_axis(spot, scene.camera);
+    const RotationCaptures rotation = find_captures(scene, with_noise(scene.frames(0.1), random));
+    ASSERT_EQ(rotation.heights.size(), 2U);
+    EXPECT_EQ(rotation.captures.size(), 24U);
+    const RotationFit found = fit_rotation_axis(rotation, scene.camera);
     ASSERT_TRUE(found.converged && found.center.covariance);
     const auto sd_rad = axis_sd_rad(found.center, scene.camera);
     EXPECT_LT(*sd_rad, rad_from_deg(0.1));
@@ -49,39 +49,39 @@ TEST(FindRotationCaptures, SeparatesHeightsTenCentimetersApart) {
 }
 
 TEST(FindRotationCaptures, SeparatesFourHeights) {
-  SpotScene scene = high_scene();
+  RotationScene scene = high_scene();
   scene.heights_m = {0, 0.05, 0.15, 0.2};
   for (int seed = 0; seed < kSeeds; ++seed) {
     SCOPED_TRACE(seed);
     Random random(static_cast<unsigned>(seed));
-    const SpotCaptures spot = captures_of(scene, with_noise(scene.frames(0.1), random));
-    EXPECT_EQ(spot.heights.size(), 4U);
-    EXPECT_TRUE(spot.left_out.empty());
+    const RotationCaptures rotation = find_captures(scene, with_noise(scene.frames(0.1), random));
+    EXPECT_EQ(rotation.heights.size(), 4U);
+    EXPECT_TRUE(rotation.rejected.empty());
   }
 }
 
 /// Noise of 1 px causes height errors of 1 % of the distance for fixes of two lamps.
 TEST(FindRotationCaptures, KeepsOneHeightUnderNoise) {
   for (const std::size_t lamps : {std::size_t{2}, std::size_t{8}}) {
-    SpotScene scene = tilted_scene();
+    RotationScene scene = tilted_scene();
     scene.map.lamps.resize(lamps);
-    if (lamps == 2) scene.map = lamp_map_of({{-0.3, -0.25, 1.6}, {0.2, 0.2, 1.6}});
+    if (lamps == 2) scene.map = make_lamp_map({{-0.3, -0.25, 1.6}, {0.2, 0.2, 1.6}});
     scene.captures = 24;
     for (int seed = 0; seed < kSeeds; ++seed) {
       SCOPED_TRACE(testing::Message() << lamps << " lamps, seed " << seed);
       Random random(static_cast<unsigned>(seed));
-      const SpotCaptures spot = captures_of(scene, with_noise(scene.frames(1), random));
-      EXPECT_EQ(spot.heights.size(), 1U);
-      EXPECT_GE(spot.captures.size(), 23U);
+      const RotationCaptures rotation = find_captures(scene, with_noise(scene.frames(1), random));
+      EXPECT_EQ(rotation.heights.size(), 1U);
+      EXPECT_GE(rotation.captures.size(), 23U);
     }
   }
 }
 
 TEST(FitRotationAxis, EstimatesLeverArmFromLampsAtSeveralHeights) {
-  SpotScene scene = tilted_scene();
+  RotationScene scene = tilted_scene();
   scene.map =
-      lamp_map_of({{-0.5, -0.35, 1.6}, {0.5, 0.2, 1.4}, {-0.4, 0.3, 1.8}, {0.1, -0.4, 1.5}});
-  const RotationFit exact = fit_turning_axis(captures_of(scene, scene.frames()), scene.camera);
+      make_lamp_map({{-0.5, -0.35, 1.6}, {0.5, 0.2, 1.4}, {-0.4, 0.3, 1.8}, {0.1, -0.4, 1.5}});
+  const RotationFit exact = fit_rotation_axis(find_captures(scene, scene.frames()), scene.camera);
   ASSERT_TRUE(exact.converged && exact.center.lever_arm_m);
   EXPECT_LT(angle_between(exact.center.zenith_in_camera, scene.truth().zenith_in_camera),
             rad_from_deg(1e-6));
@@ -90,21 +90,21 @@ TEST(FitRotationAxis, EstimatesLeverArmFromLampsAtSeveralHeights) {
 
 /// Lamps whose heights differ by 2 mm determine a lever arm of 15 mm only to several centimeters.
 TEST(FitRotationAxis, OmitsLeverArmForLampsAtNearlyOneHeight) {
-  SpotScene scene = tilted_scene();
+  RotationScene scene = tilted_scene();
   for (std::size_t i = 0; i < scene.map.lamps.size(); i += 2) {
     scene.map.lamps[i].position_m.z() += 0.002;
   }
   Random random(1);
-  const SpotCaptures spot = captures_of(scene, with_noise(scene.frames(0.3), random));
-  const RotationFit found = fit_turning_axis(spot, scene.camera);
+  const RotationCaptures rotation = find_captures(scene, with_noise(scene.frames(0.3), random));
+  const RotationFit found = fit_rotation_axis(rotation, scene.camera);
   ASSERT_TRUE(found.converged);
   EXPECT_FALSE(found.center.lever_arm_m);
 }
 
 /// With a lever arm and a single height, fixes are those of the axis at that height.
 TEST(FitRotationAxis, YieldsFixesOfAxisAtOneHeight) {
-  const SpotScene scene = tilted_scene();
-  const RotationFit found = fit_turning_axis(captures_of(scene, scene.frames()), scene.camera);
+  const RotationScene scene = tilted_scene();
+  const RotationFit found = fit_rotation_axis(find_captures(scene, scene.frames()), scene.camera);
   ASSERT_TRUE(found.converged);
   EXPECT_FALSE(found.center.lever_arm_m);
   Calibration calibration;

@@ -15,8 +15,8 @@ namespace {
 
 constexpr double kExact_rad = rad_from_deg(1e-6);
 
-void expect_exact(const SpotScene& scene) {
-  const RotationFit found = fit_of(scene, scene.frames());
+void expect_exact(const RotationScene& scene) {
+  const RotationFit found = fit_axis(scene, scene.frames());
   ASSERT_TRUE(found.converged);
   EXPECT_LT(angle_between(found.center.zenith_in_camera, scene.truth().zenith_in_camera),
             kExact_rad);
@@ -32,20 +32,21 @@ void expect_exact(const SpotScene& scene) {
 TEST(FitRotationAxis, ReturnsExactAxisAtOneHeightWithoutLeverArm) {
   for (const double tilt_deg : {0.0, 0.5, 2.0, 5.0, 10.0}) {
     SCOPED_TRACE(tilt_deg);
-    SpotScene scene;
+    RotationScene scene;
     scene.tilt_rad = rad_from_deg(tilt_deg);
     expect_exact(scene);
   }
 }
 
 TEST(FitRotationAxis, RejectsCapturesAboutTwoAxes) {
-  SpotScene scene, elsewhere;
+  RotationScene scene, elsewhere;
   elsewhere.axis_m.x() += 0.07;
   auto frames = scene.frames(0.1);
   const auto others = elsewhere.frames(0.1);
   for (std::size_t i = 0; i < frames.size(); i += 2) frames[i].detections = others[i].detections;
-  const SpotCaptures spot = spot_captures(frames, scene.map, scene.camera);
-  EXPECT_TRUE(spot.status != SpotStatus::ok || !fit_turning_axis(spot, scene.camera).converged);
+  const RotationCaptures rotation = find_rotation_captures(frames, scene.map, scene.camera);
+  EXPECT_TRUE(rotation.status != RotationStatus::ok ||
+              !fit_rotation_axis(rotation, scene.camera).converged);
 }
 
 TEST(FitRotationAxis, ReturnsExactLeverArmAtTwoHeights) {
@@ -54,7 +55,7 @@ TEST(FitRotationAxis, ReturnsExactLeverArmAtTwoHeights) {
          {Eigen::Vector2d(0, 0), Eigen::Vector2d(0.002, -0.001), Eigen::Vector2d(0.012, -0.009),
           Eigen::Vector2d(-0.1, 0.05), Eigen::Vector2d(0.2, 0.3)}) {
       SCOPED_TRACE(testing::Message() << tilt_deg << " deg, " << lever_arm_m.transpose());
-      SpotScene scene;
+      RotationScene scene;
       scene.tilt_rad = rad_from_deg(tilt_deg);
       scene.lever_arm_m = lever_arm_m;
       scene.heights_m = {0, 0.3};
@@ -68,7 +69,7 @@ TEST(FitRotationAxis, ConvergesForRandomScenes) {
   Random random(11);
   for (int i = 0; i < 150; ++i) {
     SCOPED_TRACE(i);
-    SpotScene scene;
+    RotationScene scene;
     scene.tilt_rad = rad_from_deg(random.uniform(0, 10));
     scene.azimuth_rad = random.uniform(-3, 3);
     scene.axis_m = {random.uniform(-0.1, 0.1), random.uniform(-0.1, 0.1)};
@@ -87,7 +88,7 @@ TEST(FitRotationAxis, ConvergesForRandomScenes) {
       });
       if (apart) lamps_m.push_back(at_m);
     }
-    scene.map = lamp_map_of(lamps_m);
+    scene.map = make_lamp_map(lamps_m);
     scene.only_in_image = false;
     scene.captures = 3 + static_cast<int>(random.index(20));
     scene.arc_rad = random.uniform(2.2, 6);

@@ -64,7 +64,7 @@ struct Functions {
   decltype(&level_from_inclination) from_inclination = &level_from_inclination;
   decltype(&level_from_zenith) from_zenith = &level_from_zenith;
   decltype(&level_from_world) from_world = &level_from_world;
-  std::string_view (*name_of_lens)(LensModel) = &name_of;
+  std::string_view (*name_of_lens)(LensModel) = &to_string;
   FromName* lens_from_name = &lens_model_from_name;
   decltype(&lens_model_names) lens_names = &lens_model_names;
   decltype(&parameter_count) parameters = &parameter_count;
@@ -77,8 +77,8 @@ struct Functions {
   decltype(&read_calibration) read = &read_calibration;
   decltype(&write_calibration) write = &write_calibration;
   decltype(&level_from_camera) from_camera = &level_from_camera;
-  std::string_view (*name_of_status)(FixStatus) = &name_of;
-  decltype(&explanation_of) explanation = &explanation_of;
+  std::string_view (*name_of_status)(FixStatus) = &to_string;
+  decltype(&describe) explanation = &describe;
   Fix (Positioner::*locate)(Seen, const Sensors&) const noexcept = &Positioner::locate;
   Fix (Positioner::*locate_together)(
       Seen, const Sensors&, std::span<const EarlierFrame>) const noexcept = &Positioner::locate;

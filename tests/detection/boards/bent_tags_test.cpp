@@ -55,15 +55,15 @@ TEST(BoardDetector, RefinesCornersOfCurvedTags) {
   const BoardDetector detector(scene.board->print);
   Errors of_long, of_others;
   for (std::size_t index = 0; index < 6; ++index) {
-    const BoardShot shot = board_shot(scene, views, index);
+    const BoardShot shot = make_board_shot(scene, views, index);
     std::map<int, Corners> truth;
     std::map<int, int> seen_corners;
-    for (const auto& [tag, corner, pixel] : true_corners(scene, renderer, shot)) {
+    for (const auto& [tag, corner, pixel] : find_true_corners(scene, renderer, shot)) {
       truth[*tag][static_cast<std::size_t>(corner)] = pixel;
       ++seen_corners[*tag];
     }
     const cv::Mat image = expose(scene.sensor, renderer.board_electrons(shot), 1);
-    for (const SeenTag& tag : detector.detect(image).tags) {
+    for (const TagDetection& tag : detector.detect(image).tags) {
       if (seen_corners[tag.id] < 4) continue;
       Errors& errors = longest_px(truth[tag.id]) > long_px ? of_long : of_others;
       ++errors.tags;

@@ -30,10 +30,10 @@ TEST(BlurredStep, DerivativesMatchDifferenceQuotients) {
       const BlurredStep step(distance_px, Blur(blur_px));
       const double by_distance = BlurredStep(distance_px + h, Blur(blur_px)).value -
                                  BlurredStep(distance_px - h, Blur(blur_px)).value;
-      const double by_blur = BlurredStep(distance_px, Blur(blur_px + h)).value -
-                             BlurredStep(distance_px, Blur(blur_px - h)).value;
+      const double d_value_d_blur = BlurredStep(distance_px, Blur(blur_px + h)).value -
+                                    BlurredStep(distance_px, Blur(blur_px - h)).value;
       EXPECT_NEAR(step.slope, by_distance / (2 * h), 1e-8);
-      EXPECT_NEAR(step.by_blur, by_blur / (2 * h), 1e-8);
+      EXPECT_NEAR(step.d_value_d_blur, d_value_d_blur / (2 * h), 1e-8);
     }
   }
 }
@@ -51,7 +51,7 @@ TEST(BlurredStep, KurtosisDerivativeMatchesIntegralOfGramCharlierTerm) {
       }
       integral *= end / intervals / std::sqrt(2 * std::numbers::pi);
       const BlurredStep step(distance_px, Blur(blur_px));
-      EXPECT_NEAR(step.by_kurtosis, 2 * integral, 1e-6) << distance_px << ", " << blur_px;
+      EXPECT_NEAR(step.d_value_d_kurtosis, 2 * integral, 1e-6) << distance_px << ", " << blur_px;
     }
   }
 }

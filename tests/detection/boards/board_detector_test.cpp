@@ -28,7 +28,7 @@ class BoardDetectorOnRenderedBoard : public testing::TestWithParam<const char*> 
   const Board board = read_board(rig / "board.yaml");
   const cv::Mat image = read_image(rig / "sample-boards/0000.png");
 
-  std::map<int, std::array<Eigen::Vector2d, 4>> true_corners() const {
+  std::map<int, std::array<Eigen::Vector2d, 4>> find_true_corners() const {
     const CsvTable table(rig / "sample-boards/true_corners.csv");
     std::map<int, std::array<Eigen::Vector2d, 4>> corners;
     for (std::size_t row = 0; row < static_cast<std::size_t>(table.rows()); ++row) {
@@ -40,10 +40,10 @@ class BoardDetectorOnRenderedBoard : public testing::TestWithParam<const char*> 
     return corners;
   }
   /// Root of the mean square per axis, with every tag where the truth has it.
-  double rms_px(const SeenBoard& seen) const {
-    const auto truth = true_corners();
+  double rms_px(const BoardDetection& seen) const {
+    const auto truth = find_true_corners();
     double squares = 0;
-    for (const SeenTag& tag : seen.tags) {
+    for (const TagDetection& tag : seen.tags) {
       for (std::size_t k = 0; k < 4; ++k) {
         squares += (tag.corners_px[k] - truth.at(tag.id)[k]).squaredNorm();
       }
@@ -53,8 +53,8 @@ class BoardDetectorOnRenderedBoard : public testing::TestWithParam<const char*> 
 };
 
 TEST_P(BoardDetectorOnRenderedBoard, DetectsAllTagsWithAccurateCorners) {
-  const SeenBoard seen = BoardDetector(board).detect(image);
-  EXPECT_EQ(seen.tags.size(), true_corners().size());
+  const BoardDetection seen = BoardDetector(board).detect(image);
+  EXPECT_EQ(seen.tags.size(), find_true_corners().size());
   EXPECT_TRUE(seen.foreign.empty());
   EXPECT_EQ(seen.unusable, 0);
   EXPECT_LT(rms_px(seen), 0.03);  // 0.019 and 0.013 over all views; 0.5 with the origin wrong
@@ -63,24 +63,24 @@ TEST_P(BoardDetectorOnRenderedBoard, DetectsAllTagsWithAccurateCorners) {
 TEST_P(BoardDetectorOnRenderedBoard, DetectsTagsIn16BitImage) {
   cv::Mat deep;
   image.convertTo(deep, CV_16U, 16);  // as a camera of 12 bits has it
-  const SeenBoard seen = BoardDetector(board).detect(deep);
-  EXPECT_EQ(seen.tags.size(), true_corners().size());
+  const BoardDetection seen = BoardDetector(board).detect(deep);
+  EXPECT_EQ(seen.tags.size(), find_true_corners().size());
   EXPECT_LT(rms_px(seen), 0.03);
 }
 
 TEST_P(BoardDetectorOnRenderedBoard, KeepsWholeTagsOfTruncatedBoard) {
   const cv::Mat part = image(cv::Rect(0, 0, image.cols / 2, image.rows)).clone();
-  const SeenBoard seen = BoardDetector(board).detect(part);
+  const BoardDetection seen = BoardDetector(board).detect(part);
   EXPECT_GT(seen.tags.size(), 3U);
-  EXPECT_LT(seen.tags.size(), true_corners().size());
+  EXPECT_LT(seen.tags.size(), find_true_corners().size());
   EXPECT_LT(rms_px(seen), 0.03);
 }
 
 TEST_P(BoardDetectorOnRenderedBoard, ReturnsSameCornersForUpsideDownImage) {
   cv::Mat turned;
   cv::rotate(image, turned, cv::ROTATE_180);
-  const SeenBoard upright = BoardDetector(board).detect(image);
-  const SeenBoard upside_down = BoardDetector(board).detect(turned);
+  const BoardDetection upright = BoardDetector(board).detect(image);
+  const BoardDetection upside_down = BoardDetector(board).detect(turned);
   ASSERT_EQ(upside_down.tags.size(), upright.tags.size());
   const Eigen::Vector2d last(image.cols - 1, image.rows - 1);
   for (std::size_t i = 0; i < upright.tags.size(); ++i) {
@@ -95,7 +95,7 @@ TEST_P(BoardDetectorOnRenderedBoard, ReturnsSameCornersForUpsideDownImage) {
 TEST_P(BoardDetectorOnRenderedBoard, ReportsTagsWithOtherIdsAsForeign) {
   Board other = board;
   other.first_id = 100;
-  const SeenBoard seen = BoardDetector(other).detect(image);
+  const BoardDetection seen = BoardDetector(other).detect(image);
   EXPECT_TRUE(seen.tags.empty());
   EXPECT_GT(seen.foreign.size(), 10U);
 }
@@ -103,7 +103,7 @@ TEST_P(BoardDetectorOnRenderedBoard, ReportsTagsWithOtherIdsAsForeign) {
 TEST_P(BoardDetectorOnRenderedBoard, RejectsTagsDetectedTwice) {
   cv::Mat twice;
   cv::hconcat(image, image, twice);
-  const SeenBoard seen = BoardDetector(board).detect(twice);
+  const BoardDetection seen = BoardDetector(board).detect(twice);
   EXPECT_TRUE(seen.tags.empty()) << seen.tags.size();
   EXPECT_GT(seen.unusable, 20);
 }

@@ -19,54 +19,54 @@ double blur_px(const Eigen::Vector2d& at_px, const Eigen::Vector2d& along) {
 }
 
 /// Creates samples of this blur with a relative standard deviation in addition to the noise.
-std::vector<EdgeFigure> figures(int count, double apart, double noise = 0.02) {
+std::vector<EdgeSample> make_samples(int count, double excess_sd, double noise = 0.02) {
   Random random(5);
-  std::vector<EdgeFigure> all;
+  std::vector<EdgeSample> all;
   for (int i = 0; i < count; ++i) {
     const double u = random.uniform(50, 750), v = random.uniform(50, 550);
     const double angle = random.uniform(0, 3);
     const Eigen::Vector2d at(u, v), along(std::cos(angle), std::sin(angle));
-    const double off = apart * random.normal() + noise * random.normal();
+    const double off = excess_sd * random.normal() + noise * random.normal();
     all.push_back({at, along, blur_px(at, along) * std::exp(off), noise});
   }
   return all;
 }
 
 TEST(EdgeField, IsExactWithoutNoise) {
-  const auto all = figures(60, 0, 0);
+  const auto all = make_samples(60, 0, 0);
   const EdgeField field(all, EdgeField::Terms::place_and_direction);
-  for (const EdgeFigure& figure : all) {
-    EXPECT_NEAR(field.value(figure.at_px, figure.along) / figure.value, 1, 1e-6);
+  for (const EdgeSample& sample : all) {
+    EXPECT_NEAR(field.value(sample.at_px, sample.along) / sample.value, 1, 1e-6);
   }
 }
 
 TEST(EdgeField, ReportsExcessStandardDeviation) {
-  for (const double apart : {0.05, 0.2}) {
-    const EdgeField field(figures(300, apart), EdgeField::Terms::place_and_direction);
-    EXPECT_NEAR(field.apart() / apart, 1, 0.15);
+  for (const double excess_sd : {0.05, 0.2}) {
+    const EdgeField field(make_samples(300, excess_sd), EdgeField::Terms::place_and_direction);
+    EXPECT_NEAR(field.excess_sd() / excess_sd, 1, 0.15);
   }
-  const EdgeField alike(figures(300, 0), EdgeField::Terms::place_and_direction);
-  EXPECT_LE(alike.apart(), 0.012);
-  const EdgeField without_direction(figures(300, 0), EdgeField::Terms::place);
-  EXPECT_GT(without_direction.apart(), 0.05);
+  const EdgeField alike(make_samples(300, 0), EdgeField::Terms::place_and_direction);
+  EXPECT_LE(alike.excess_sd(), 0.012);
+  const EdgeField without_direction(make_samples(300, 0), EdgeField::Terms::place);
+  EXPECT_GT(without_direction.excess_sd(), 0.05);
 }
 
 TEST(EdgeField, IsRobustToOutliers) {
-  auto all = figures(100, 0);
+  auto all = make_samples(100, 0);
   for (std::size_t i = 0; i < all.size(); i += 8) all[i].value *= 4;
   const EdgeField field(all, EdgeField::Terms::place_and_direction);
-  const EdgeFigure& figure = all[1];
-  EXPECT_NEAR(field.value(figure.at_px, figure.along) / blur_px(figure.at_px, figure.along), 1,
+  const EdgeSample& sample = all[1];
+  EXPECT_NEAR(field.value(sample.at_px, sample.along) / blur_px(sample.at_px, sample.along), 1,
               0.03);
 }
 
 TEST(EdgeField, ReturnsMedianForFewSamples) {
-  const std::vector<EdgeFigure> few{
+  const std::vector<EdgeSample> few{
       {{10, 10}, {1, 0}, 0.5, 0.1}, {{90, 10}, {1, 0}, 0.8, 0.1}, {{50, 80}, {0, 1}, 2.0, 0.1}};
   const EdgeField field(few, EdgeField::Terms::place);
   EXPECT_EQ(field.value({0, 0}, {1, 0}), field.value({500, 700}, {0, 1}));
   EXPECT_NEAR(field.value({0, 0}, {1, 0}), 0.9, 0.2);
-  EXPECT_GT(field.apart(), 0.3);
+  EXPECT_GT(field.excess_sd(), 0.3);
 }
 
 }  // namespace

@@ -21,11 +21,11 @@ struct Step {
 
   double level(double w, double v, double white_behind) const {
     const double e = v - off_px - slope_px * w - bow_px * w * w;
-    const auto share = [&](double x) {
+    const auto blurred_step = [&](double x) {
       return std::erfc(-x / (std::numbers::sqrt2 * blur_px)) / 2;
     };
     const double light =
-        black + (white - black) * (share(e) + white_behind * share(-e - stripe_px));
+        black + (white - black) * (blurred_step(e) + white_behind * blurred_step(-e - stripe_px));
     return 255 * std::pow(light / 255, 1 / gamma);
   }
 
@@ -67,7 +67,7 @@ TEST(FitEdge, IsExactWithoutNoise) {
   ASSERT_TRUE(fit);
   step.expect_found(edge, 1e-3);
   EXPECT_LT(fit->squares, 1e-3);
-  EXPECT_FALSE(fit->runs_over);
+  EXPECT_FALSE(fit->is_saturated);
 }
 
 TEST(FitEdge, IsExactWithToneCurve) {
@@ -98,7 +98,7 @@ TEST(FitEdge, IsExactForSaturatedOuterSide) {
     EdgeCurve edge = step.start();
     const auto fit = fit_edge(edge, step.pixels(), {gamma});
     ASSERT_TRUE(fit);
-    EXPECT_TRUE(fit->runs_over);
+    EXPECT_TRUE(fit->is_saturated);
     EXPECT_GT(fit->blur_variance, 0);
     step.expect_found(edge, 2e-3);
   }
@@ -112,7 +112,7 @@ TEST(FitEdge, IsExactForSaturatedInnerSide) {
   EdgeCurve edge = step.start();
   const auto fit = fit_edge(edge, pixels, {});
   ASSERT_TRUE(fit);
-  EXPECT_TRUE(fit->runs_over);
+  EXPECT_TRUE(fit->is_saturated);
   step.expect_found(edge, 2e-3);
 }
 
@@ -186,9 +186,9 @@ TEST(EdgeCurveIntersection, LiesOnBothCurves) {
   upright.along = {0, 1};
   upright.across = {-1, 0};
   upright.coefficients << -0.2, 0.3, 0.2, 0;
-  const Eigen::Vector2d at = crossing(flat, upright, {101, 99});
-  EXPECT_LT(std::abs(flat.off(at)), 1e-12);
-  EXPECT_LT(std::abs(upright.off(at)), 1e-12);
+  const Eigen::Vector2d at = find_intersection(flat, upright, {101, 99});
+  EXPECT_LT(std::abs(flat.offset_px(at)), 1e-12);
+  EXPECT_LT(std::abs(upright.offset_px(at)), 1e-12);
 }
 
 }  // namespace

@@ -57,14 +57,14 @@ Found measure(const Scene& scene, std::size_t count, double min_side_px = 0) {
   std::vector<BoardView> views;
   views.reserve(count);
   for (std::size_t i = 0; i < count; ++i) {
-    const BoardShot shot = board_shot(scene, set, i);
+    const BoardShot shot = make_board_shot(scene, set, i);
     const cv::Mat image = expose(scene.sensor, renderer.board_electrons(shot), i, scene.picture);
     views.push_back({shot.image, scene.camera.imager_px, detector.detect(image)});
   }
-  take_curve(views, costs_of_levels(views));
+  apply_tone_curve(views, sum_tone_curve_costs(views));
   std::vector<double> blurs_px, ratios;
   for (const BoardView& view : views) {
-    for (const SeenTag& tag : view.seen.tags) {
+    for (const TagDetection& tag : view.seen.tags) {
       for (std::size_t k = 0; k < tag.steps.size(); ++k) {
         const EdgeStep& step = tag.steps[k];
         const double side_px = (tag.corners_px[(k + 1) % 4] - tag.corners_px[k]).norm();
@@ -76,7 +76,7 @@ Found measure(const Scene& scene, std::size_t count, double min_side_px = 0) {
   }
   if (blurs_px.empty()) return {};
   const std::size_t edges = blurs_px.size();
-  return {edges, mtf50_from_blur(upper_median(blurs_px)), upper_median(ratios)};
+  return {edges, compute_mtf50(upper_median(blurs_px)), upper_median(ratios)};
 }
 
 Scene station_scene() { return read_scene(VLP_SOURCE_DIR "/datasets/station/scene.yaml"); }

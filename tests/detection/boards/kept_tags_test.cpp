@@ -24,7 +24,7 @@ struct Pictures {
   const char* scene;
   /// Brightness of the board's white, relative to full scale.
   double white;
-  std::optional<Picture> picture;
+  std::optional<ImageProcessing> picture;
   /// Minimum fraction of the tags with refined corners.
   double kept;
   const char* name;
@@ -39,17 +39,17 @@ class BoardDetectorYield : public testing::TestWithParam<Pictures> {
   const Board& board = scene.board->print;
 
   cv::Mat image(const FrameRenderer& renderer, const CaptureSet& set, std::size_t index) const {
-    const BoardShot shot = board_shot(scene, set, index);
+    const BoardShot shot = make_board_shot(scene, set, index);
     const auto& picture = GetParam().picture;
     const cv::Mat exposed =
         expose(scene.sensor, renderer.board_electrons(shot), shot.noise_seed, picture);
-    return cv::imdecode(encoded(exposed, picture), cv::IMREAD_GRAYSCALE);
+    return cv::imdecode(encode_image(exposed, picture), cv::IMREAD_GRAYSCALE);
   }
-  std::set<int> told(const TagFinder& finder, const cv::Mat& image) const {
+  std::set<int> detect_ids(const TagFinder& finder, const cv::Mat& image) const {
     std::set<int> ids;
-    for (const SeenTag& tag : finder.find(image)) ids.insert(tag.id);
+    for (const TagDetection& tag : finder.find(image)) ids.insert(tag.id);
     std::set<int> of_board;
-    for (const BoardTag& tag : board_layout(board)) {
+    for (const BoardTag& tag : compute_board_layout(board)) {
       if (ids.contains(tag.id)) of_board.insert(tag.id);
     }
     return of_board;
@@ -65,13 +65,14 @@ TEST_P(BoardDetectorYield, KeepsNearlyAllTagsOfTagFinder) {
   set.exposure_s = GetParam().white * white_e / scene.board->white_e_per_s;
   const FrameRenderer renderer(scene);
   const BoardDetector detector(board);
-  const auto finder = board.corner_squares ? aruco_finder(board) : apriltag_finder(board);
+  const auto finder = board.corner_squares ? make_aruco_finder(board) : make_apriltag_finder(board);
   double all = 0, kept = 0;
   for (std::size_t index = 0; index < views; index += apart) {
     const cv::Mat picture = image(renderer, set, index);
-    const std::set<int> ids = told(*finder, picture);
+    const std::set<int> ids = detect_ids(*finder, picture);
     all += static_cast<double>(ids.size());
-    for (const SeenTag& tag : detector.detect(picture).tags) kept += ids.contains(tag.id) ? 1 : 0;
+    for (const TagDetection& tag : detector.detect(picture).tags)
+      kept += ids.contains(tag.id) ? 1 : 0;
   }
   RecordProperty("told", std::to_string(all));
   RecordProperty("kept", std::to_string(kept));
@@ -79,7 +80,7 @@ TEST_P(BoardDetectorYield, KeepsNearlyAllTagsOfTagFinder) {
   EXPECT_GT(all, 0);
 }
 
-constexpr Picture kCoded{2.4, Sharpening{1, 1}, 80};
+constexpr ImageProcessing kCoded{2.4, Sharpening{1, 1}, 80};
 INSTANTIATE_TEST_SUITE_P(
     Scenes, BoardDetectorYield,
     testing::Values(Pictures{"paper-rig", 1, {}, 0.98, "PlainOfWhite"},

@@ -56,7 +56,7 @@ cv::Mat drawn_by_opencv(const Board& board) {
 }
 
 /// Returns the true position of a corner, which lies between pixels.
-Eigen::Vector2d place_of(const Board& board, std::size_t index) {
+Eigen::Vector2d corner_position(const Board& board, std::size_t index) {
   const auto cols = static_cast<std::size_t>(board.cols - 1);
   const Eigen::Vector2d node(static_cast<double>(index % cols), static_cast<double>(index / cols));
   return Eigen::Vector2d::Constant(kMargin_px + kSquare_px - 0.5) + kSquare_px * node;
@@ -76,11 +76,11 @@ cv::Mat drawn_chessboard(const Board& board) {
   return image;
 }
 
-void expect_all_corners(const Board& board, const SeenBoard& seen) {
+void expect_all_corners(const Board& board, const BoardDetection& seen) {
   ASSERT_EQ(seen.points.size(), static_cast<std::size_t>((board.cols - 1) * (board.rows - 1)));
   for (std::size_t i = 0; i < seen.points.size(); ++i) {
     EXPECT_EQ(seen.points[i].index, i);
-    EXPECT_LT((seen.points[i].pixel - place_of(board, i)).norm(), 0.05) << i;
+    EXPECT_LT((seen.points[i].pixel - corner_position(board, i)).norm(), 0.05) << i;
   }
 }
 
@@ -94,8 +94,8 @@ TEST(SquareCorners, DetectsAllCornersOfOpencvCharucoBoard) {
   for (const Board& board : boards) {
     SCOPED_TRACE(board.rows);
     const cv::Mat image = drawn_by_opencv(board);
-    const SeenBoard seen = BoardDetector(board).detect(image);
-    EXPECT_EQ(seen.tags.size(), board_layout(board).size());
+    const BoardDetection seen = BoardDetector(board).detect(image);
+    EXPECT_EQ(seen.tags.size(), compute_board_layout(board).size());
     EXPECT_TRUE(seen.foreign.empty());
     expect_all_corners(board, seen);
   }
@@ -105,10 +105,10 @@ TEST(SquareCorners, DetectsVisibleCornersOfTruncatedCharucoBoard) {
   const Board board = squares(BoardKind::charuco, 7, 5);
   const cv::Mat image = drawn_by_opencv(board);
   const cv::Mat part = image(cv::Rect(0, 0, image.cols / 2, image.rows)).clone();
-  const SeenBoard seen = BoardDetector(board).detect(part);
+  const BoardDetection seen = BoardDetector(board).detect(part);
   EXPECT_GE(seen.points.size(), 8U);
-  for (const SeenPoint& point : seen.points) {
-    EXPECT_LT((point.pixel - place_of(board, point.index)).norm(), 0.05);
+  for (const PointDetection& point : seen.points) {
+    EXPECT_LT((point.pixel - corner_position(board, point.index)).norm(), 0.05);
   }
 }
 
@@ -120,14 +120,14 @@ TEST(SquareCorners, RejectsCornersNextToMisreadMarker) {
   image.convertTo(smoothed, CV_32F);
   cv::GaussianBlur(smoothed, smoothed, {}, 1);
   const GreyLevels grey{image, smoothed};
-  SeenBoard seen = BoardDetector(board).detect(image);
+  BoardDetection seen = BoardDetector(board).detect(image);
   for (const double off_px : {30.0, 1e12}) {
     for (auto& corner_px : seen.tags[7].corners_px) corner_px.x() += off_px;
-    const auto points = SquareCorners(board).beside(seen.tags, grey);
+    const auto points = SquareCorners(board).detect_beside(seen.tags, grey);
     EXPECT_GE(points.size(), 8U);
     EXPECT_LT(points.size(), seen.points.size());
-    for (const SeenPoint& point : points) {
-      EXPECT_LT((point.pixel - place_of(board, point.index)).norm(), 0.05) << point.index;
+    for (const PointDetection& point : points) {
+      EXPECT_LT((point.pixel - corner_position(board, point.index)).norm(), 0.05) << point.index;
     }
   }
 }
@@ -153,10 +153,10 @@ TEST(SquareCorners, DetectsChessboardAccuratelyInLargeImage) {
   cv::Mat image(3001, 4002, CV_8U, cv::Scalar(255));
   const cv::Point at(1703, 1201);
   drawn.copyTo(image(cv::Rect(at, drawn.size())));
-  SeenBoard seen = BoardDetector(board).detect(image);
-  for (SeenPoint& point : seen.points) point.pixel -= Eigen::Vector2d(at.x, at.y);
+  BoardDetection seen = BoardDetector(board).detect(image);
+  for (PointDetection& point : seen.points) point.pixel -= Eigen::Vector2d(at.x, at.y);
   expect_all_corners(board, seen);
-  auto shown = chessboard_shown(image);  // either way around
+  auto shown = count_chessboard_squares(image);  // either way around
   std::sort(shown.begin(), shown.end());
   EXPECT_EQ(shown, (std::array{6, 9}));
 }
@@ -173,18 +173,18 @@ TEST(SquareCorners, ReturnsNoCornersForIncompleteChessboard) {
 
 TEST(OtherTags, ReportsChessboardSizeAndMarkerDictionary) {
   const cv::Mat image = drawn_chessboard(squares(BoardKind::chessboard, 9, 6));
-  const auto [cols, rows] = chessboard_shown(image);
+  const auto [cols, rows] = count_chessboard_squares(image);
   EXPECT_EQ(std::max(cols, rows), 9);
   EXPECT_EQ(std::min(cols, rows), 6);
   Board charuco = squares(BoardKind::charuco, 7, 5);
   const cv::Mat markers = drawn_by_opencv(charuco);
   charuco.family = "DICT_4X4_50";
-  EXPECT_EQ(other_tags(charuco, markers),
+  EXPECT_EQ(describe_other_tags(charuco, markers),
             "the image shows markers of DICT_5X5, the largest of id 16");
 }
 
 TEST(OrderLattice, ReversesRowsCountedUpwards) {
-  std::vector<SeenPoint> points;
+  std::vector<PointDetection> points;
   for (std::size_t i = 0; i < 12; ++i) {
     points.push_back({i, {10.0 * static_cast<double>(i % 4), -10.0 * static_cast<double>(i / 4)}});
   }

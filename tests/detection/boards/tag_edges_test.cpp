@@ -22,7 +22,7 @@ struct CornerErrors {
   int corners = 0;
   double outwards = 0, squares = 0;
 
-  void add(const SeenTag::Corners& seen, const SeenTag::Corners& truth) {
+  void add(const TagDetection::Corners& seen, const TagDetection::Corners& truth) {
     const Eigen::Vector2d middle = (truth[0] + truth[1] + truth[2] + truth[3]) / 4;
     for (std::size_t k = 0; k < 4; ++k) {
       const Eigen::Vector2d error = seen[k] - truth[k];
@@ -35,34 +35,34 @@ struct CornerErrors {
   double rms_px() const { return std::sqrt(squares / (2 * corners)); }
 };
 
-double narrowest_px(const SeenTag::Corners& corners) {
-  double least = INFINITY;
+double narrowest_px(const TagDetection::Corners& corners) {
+  double min_width_px = INFINITY;
   for (std::size_t k = 0; k < 4; ++k) {
     const Eigen::Vector2d side = corners[(k + 1) % 4] - corners[k];
     const Eigen::Vector2d across = Eigen::Vector2d(-side.y(), side.x()).normalized();
     for (const std::size_t other : {k + 2, k + 3}) {
-      least = std::min(least, std::abs(across.dot(corners[other % 4] - corners[k])));
+      min_width_px = std::min(min_width_px, std::abs(across.dot(corners[other % 4] - corners[k])));
     }
   }
-  return least;
+  return min_width_px;
 }
 
 /// Measures the corner errors of boards in front of the camera of datasets/paper-rig.
 template <typename Wanted>
-CornerErrors errors_of(const Scene& scene, const CaptureSet& views, std::size_t images,
-                       Wanted wanted) {
+CornerErrors measure_errors(const Scene& scene, const CaptureSet& views, std::size_t images,
+                            Wanted wanted) {
   const FrameRenderer renderer(scene);
   const BoardDetector detector(scene.board->print);
   CornerErrors errors;
   for (std::size_t index = 0; index < images; ++index) {
-    const BoardShot shot = board_shot(scene, views, index);
-    std::map<int, SeenTag::Corners> truth;
-    for (const auto& [tag, corner, pixel] : true_corners(scene, renderer, shot)) {
+    const BoardShot shot = make_board_shot(scene, views, index);
+    std::map<int, TagDetection::Corners> truth;
+    for (const auto& [tag, corner, pixel] : find_true_corners(scene, renderer, shot)) {
       truth[*tag][static_cast<std::size_t>(corner)] = pixel;
     }
     const cv::Mat image =
         expose(scene.sensor, renderer.board_electrons(shot), index, scene.picture);
-    for (const SeenTag& tag : detector.detect(image).tags) {
+    for (const TagDetection& tag : detector.detect(image).tags) {
       if (wanted(truth[tag.id])) errors.add(tag.corners_px, truth[tag.id]);
     }
   }
@@ -71,7 +71,7 @@ CornerErrors errors_of(const Scene& scene, const CaptureSet& views, std::size_t 
 
 Scene paper_rig() { return read_scene(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml"); }
 
-CaptureSet boards_of(const Scene& scene) {
+CaptureSet find_board_set(const Scene& scene) {
   return *std::ranges::find(scene.sets, "boards", &CaptureSet::folder);
 }
 
@@ -79,8 +79,9 @@ TEST(TagEdges, CornersOfNarrowTagsAreNotBiasedByBits) {
   Scene scene = paper_rig();
   scene.sensor.shot_noise = false;
   scene.sensor.read_noise_e = 0;
-  const CornerErrors errors = errors_of(
-      scene, boards_of(scene), 16, [](const auto& corners) { return narrowest_px(corners) < 24; });
+  const CornerErrors errors =
+      measure_errors(scene, find_board_set(scene), 16,
+                     [](const auto& corners) { return narrowest_px(corners) < 24; });
   ASSERT_GT(errors.corners, 40);
   EXPECT_LT(std::abs(errors.outwards_px()), 0.006);  // without the bits 0.02
   EXPECT_LT(errors.rms_px(), 0.012);
@@ -90,9 +91,9 @@ TEST(TagEdges, CornersOfNarrowTagsAreNotBiasedByBits) {
 
 TEST(TagEdges, CornersOfSaturatedTagsAreUnbiased) {
   Scene scene = paper_rig();
-  CaptureSet views = boards_of(scene);
+  CaptureSet views = find_board_set(scene);
   views.exposure_s = 0.0079;  // one and a half times white
-  const CornerErrors errors = errors_of(scene, views, 6, [](const auto&) { return true; });
+  const CornerErrors errors = measure_errors(scene, views, 6, [](const auto&) { return true; });
   ASSERT_GT(errors.corners, 400);
   EXPECT_LT(std::abs(errors.outwards_px()), 0.02);
   EXPECT_LT(errors.rms_px(), 0.025);  // without the light of the others 0.042

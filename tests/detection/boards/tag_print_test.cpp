@@ -16,8 +16,8 @@ TEST(TagGeometry, MatchesImagesOfLibapriltag) {
   board.tag_spacing = 0.5;
   for (const std::string family : {"tag36h11", "tag25h9", "tag16h5"}) {
     board.family = family;
-    const TagPrint print(board);
-    const TagFamily drawn = tag_family(family);
+    const TagGeometry print(board);
+    const TagFamily drawn = make_tag_family(family);
     const int width = drawn->width_at_border, margin = (drawn->total_width - width) / 2;
     EXPECT_EQ(print.width(), width);
     EXPECT_EQ(print.inside(), 1);
@@ -28,7 +28,7 @@ TEST(TagGeometry, MatchesImagesOfLibapriltag) {
       const auto white = [&](int x, int y) {
         return picture->buf[(margin + y) * picture->stride + margin + x] > 0;
       };
-      const TagPrint::Sides sides = print.white_behind(id);
+      const TagGeometry::Sides sides = print.find_white_segments(id);
       const int last = width - 1;
       for (int i = 0; i < width; ++i) {
         // Bottom, from the left; right, from the bottom; top, from the right; left, from the top.
@@ -36,7 +36,8 @@ TEST(TagGeometry, MatchesImagesOfLibapriltag) {
                                            white(last - i, 1), white(1, i)};
         for (std::size_t k = 0; k < 4; ++k) {
           bool found = false;
-          for (const TagPrint::Run& run : sides[k]) found |= run.from <= i && i + 1 <= run.to;
+          for (const TagGeometry::Segment& run : sides[k])
+            found |= run.from <= i && i + 1 <= run.to;
           EXPECT_EQ(found, expected[k] && i > 0 && i < last)
               << family << id << " " << k << " " << i;
         }
@@ -50,12 +51,12 @@ TEST(TagGeometry, ShiftsBitsByWidthOfBorder) {
   board.family = "tag36h11";
   board.border_bits = 1;
   board.tag_spacing = 1;
-  const TagPrint::Sides narrow = TagPrint(board).white_behind(3);
+  const TagGeometry::Sides narrow = TagGeometry(board).find_white_segments(3);
   board.border_bits = 2;
-  const TagPrint wide(board);
+  const TagGeometry wide(board);
   EXPECT_EQ(wide.width(), 10);
   EXPECT_EQ(wide.inside(), 2);
-  const TagPrint::Sides sides = wide.white_behind(3);
+  const TagGeometry::Sides sides = wide.find_white_segments(3);
   for (std::size_t k = 0; k < 4; ++k) {
     ASSERT_EQ(sides[k].size(), narrow[k].size());
     for (std::size_t i = 0; i < sides[k].size(); ++i) {
@@ -69,9 +70,9 @@ TEST(TagGeometry, ReturnsNoSegmentsForWhiteBorder) {
   board.family = "tagStandard41h12";
   board.border_bits = 1;
   board.tag_spacing = 0.3;
-  const TagPrint print(board);
+  const TagGeometry print(board);
   EXPECT_EQ(print.outside(), 1);
-  for (const auto& side : print.white_behind(0)) EXPECT_TRUE(side.empty());
+  for (const auto& side : print.find_white_segments(0)) EXPECT_TRUE(side.empty());
 }
 
 }  // namespace

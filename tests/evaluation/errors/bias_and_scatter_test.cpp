@@ -21,15 +21,15 @@ TEST(BiasAndScatter, SeparatesBiasFromScatter) {
     }
   }
   errors.push_back({4, {1, 1}, {}, {}, 2, 0});  // alone at its station
-  const auto figures = bias_and_scatter(errors, {{"a", {5, 6}, {}, {}}});
-  ASSERT_TRUE(figures);
-  ASSERT_EQ(figures->stations.size(), 2);
-  EXPECT_EQ(figures->fixes, 4);
-  EXPECT_EQ(figures->stations[0].xy_m, Eigen::Vector2d(5, 6));
-  EXPECT_THAT(figures->stations[1].bias_m, IsNear(Eigen::Vector2d(-3e-3, 0), 1e-15));
-  EXPECT_NEAR(figures->stations[0].sd_m, std::sqrt(32e-6), 1e-12);
-  EXPECT_NEAR(figures->scatter_m, std::sqrt(32e-6), 1e-12);
-  EXPECT_EQ(figures->bias_m, 0);  // 9 of bias^2, and 16 that chance puts there
+  const auto statistics = compute_bias_and_scatter(errors, {{"a", {5, 6}, {}, {}}});
+  ASSERT_TRUE(statistics);
+  ASSERT_EQ(statistics->stations.size(), 2);
+  EXPECT_EQ(statistics->fixes, 4);
+  EXPECT_EQ(statistics->stations[0].xy_m, Eigen::Vector2d(5, 6));
+  EXPECT_THAT(statistics->stations[1].bias_m, IsNear(Eigen::Vector2d(-3e-3, 0), 1e-15));
+  EXPECT_NEAR(statistics->stations[0].sd_m, std::sqrt(32e-6), 1e-12);
+  EXPECT_NEAR(statistics->scatter_m, std::sqrt(32e-6), 1e-12);
+  EXPECT_EQ(statistics->bias_m, 0);  // 9 of bias^2, and 16 that chance puts there
 }
 
 TEST(BiasAndScatter, IsUnbiasedUnderLargeScatter) {
@@ -39,10 +39,10 @@ TEST(BiasAndScatter, IsUnbiasedUnderLargeScatter) {
     errors.push_back(
         {i, {1e-3 + 2e-3 * random.normal(), 2e-3 * random.normal()}, {}, {}, i / 4, 0});
   }
-  const auto figures = bias_and_scatter(errors, {{"a", {0, 0}, {}, {}}});
+  const auto statistics = compute_bias_and_scatter(errors, {{"a", {0, 0}, {}, {}}});
   // Means of four scatter by as much as the bias is; standard errors are 0.02 and 0.03 mm.
-  EXPECT_NEAR(figures->scatter_m, 2e-3 * std::sqrt(2), 0.06e-3);
-  EXPECT_NEAR(figures->bias_m, 1e-3, 0.1e-3);
+  EXPECT_NEAR(statistics->scatter_m, 2e-3 * std::sqrt(2), 0.06e-3);
+  EXPECT_NEAR(statistics->bias_m, 1e-3, 0.1e-3);
 }
 
 }  // namespace

@@ -17,7 +17,7 @@ namespace {
 
 struct Errors {
   std::vector<double> values;
-  std::vector<std::size_t> units;
+  std::vector<std::size_t> clusters;
 };
 
 /// Draws horizontal errors: x and y each have a bias per station and independent noise, both
@@ -30,7 +30,7 @@ Errors draw(std::size_t stations, std::size_t captures, double bias, double scat
     for (std::size_t i = 0; i < captures; ++i) {
       errors.values.push_back(
           std::hypot(x + scatter * random.normal(), y + scatter * random.normal()));
-      errors.units.push_back(station);
+      errors.clusters.push_back(station);
     }
   }
   return errors;
@@ -38,7 +38,8 @@ Errors draw(std::size_t stations, std::size_t captures, double bias, double scat
 
 /// Returns in how many of 300 cases the intervals of mean, median, p90 and rms contain the true
 /// value of a Rayleigh distribution with this sigma.
-std::array<int, 4> held(std::size_t stations, std::size_t captures, double bias, double scatter) {
+std::array<int, 4> count_covered(std::size_t stations, std::size_t captures, double bias,
+                                 double scatter) {
   const double sigma = std::hypot(bias, scatter);
   const double mean = sigma * std::sqrt(std::numbers::pi / 2);
   const double median = sigma * std::sqrt(2 * std::log(2)),
@@ -48,7 +49,7 @@ std::array<int, 4> held(std::size_t stations, std::size_t captures, double bias,
   Random random(1);
   for (int i = 0; i < 300; ++i) {
     const Errors errors = draw(stations, captures, bias, scatter, random);
-    const auto intervals = error_intervals(errors.values, errors.units, 1);
+    const auto intervals = compute_error_intervals(errors.values, errors.clusters, 1);
     const auto holds = [](const Interval& interval, double truth) {
       return interval.low <= truth && truth <= interval.high ? 1 : 0;
     };
@@ -63,14 +64,14 @@ std::array<int, 4> held(std::size_t stations, std::size_t captures, double bias,
 /// The expectation of 95 % of 300 cases is 285 with a standard deviation of 4. Percentile intervals
 /// from a hundred clusters are slightly too narrow: 94.5 % in 2,000 cases.
 TEST(ErrorIntervals, CoversTrueValuesAtNominalRate) {
-  for (const int count : held(100, 1, 0, 1)) {
+  for (const int count : count_covered(100, 1, 0, 1)) {
     EXPECT_GE(count, 270);
     EXPECT_LE(count, 297);
   }
 }
 
 TEST(ErrorIntervals, CoversTrueValuesWithPerStationBias) {
-  for (const int count : held(100, 3, 1, 0.3)) {
+  for (const int count : count_covered(100, 3, 1, 0.3)) {
     EXPECT_GE(count, 270);
     EXPECT_LE(count, 297);
   }
@@ -80,9 +81,9 @@ TEST(ErrorIntervals, CoversTrueValuesWithPerStationBias) {
 TEST(ErrorIntervals, SingleCapturesAsUnitsAreTooNarrow) {
   Random random(2);
   Errors errors = draw(40, 12, 1, 0.1, random);
-  const Interval together = error_intervals(errors.values, errors.units, 1)->mean;
-  std::iota(errors.units.begin(), errors.units.end(), std::size_t{0});
-  const Interval singly = error_intervals(errors.values, errors.units, 1)->mean;
+  const Interval together = compute_error_intervals(errors.values, errors.clusters, 1)->mean;
+  std::iota(errors.clusters.begin(), errors.clusters.end(), std::size_t{0});
+  const Interval singly = compute_error_intervals(errors.values, errors.clusters, 1)->mean;
   EXPECT_LT(2 * (singly.high - singly.low), together.high - together.low);
 }
 
@@ -92,9 +93,9 @@ TEST(ErrorIntervals, WidthMatchesTheoryForManyErrors) {
   Random random(3);
   const std::size_t count = 50000;
   const Errors errors = draw(count, 1, 0, 1, random);
-  const auto intervals = error_intervals(errors.values, errors.units, 2);
+  const auto intervals = compute_error_intervals(errors.values, errors.clusters, 2);
   ASSERT_TRUE(intervals);
-  EXPECT_EQ(intervals->units, count);
+  EXPECT_EQ(intervals->clusters, count);
   const double root = std::sqrt(static_cast<double>(count));
   const auto expect_width = [&](const Interval& interval, double sd) {
     EXPECT_NEAR((interval.high - interval.low) / (2 * 1.96 * sd), 1, 0.15);
@@ -111,8 +112,8 @@ TEST(ErrorIntervals, WidthMatchesTheoryForManyErrors) {
 TEST(ErrorIntervals, IsIndependentOfThreadCount) {
   Random random(4);
   const Errors errors = draw(3000, 2, 1, 1, random);
-  const auto one = error_intervals(errors.values, errors.units, 1);
-  const auto four = error_intervals(errors.values, errors.units, 4);
+  const auto one = compute_error_intervals(errors.values, errors.clusters, 1);
+  const auto four = compute_error_intervals(errors.values, errors.clusters, 4);
   for (const auto figure : {&ErrorIntervals::mean, &ErrorIntervals::median, &ErrorIntervals::rms}) {
     EXPECT_EQ(((*one).*figure).low, ((*four).*figure).low);
     EXPECT_EQ(((*one).*figure).high, ((*four).*figure).high);
@@ -123,25 +124,26 @@ TEST(ErrorIntervals, IsIndependentOfThreadCount) {
 
 TEST(ErrorIntervals, ReturnsNulloptForFewUnits) {
   const std::vector<double> errors{1, 2, 3, 4, 5, 6};
-  EXPECT_FALSE(error_intervals(errors, std::vector<std::size_t>{0, 0, 1, 1, 2, 3}, 1));
-  const auto intervals = error_intervals(errors, std::vector<std::size_t>{0, 0, 1, 4, 2, 3}, 1);
+  EXPECT_FALSE(compute_error_intervals(errors, std::vector<std::size_t>{0, 0, 1, 1, 2, 3}, 1));
+  const auto intervals =
+      compute_error_intervals(errors, std::vector<std::size_t>{0, 0, 1, 4, 2, 3}, 1);
   ASSERT_TRUE(intervals);
-  EXPECT_EQ(intervals->units, 5);
+  EXPECT_EQ(intervals->clusters, 5);
 }
 
 TEST(ErrorIntervals, OmitsP90ForFewUnits) {
   Random random(5);
-  const Errors few = draw(kFewestUnitsOfP90 - 1, 3, 1, 1, random);
-  EXPECT_FALSE(error_intervals(few.values, few.units, 1)->p90);
-  const Errors enough = draw(kFewestUnitsOfP90, 3, 1, 1, random);
-  EXPECT_TRUE(error_intervals(enough.values, enough.units, 1)->p90);
+  const Errors few = draw(kMinClustersForP90 - 1, 3, 1, 1, random);
+  EXPECT_FALSE(compute_error_intervals(few.values, few.clusters, 1)->p90);
+  const Errors sufficient = draw(kMinClustersForP90, 3, 1, 1, random);
+  EXPECT_TRUE(compute_error_intervals(sufficient.values, sufficient.clusters, 1)->p90);
 }
 
 TEST(ErrorIntervals, HasZeroWidthForEqualErrors) {
   const std::vector<double> errors(20, 2.5);
-  std::vector<std::size_t> units(20);
-  std::iota(units.begin(), units.end(), std::size_t{0});
-  const auto intervals = error_intervals(errors, units, 1);
+  std::vector<std::size_t> clusters(20);
+  std::iota(clusters.begin(), clusters.end(), std::size_t{0});
+  const auto intervals = compute_error_intervals(errors, clusters, 1);
   EXPECT_EQ(intervals->median.low, 2.5);
   EXPECT_EQ(intervals->p90->high, 2.5);
   EXPECT_DOUBLE_EQ(intervals->mean.low, 2.5);

@@ -31,16 +31,16 @@ Pairs pairs(std::size_t count, double difference_m) {
   }
   return all;
 }
-std::string_view verdict_of(const Pairs& all) {
+std::string_view compare_pairs(const Pairs& all) {
   return compare(all.fixes, all.errors, all.others, all.other_errors, 1).verdict();
 }
 
 TEST(Compare, DetectsSmallPairedDifferences) {
-  EXPECT_EQ(verdict_of(pairs(100, 3e-4)), "worse");
-  EXPECT_EQ(verdict_of(pairs(100, -3e-4)), "better");
-  EXPECT_EQ(verdict_of(pairs(kFewestUnitsCompared, 1e-2)), "worse");
-  EXPECT_EQ(verdict_of(pairs(kFewestUnitsCompared - 1, 1e-2)), "no evidence");  // too few
-  EXPECT_EQ(verdict_of(pairs(4, 1)), "no evidence");
+  EXPECT_EQ(compare_pairs(pairs(100, 3e-4)), "worse");
+  EXPECT_EQ(compare_pairs(pairs(100, -3e-4)), "better");
+  EXPECT_EQ(compare_pairs(pairs(kMinClustersCompared, 1e-2)), "worse");
+  EXPECT_EQ(compare_pairs(pairs(kMinClustersCompared - 1, 1e-2)), "no evidence");  // too few
+  EXPECT_EQ(compare_pairs(pairs(4, 1)), "no evidence");
   const Pairs same = pairs(100, 0);
   EXPECT_EQ(compare(same.fixes, same.errors, same.fixes, same.errors, 1).verdict(), "the same");
 }
@@ -48,9 +48,9 @@ TEST(Compare, DetectsSmallPairedDifferences) {
 TEST(Compare, ReportsInsignificantDifferenceAsTheSame) {
   // For errors of 15 mm on average 1 % is 0.15 mm; the mean difference has an uncertainty of 0.01
   // mm.
-  EXPECT_EQ(verdict_of(pairs(100, 1e-4)), "the same");
-  EXPECT_EQ(verdict_of(pairs(100, -1e-4)), "the same");
-  EXPECT_EQ(verdict_of(pairs(100, 1.5e-4)), "no evidence");
+  EXPECT_EQ(compare_pairs(pairs(100, 1e-4)), "the same");
+  EXPECT_EQ(compare_pairs(pairs(100, -1e-4)), "the same");
+  EXPECT_EQ(compare_pairs(pairs(100, 1.5e-4)), "no evidence");
   const Pairs tenth = pairs(100, 1e-4);
   EXPECT_EQ(compare(tenth.fixes, tenth.errors, tenth.others, tenth.other_errors, 1).words(),
             "the same within 0.15 mm");
@@ -61,17 +61,17 @@ TEST(Compare, ReportsInsignificantDifferenceAsTheSame) {
   Comparison comparison = compare(small.fixes, small.errors, small.others, small.other_errors, 1);
   EXPECT_EQ(comparison.words(), "the same within 0.001 mm");
   EXPECT_GT(comparison.interval_m->low, 0);
-  comparison.least_m = 1e-7;
+  comparison.min_relevant_m = 1e-7;
   EXPECT_EQ(comparison.words(), "worse by more than 0.0001 mm");
-  comparison.units = 1;
+  comparison.clusters = 1;
   EXPECT_EQ(comparison.words(), "no evidence, too few");
 }
 
 TEST(Compare, RequiresUnitsNotPairs) {
   Pairs all = pairs(100, 1e-2);
-  for (FixError& error : all.errors) error.unit = 3 * (error.unit % 19);
+  for (FixError& error : all.errors) error.cluster = 3 * (error.cluster % 19);
   const Comparison comparison = compare(all.fixes, all.errors, all.others, all.other_errors, 1);
-  EXPECT_EQ(comparison.units, 19);
+  EXPECT_EQ(comparison.clusters, 19);
   EXPECT_EQ(comparison.verdict(), "no evidence");
   EXPECT_GT(comparison.interval_m->low, 0);
 }
@@ -79,7 +79,7 @@ TEST(Compare, RequiresUnitsNotPairs) {
 TEST(Comparison, VerdictRequiresWholeIntervalOnOneSide) {
   Comparison comparison;
   EXPECT_EQ(comparison.verdict(), "no evidence");
-  comparison.units = kFewestUnitsCompared;
+  comparison.clusters = kMinClustersCompared;
   EXPECT_EQ(comparison.verdict(), "no evidence");
   comparison.interval_m = {-1, 0.1};
   EXPECT_EQ(comparison.verdict(), "no evidence");
@@ -97,7 +97,7 @@ TEST(Compare, CountsPairsAndMissingFixes) {
   all.other_errors.erase(all.other_errors.begin() + 9);
   const Comparison comparison = compare(all.fixes, all.errors, all.others, all.other_errors, 1);
   EXPECT_EQ(comparison.pairs, 6);
-  EXPECT_EQ(comparison.units, 6);
+  EXPECT_EQ(comparison.clusters, 6);
   EXPECT_EQ(comparison.larger, 6);
   EXPECT_EQ(comparison.only_these, 1);
   EXPECT_EQ(comparison.only_others, 3);
@@ -107,9 +107,9 @@ TEST(Compare, CountsPairsAndMissingFixes) {
 TEST(CheckSameImages, RejectsFixesOfOtherCaptures) {
   const FromFile<FixRow> fixes{"a.csv", {fix_at("a", 0, 0)}};
   const FromFile<FixRow> others{"b.csv", {fix_at("a", 0, 0), fix_at("b", 0, 0)}};
-  EXPECT_THAT(refusal_of([&] { check_same_images(fixes, others); }),
+  EXPECT_THAT(rejection_message([&] { check_same_images(fixes, others); }),
               HasSubstr("b.csv:1: image: 'b' is not in a.csv; 1 of 2"));
-  EXPECT_EQ(refusal_of([&] { check_same_images(fixes, fixes); }), "");
+  EXPECT_EQ(rejection_message([&] { check_same_images(fixes, fixes); }), "");
 }
 
 }  // namespace

@@ -10,38 +10,38 @@ namespace vlp {
 namespace {
 
 TEST(ErrorStatistics, MatchesManualComputation) {
-  const ErrorFigures figures = figures_of({10, 1, 2, 3, 4, 9, 8, 7, 6, 5});
-  EXPECT_EQ(figures.count, 10);
-  EXPECT_DOUBLE_EQ(figures.mean, 5.5);
-  EXPECT_EQ(figures.median, 5);  // half of ten do not exceed it
-  EXPECT_EQ(figures.p90, 9);
-  EXPECT_EQ(figures.max, 10);
-  EXPECT_DOUBLE_EQ(figures.rms, std::sqrt(38.5));
+  const ErrorStatistics statistics = compute_error_statistics({10, 1, 2, 3, 4, 9, 8, 7, 6, 5});
+  EXPECT_EQ(statistics.count, 10);
+  EXPECT_DOUBLE_EQ(statistics.mean, 5.5);
+  EXPECT_EQ(statistics.median, 5);  // half of ten do not exceed it
+  EXPECT_EQ(statistics.p90, 9);
+  EXPECT_EQ(statistics.max, 10);
+  EXPECT_DOUBLE_EQ(statistics.rms, std::sqrt(38.5));
 }
 
 TEST(ErrorStatistics, ReturnsTheErrorForSingleError) {
-  const ErrorFigures figures = figures_of({3});
+  const ErrorStatistics statistics = compute_error_statistics({3});
   for (const double figure :
-       {figures.mean, figures.median, figures.p90, figures.max, figures.rms}) {
+       {statistics.mean, statistics.median, statistics.p90, statistics.max, statistics.rms}) {
     EXPECT_EQ(figure, 3);
   }
 }
 
 TEST(SignedErrorStatistics, ReturnsBias) {
-  const SignedFigures figures = signed_figures_of({-3, 1, -1});
-  EXPECT_EQ(figures.bias, -1);
-  EXPECT_EQ(figures.sizes.median, 1);
-  EXPECT_EQ(figures.sizes.max, 3);
+  const SignedErrorStatistics statistics = compute_signed_error_statistics({-3, 1, -1});
+  EXPECT_EQ(statistics.bias, -1);
+  EXPECT_EQ(statistics.sizes.median, 1);
+  EXPECT_EQ(statistics.sizes.max, 3);
 }
 
 TEST(ComputeDistribution, ContainsQuantilesOfFigures) {
   std::vector<double> errors(200);
   for (std::size_t i = 0; i < errors.size(); ++i) errors[i] = static_cast<double>(200 - i);
-  const auto distribution = distribution_of(errors);
+  const auto distribution = compute_distribution(errors);
   ASSERT_EQ(distribution.size(), 100);
   EXPECT_EQ(distribution[0], std::pair(0.01, 2.0));
   EXPECT_EQ(distribution[6], std::pair(0.07, 14.0));  // 0.07 * 200 is a little more than 14
-  EXPECT_EQ(distribution[89].second, figures_of(errors).p90);
+  EXPECT_EQ(distribution[89].second, compute_error_statistics(errors).p90);
   EXPECT_EQ(distribution[99], std::pair(1.0, 200.0));
 }
 

@@ -26,7 +26,7 @@ TEST(NormalizedErrors, IsOneIfErrorsMatchReportedSd) {
                       i,
                       0});
   }
-  const auto ratio = stated_ratio(fixes, errors);
+  const auto ratio = compute_normalized_errors(fixes, errors);
   ASSERT_TRUE(ratio);
   EXPECT_NEAR(ratio->horizontal, 1, 0.015);  // three standard errors
   EXPECT_NEAR(*ratio->height, 2, 0.05);      // stated too small by a factor of two
@@ -36,7 +36,7 @@ TEST(NormalizedErrors, IsOneIfErrorsMatchReportedSd) {
   EXPECT_FALSE(ratio->yaw_within_95);
   fixes.resize(1);
   fixes[0].fix->sd.reset();
-  EXPECT_FALSE(stated_ratio(fixes, {errors[0]}));
+  EXPECT_FALSE(compute_normalized_errors(fixes, {errors[0]}));
 }
 
 /// Four lamps round the origin at a height of 2 m.
@@ -60,10 +60,10 @@ TEST(CrlbRatio, MatchesAnalyticLimit) {
   const double sd_m = 2.0 / 500 * 0.1 / 2, limit_m = sd_m * std::sqrt(2);
   const std::vector<TruthRow> truth{
       {"a", {0, 0}, 0, 0.3}, {"b", {90, 0}, 0, 0}, {"c", {0, 0}, {}, 0}};
-  const auto ratio = limit_ratio({{0, {0, 3 * limit_m}, {}, {}, 0, 0},
-                                  {1, {5, 5}, {}, {}, 1, 1},   // sees no lamp
-                                  {2, {5, 5}, {}, {}, 2, 2}},  // at an unknown height
-                                 truth, four_lamps(), pinhole(), 0.1, 2);
+  const auto ratio = compute_crlb_ratio({{0, {0, 3 * limit_m}, {}, {}, 0, 0},
+                                         {1, {5, 5}, {}, {}, 1, 1},   // sees no lamp
+                                         {2, {5, 5}, {}, {}, 2, 2}},  // at an unknown height
+                                        truth, four_lamps(), pinhole(), 0.1, 2);
   ASSERT_TRUE(ratio);
   EXPECT_EQ(ratio->fixes, 1);
   EXPECT_NEAR(ratio->limit_m, limit_m, 1e-9);
@@ -74,18 +74,18 @@ TEST(CrlbRatio, MatchesAnalyticLimit) {
 TEST(CrlbRatio, BeatenIgnoresChanceAndDetectsSmallErrors) {
   Random random(3);
   constexpr int trials = 2000, fixes = 50;
-  const auto beaten = [&](double stated) {
+  const auto is_below_limit = [&](double stated) {
     int count = 0;
     for (int trial = 0; trial < trials; ++trial) {
       double squares = 0;
       for (int i = 0; i < 2 * fixes; ++i) squares += std::pow(random.normal(), 2);
       const double ratio = std::sqrt(squares / (2 * fixes)) / stated;
-      count += LimitRatio{ratio, 1, fixes, 1 / std::sqrt(4.0 * fixes)}.beaten() ? 1 : 0;
+      count += CrlbRatio{ratio, 1, fixes, 1 / std::sqrt(4.0 * fixes)}.is_below_limit() ? 1 : 0;
     }
     return count;
   };
-  EXPECT_LE(beaten(1), 10);  // 2.7 are expected
-  EXPECT_EQ(beaten(1.0 / 0.609), trials);
+  EXPECT_LE(is_below_limit(1), 10);  // 2.7 are expected
+  EXPECT_EQ(is_below_limit(1.0 / 0.609), trials);
 }
 
 /// Every sixth camera is 10 m below the lamps, the others 2 m: their limit is five times as large,
@@ -99,7 +99,7 @@ TEST(CrlbRatio, FalseAlarmRateHoldsForUnequalLimits) {
   constexpr double sd_per_m = 0.1 / 500 / 2;  // see above
   std::vector<TruthRow> truth;
   for (std::size_t i = 0; i < fixes; ++i) truth.push_back({"", {0, 0}, i % 6 == 0 ? -8.0 : 0, 0});
-  int beaten = 0, as_if_equal = 0;
+  int is_below_limit = 0, as_if_equal = 0;
   double square = 0, sd = 0;
   for (int trial = 0; trial < trials; ++trial) {
     std::vector<FixError> errors;
@@ -108,15 +108,15 @@ TEST(CrlbRatio, FalseAlarmRateHoldsForUnequalLimits) {
       const double x_m = sd_m * random.normal(), y_m = sd_m * random.normal();
       errors.push_back({i, {x_m, y_m}, {}, {}, i, i});
     }
-    const auto ratio = limit_ratio(errors, truth, lamps, camera, 0.1, 1);
+    const auto ratio = compute_crlb_ratio(errors, truth, lamps, camera, 0.1, 1);
     ASSERT_TRUE(ratio);
     sd = ratio->sd;
     square += std::pow(ratio->horizontal - 1, 2) / trials;
-    beaten += ratio->beaten() ? 1 : 0;
+    is_below_limit += ratio->is_below_limit() ? 1 : 0;
     as_if_equal += ratio->horizontal < 1 - 3 / std::sqrt(4.0 * fixes) ? 1 : 0;
   }
   EXPECT_NEAR(std::sqrt(square) / sd, 1, 0.13);  // three standard errors
-  EXPECT_LE(beaten, 3);                          // 0.1 are expected
+  EXPECT_LE(is_below_limit, 3);                  // 0.1 are expected
   EXPECT_GE(as_if_equal, 8);                     // 22 are expected: unequal limits matter here
 }
 

@@ -27,15 +27,15 @@ TEST(ErrorsAgainstTruth, MatchesRowsByImage) {
   EXPECT_THAT(errors.errors[0].horizontal_m, IsNear(Eigen::Vector2d(0.003, 0.004), 1e-12));
   EXPECT_NEAR(*errors.errors[0].height_m, 0.1, 1e-12);
   EXPECT_NEAR(*errors.errors[0].yaw_rad, 6.2 - 2 * 3.14159265358979, 1e-12);
-  EXPECT_EQ(errors.errors[0].unit, 1);
-  EXPECT_EQ(errors.errors[1].unit, 0);
+  EXPECT_EQ(errors.errors[0].cluster, 1);
+  EXPECT_EQ(errors.errors[1].cluster, 0);
 }
 
 TEST(ErrorsAgainstTruth, RejectsImagesMissingInTruth) {
   FromFile<FixRow> fixes{"fixes.csv", {fix_at("a", 0, 0), fix_at("x", 0, 0), fix_at("y", 0, 0)}};
   fixes.rows[1].line = 17;
   const FromFile<TruthRow> truth{"truth.csv", {{"a", {0, 0}, {}, {}}}};
-  const std::string refusal = refusal_of([&] { errors_against_truth(fixes, truth, 1e-3); });
+  const std::string refusal = rejection_message([&] { errors_against_truth(fixes, truth, 1e-3); });
   EXPECT_THAT(refusal, HasSubstr("fixes.csv:17: image: 'x' is not in truth.csv"));
   EXPECT_THAT(refusal, HasSubstr("2 of 3"));
 }
@@ -57,10 +57,10 @@ TEST(ErrorsAgainstPath, UsesNearestPointOfPath) {
 TEST(ErrorsAgainstPath, GroupsFixesIntoThirtyUnits) {
   const std::vector<FixRow> fixes(3000, fix_at("a", 0, 0));
   const FixErrors errors = errors_against_path(fixes, {{{0, 0}, {1, 0}}, {}});
-  EXPECT_EQ(errors.errors.front().unit, 0);
-  EXPECT_EQ(errors.errors[99].unit, 0);
-  EXPECT_EQ(errors.errors[100].unit, 1);
-  EXPECT_EQ(errors.errors.back().unit, 29);
+  EXPECT_EQ(errors.errors.front().cluster, 0);
+  EXPECT_EQ(errors.errors[99].cluster, 0);
+  EXPECT_EQ(errors.errors[100].cluster, 1);
+  EXPECT_EQ(errors.errors.back().cluster, 29);
 }
 
 }  // namespace

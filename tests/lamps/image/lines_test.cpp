@@ -17,7 +17,7 @@ namespace {
 constexpr int kAround_px = 64;
 
 /// Returns the pixels of a view as an image of OpenCV.
-cv::Mat mat_of(const ImageView& view) {
+cv::Mat to_mat(const ImageView& view) {
   return {view.height, view.width, view.bits == 8 ? CV_8U : CV_16U, const_cast<void*>(view.data),
           std::size_t(view.stride)};
 }
@@ -38,8 +38,9 @@ cv::Mat spots_on_dark(const cv::Size& size, int depth, int spots) {
 }
 
 void expect_turned(const cv::Mat& image, double threshold) {
-  const Lines found = lines_of(image_view(image), Readout::columns, {0, 1, threshold});
-  const cv::Mat lines = mat_of(found.pixels), all = image.t();
+  const ScanlineImage found =
+      make_scanline_image(image_view(image), Readout::columns, {0, 1, threshold});
+  const cv::Mat lines = to_mat(found.pixels), all = image.t();
   ASSERT_EQ(lines.size(), all.size());
   ASSERT_EQ(lines.type(), all.type());
   const cv::Mat bright = all > threshold;
@@ -57,17 +58,18 @@ void expect_turned(const cv::Mat& image, double threshold) {
   EXPECT_EQ(cv::countNonZero(differs & (lines != 0)), 0);
   EXPECT_EQ(cv::countNonZero(differs & bright), 0);
   // Only lit tiles are searched, and no run is missed.
-  const auto some = find_runs(found.pixels, threshold, found.lit);
-  const auto every = find_runs(image_view(all), threshold);
-  EXPECT_TRUE(std::equal(some.begin(), some.end(), every.begin(), every.end(),
-                         [](const Run& a, const Run& b) {
+  const auto runs_in_lit_tiles = find_pixel_runs(found.pixels, threshold, found.lit);
+  const auto all_runs = find_pixel_runs(image_view(all), threshold);
+  EXPECT_TRUE(std::equal(runs_in_lit_tiles.begin(), runs_in_lit_tiles.end(), all_runs.begin(),
+                         all_runs.end(), [](const PixelRun& a, const PixelRun& b) {
                            return a.row == b.row && a.begin == b.begin && a.end == b.end;
                          }));
 }
 
 TEST(MakeScanlineImage, ReturnsSameImageForRowReadout) {
   const cv::Mat image = spots_on_dark({100, 70}, CV_8U, 3);
-  EXPECT_EQ(lines_of(image_view(image), Readout::rows, {0, 1, 100}).pixels.data, image.data);
+  EXPECT_EQ(make_scanline_image(image_view(image), Readout::rows, {0, 1, 100}).pixels.data,
+            image.data);
 }
 
 TEST(MakeScanlineImage, TransposesTilesAroundLitPixels) {
@@ -87,8 +89,9 @@ TEST(MakeScanlineImage, FillsSurroundingsOfLightsWithBackgroundLevel) {
     cv::Mat image = spots_on_dark({2000, 1500}, depth, 0);
     const cv::Rect light(900, 700, 200, 150);
     image(light).setTo(white);
-    const Lines found = lines_of(image_view(image), Readout::columns, {7.4, 1, white - 1});
-    const cv::Mat lines = mat_of(found.pixels);
+    const ScanlineImage found =
+        make_scanline_image(image_view(image), Readout::columns, {7.4, 1, white - 1});
+    const cv::Mat lines = to_mat(found.pixels);
     EXPECT_EQ(lines.size(), cv::Size(1500, 2000));
     EXPECT_EQ(lines.type(), image.type());
     // The margin is the size of the light: at least 200 px.
@@ -104,17 +107,18 @@ TEST(MakeScanlineImage, FillsSurroundingsOfLightsWithBackgroundLevel) {
 TEST(MakeScanlineImage, ReturnsBlackImageWhenNoTileIsLit) {
   cv::Mat dark = spots_on_dark({601, 333}, CV_8U, 0);
   dark.at<std::uint8_t>(100, 200) = dark.at<std::uint8_t>(300, 500) = 200;  // no run of three
-  const Lines lines = lines_of(image_view(dark), Readout::columns, {7.4, 1, 100});
+  const ScanlineImage lines =
+      make_scanline_image(image_view(dark), Readout::columns, {7.4, 1, 100});
   EXPECT_EQ(lines.pixels.size(), (ImageSize{333, 601}));
-  EXPECT_EQ(cv::countNonZero(mat_of(lines.pixels)), 0);
-  EXPECT_TRUE(find_runs(lines.pixels, 100, lines.lit).empty());
+  EXPECT_EQ(cv::countNonZero(to_mat(lines.pixels)), 0);
+  EXPECT_TRUE(find_pixel_runs(lines.pixels, 100, lines.lit).empty());
 }
 
 TEST(MakeScanlineImage, KeepsRunAcrossTileBorder) {
   cv::Mat image(200, 200, CV_8U, cv::Scalar(0));
   image.at<std::uint8_t>(63, 10) = image.at<std::uint8_t>(65, 10) = 200;
-  const Lines lines = lines_of(image_view(image), Readout::columns, {0, 1, 100});
-  const auto runs = find_runs(lines.pixels, 100, lines.lit);
+  const ScanlineImage lines = make_scanline_image(image_view(image), Readout::columns, {0, 1, 100});
+  const auto runs = find_pixel_runs(lines.pixels, 100, lines.lit);
   ASSERT_EQ(runs.size(), 1U);
   EXPECT_EQ(runs[0].row, 10);
   EXPECT_EQ(runs[0].begin, 63);
@@ -134,7 +138,7 @@ TEST(MakeScanlineImage, YieldsSameLightsForTransposedImage) {
   scene.sensor.shot_noise = false;
   scene.sensor.read_noise_e = 0;
   const FrameRenderer renderer(scene);
-  const LampMap map = lamp_map_of(scene, false);
+  const LampMap map = make_lamp_map(scene, false);
   const double row_time_s = *scene.camera.row_time_s;
   const LightDetector by_rows(map, {Readout::rows, row_time_s, std::nullopt});
   const LightDetector by_columns(map, {Readout::columns, row_time_s, std::nullopt});
@@ -142,7 +146,7 @@ TEST(MakeScanlineImage, YieldsSameLightsForTransposedImage) {
       *std::find_if(scene.sets.begin(), scene.sets.end(),
                     [](const CaptureSet& any) { return any.folder == "check"; });
   for (std::size_t i = 0; i < 3; ++i) {
-    const LampShot shot = lamp_shot(scene, set, i * 7);
+    const LampShot shot = make_lamp_shot(scene, set, i * 7);
     const cv::Mat image = expose(scene.sensor, renderer.lamp_electrons(shot), shot.noise_seed);
     const auto upright = by_rows.detect(image_view(image));
     auto turned = by_columns.detect(image_view(image.t()));

@@ -71,18 +71,19 @@ struct DrawnDisc {
 
 inline std::vector<EdgePoint> outline_in(const cv::Mat& pixels) {
   const ImageView image = image_view(pixels);
-  const Background background = background_of(image);
+  const Background background = estimate_background(image);
   std::vector<EdgePoint> all;
-  for (const Blob& blob : group_runs(find_runs(image, background.threshold), 3)) {
-    const auto points = outline_of(image, blob, background);
+  for (const Blob& blob : group_pixel_runs(find_pixel_runs(image, background.threshold), 3)) {
+    const auto points = find_outline(image, blob, background);
     all.insert(all.end(), points.begin(), points.end());
   }
   return all;
 }
 
 inline RefinedOutline refined_outline_in(const cv::Mat& image, const DrawnDisc& disc) {
-  return refined(image_view(image), outline_in(image), {disc.low(), disc.high(), disc.center},
-                 background_of(image_view(image)));
+  return refine_outline(image_view(image), outline_in(image),
+                        {disc.low(), disc.high(), disc.center},
+                        estimate_background(image_view(image)));
 }
 
 inline std::vector<EdgePoint> refined_in(const cv::Mat& image, const DrawnDisc& disc) {
@@ -91,10 +92,10 @@ inline std::vector<EdgePoint> refined_in(const cv::Mat& image, const DrawnDisc& 
 
 /// Returns the largest error of the points with at least this cosine between row and normal.
 inline double worst_off(const DrawnDisc& disc, const std::vector<EdgePoint>& points,
-                        double least_cosine) {
+                        double min_cosine) {
   double worst = 0;
   for (const EdgePoint& point : points) {
-    if (disc.cosine(point.pixel) < least_cosine) continue;
+    if (disc.cosine(point.pixel) < min_cosine) continue;
     worst = std::max(worst, std::abs(disc.off(point.pixel)));
   }
   return worst;

@@ -100,8 +100,8 @@ TEST(RefineOutline, DetectsMottledLights) {
         SCOPED_TRACE(testing::Message() << radius_px << ", " << chips << ", " << pitch_px);
         const DrawnDisc disc{
             .radius_px = radius_px, .level = 0.5, .chips = chips, .pitch_px = pitch_px};
-        EXPECT_TRUE(refined_outline_in(disc.image(CV_16U), disc).mottled);
-        EXPECT_TRUE(refined_outline_in(noisy(disc.image(CV_8U), 1, 3), disc).mottled);
+        EXPECT_TRUE(refined_outline_in(disc.image(CV_16U), disc).is_mottled);
+        EXPECT_TRUE(refined_outline_in(noisy(disc.image(CV_8U), 1, 3), disc).is_mottled);
       }
     }
   }
@@ -114,7 +114,7 @@ TEST(RefineOutline, ReportsNotMottledForNoiseGradientOrDarkRim) {
       for (const double radius_px : {24.0, 38.4}) {
         SCOPED_TRACE(testing::Message() << noise << ", " << change << ", " << fall);
         const DrawnDisc disc{.radius_px = radius_px, .level = 0.6, .change = change, .fall = fall};
-        EXPECT_FALSE(refined_outline_in(noisy(disc.image(CV_8U), noise, ++seed), disc).mottled);
+        EXPECT_FALSE(refined_outline_in(noisy(disc.image(CV_8U), noise, ++seed), disc).is_mottled);
       }
     }
   }

@@ -33,10 +33,10 @@ std::vector<RimPiece> pieces_of_circle(int count, double noise, Random& random) 
 TEST(EstimateOutlineShift, IsExactWithoutNoise) {
   Random random(1);
   for (const bool round : {true, false}) {
-    const auto shift = shift_of(pieces_of_circle(12, 0, random), round);
+    const auto shift = estimate_outline_shift(pieces_of_circle(12, 0, random), round);
     ASSERT_TRUE(shift);
     EXPECT_LT((shift->px - kShift).norm(), 1e-9);
-    EXPECT_NEAR(shift->agreeing, 12, 1e-6);
+    EXPECT_NEAR(shift->num_inliers, 12, 1e-6);
   }
 }
 
@@ -47,7 +47,7 @@ TEST(EstimateOutlineShift, CovarianceMatchesScatter) {
     for (const double noise : {1.0, 3.0}) {
       double squares = 0, stated = 0;
       for (int i = 0; i < draws; ++i) {
-        const auto shift = shift_of(pieces_of_circle(24, noise, random), round);
+        const auto shift = estimate_outline_shift(pieces_of_circle(24, noise, random), round);
         ASSERT_TRUE(shift);
         squares += (shift->px - kShift).squaredNorm();
         stated += shift->covariance.trace();
@@ -62,17 +62,17 @@ TEST(EstimateOutlineShift, RejectsOutlierPiece) {
   Random random(3);
   auto pieces = pieces_of_circle(14, 1, random);
   pieces[3].behind_px += 2;
-  const auto shift = shift_of(pieces, true);
+  const auto shift = estimate_outline_shift(pieces, true);
   ASSERT_TRUE(shift);
   EXPECT_LT((shift->px - kShift).norm(), 4 * std::sqrt(shift->covariance.trace()));
-  EXPECT_LT(shift->agreeing, 13);
+  EXPECT_LT(shift->num_inliers, 13);
 }
 
 TEST(EstimateOutlineShift, ReturnsNulloptForTooFewPieces) {
   Random random(4);
-  EXPECT_FALSE(shift_of(pieces_of_circle(4, 1, random), true));
-  EXPECT_FALSE(shift_of(pieces_of_circle(6, 1, random), false));
-  EXPECT_FALSE(shift_of({}, true));
+  EXPECT_FALSE(estimate_outline_shift(pieces_of_circle(4, 1, random), true));
+  EXPECT_FALSE(estimate_outline_shift(pieces_of_circle(6, 1, random), false));
+  EXPECT_FALSE(estimate_outline_shift({}, true));
 }
 
 }  // namespace

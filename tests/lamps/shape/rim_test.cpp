@@ -21,7 +21,7 @@ using Eigen::Vector2d;
 const cv::Size kSize(300, 280);
 
 Blob largest_blob(const ImageView& image, const Background& background) {
-  const auto blobs = group_runs(find_runs(image, background.threshold), 24);
+  const auto blobs = group_pixel_runs(find_pixel_runs(image, background.threshold), 24);
   return *std::max_element(blobs.begin(), blobs.end(), [](const Blob& a, const Blob& b) {
     return a.box().area() < b.box().area();
   });
@@ -29,9 +29,9 @@ Blob largest_blob(const ImageView& image, const Background& background) {
 
 std::optional<Rim> rim_in(const cv::Mat& pixels) {
   const ImageView image = image_view(pixels);
-  const Background background = background_of(image);
-  return rim_of(image, largest_blob(image, background), background,
-                LightShape(drawn_camera(kSize)));
+  const Background background = estimate_background(image);
+  return fit_rim(image, largest_blob(image, background), background,
+                 LightShape(drawn_camera(kSize)));
 }
 
 /// Returns a downlight with a core off the middle in this direction.
@@ -63,10 +63,10 @@ void for_each_downlight(const Test& test) {
 TEST(FitRim, MatchesDownlightForAllCorePositions) {
   double chi_square = 0, worst_px = 0, count = 0;
   for_each_downlight([&](const DrawnLamp& lamp, int depth, double noise, std::uint64_t seed) {
-    const auto rim = rim_in(drawn({lamp}, kSize, depth, noise, seed));
+    const auto rim = rim_in(render_lamps({lamp}, kSize, depth, noise, seed));
     ASSERT_TRUE(rim);
-    EXPECT_TRUE(rim->clear);
-    EXPECT_TRUE(rim->light.uneven);
+    EXPECT_TRUE(rim->is_clear);
+    EXPECT_TRUE(rim->light.is_uneven);
     EXPECT_NEAR(rim->light.radius_px, lamp.radius_px, 1);
     const double error_px = (rim->light.pixel - lamp.center).norm();
     worst_px = std::max(worst_px, error_px);
@@ -96,7 +96,7 @@ TEST(FitRim, IsUnbiasedUnderToneCurve) {
     for (int i = 0; i < 12; ++i) {
       const double angle = i * std::numbers::pi / 6 + 0.2;
       const DrawnLamp lamp = downlight(angle, period);
-      const auto rim = rim_in(coded(drawn({lamp}, kSize, CV_8U, 1, std::uint64_t(++count))));
+      const auto rim = rim_in(coded(render_lamps({lamp}, kSize, CV_8U, 1, std::uint64_t(++count))));
       ASSERT_TRUE(rim);
       const Vector2d error = rim->light.pixel - lamp.center;
       towards_px += error.dot(Vector2d(std::cos(angle), std::sin(angle)));
@@ -158,13 +158,13 @@ TEST(FitRim, DetectsClearRimOfLargeDownlights) {
     lamp.center *= scale, lamp.radius_px *= scale;
     lamp.recess->core_off_px *= scale, lamp.recess->core_px *= scale, lamp.recess->halo_px *= scale;
     const cv::Size size(int(scale * kSize.width), int(scale * kSize.height));
-    const cv::Mat pixels = drawn({lamp}, size, CV_8U, 1);
+    const cv::Mat pixels = render_lamps({lamp}, size, CV_8U, 1);
     const ImageView image = image_view(pixels);
-    const Background background = background_of(image);
+    const Background background = estimate_background(image);
     const auto rim =
-        rim_of(image, largest_blob(image, background), background, LightShape(drawn_camera(size)));
+        fit_rim(image, largest_blob(image, background), background, LightShape(drawn_camera(size)));
     ASSERT_TRUE(rim) << scale;
-    EXPECT_TRUE(rim->clear) << scale;
+    EXPECT_TRUE(rim->is_clear) << scale;
     EXPECT_LT((rim->light.pixel - lamp.center).norm(), 0.5) << scale;
   }
 }
@@ -173,9 +173,9 @@ TEST(LightDetector, IdentifiesDownlights) {
   for_each_downlight([](const DrawnLamp& lamp, int depth, double noise, std::uint64_t seed) {
     const LampMap map{{drawn_lamp(7, lamp.stripes.period_lines), drawn_lamp(8, 14.5)}};
     const auto lights = LightDetector(map, drawn_camera(kSize))
-                            .detect(image_view(drawn({lamp}, kSize, depth, noise, seed)));
+                            .detect(image_view(render_lamps({lamp}, kSize, depth, noise, seed)));
     ASSERT_EQ(lights.size(), 1U);
-    if (lights[0].stripes.periods < kEnoughPeriods) {
+    if (lights[0].stripes.periods < kMinReliablePeriods) {
       EXPECT_EQ(lights[0].reason, LightReason::too_few_periods);
     } else {
       EXPECT_EQ(lights[0].kind, LightKind::lamp);
@@ -192,39 +192,39 @@ TEST(FitRim, ReportsNoClearRimForGlows) {
     for (const double noise : {0.0, 0.5, 1.5}) {
       const DrawnLamp glow{
           .center = {151.3, 139.6}, .stripes = {.period_lines = period}, .glow = DrawnGlow()};
-      const auto rim = rim_in(drawn({glow}, kSize, CV_8U, noise));
-      EXPECT_FALSE(rim && rim->clear) << period << " lines, noise " << noise;
+      const auto rim = rim_in(render_lamps({glow}, kSize, CV_8U, noise));
+      EXPECT_FALSE(rim && rim->is_clear) << period << " lines, noise " << noise;
     }
   }
 }
 
 TEST(FitRim, MatchesEdgeOfDisc) {
   const DrawnLamp disc{.center = {151.3, 139.6}, .radius_px = 50.7};
-  const auto rim = rim_in(drawn({disc}, kSize, CV_8U, 1));
+  const auto rim = rim_in(render_lamps({disc}, kSize, CV_8U, 1));
   ASSERT_TRUE(rim);
-  EXPECT_TRUE(rim->clear);
+  EXPECT_TRUE(rim->is_clear);
   EXPECT_LT((rim->light.pixel - disc.center).norm(), 0.2);
 }
 
 TEST(FitRim, ReturnsNulloptForSmallBlob) {
   const DrawnLamp speck{.center = {151.3, 139.6}, .radius_px = 8};
-  EXPECT_FALSE(rim_in(drawn({speck}, kSize, CV_8U)));
+  EXPECT_FALSE(rim_in(render_lamps({speck}, kSize, CV_8U)));
 }
 
 TEST(IsUnevenlyLit, DistinguishesDownlightsFromDiscs) {
-  const auto uneven = [](const DrawnLamp& lamp, int depth) {
-    const cv::Mat pixels = drawn({lamp}, kSize, depth, 1);
+  const auto is_uneven = [](const DrawnLamp& lamp, int depth) {
+    const cv::Mat pixels = render_lamps({lamp}, kSize, depth, 1);
     const ImageView image = image_view(pixels);
-    const Background background = background_of(image);
+    const Background background = estimate_background(image);
     const Blob blob = largest_blob(image, background);
-    return unevenly_lit(image, blob, outline_of(image, blob, background), background);
+    return is_unevenly_lit(image, blob, find_outline(image, blob, background), background);
   };
   for (const int depth : {CV_8U, CV_16U}) {
-    EXPECT_TRUE(uneven(downlight(0.2, 17), depth));
-    EXPECT_FALSE(uneven({.center = {151.3, 139.6}, .radius_px = 50.7}, depth));
+    EXPECT_TRUE(is_uneven(downlight(0.2, 17), depth));
+    EXPECT_FALSE(is_uneven({.center = {151.3, 139.6}, .radius_px = 50.7}, depth));
   }
   EXPECT_FALSE(
-      unevenly_lit(image_view(cv::Mat1b(20, 20)), Blob{{{3, 2, 9}}}, {}, Background{0, 1, 5}));
+      is_unevenly_lit(image_view(cv::Mat1b(20, 20)), Blob{{{3, 2, 9}}}, {}, Background{0, 1, 5}));
 }
 
 }  // namespace

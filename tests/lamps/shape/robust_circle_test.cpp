@@ -19,12 +19,12 @@ using std::numbers::pi;
 
 constexpr double kTolerance = 0.35;
 
-std::optional<RobustCircle> circle_of(const Points& points, double tolerance = kTolerance) {
+std::optional<RobustCircle> fit_circle_to(const Points& points, double tolerance = kTolerance) {
   return fit_robust_circle(points, std::vector<double>(points.size(), 1), tolerance);
 }
 
 void expect_found(const Points& points, const Circle& truth, double within, int count) {
-  const auto fit = circle_of(points);
+  const auto fit = fit_circle_to(points);
   ASSERT_TRUE(fit);
   EXPECT_THAT(fit->circle.center, IsNear(truth.center, within));
   EXPECT_NEAR(fit->circle.radius, truth.radius, within);
@@ -73,7 +73,7 @@ TEST(FitRobustCircle, CovarianceMatchesScatter) {
     constexpr int draws = 2000;
     double sum = 0;
     for (int i = 0; i < draws; ++i) {
-      const auto fit = circle_of(with_noise(arc(truth, 0, arc_rad, 80), 0.1, random));
+      const auto fit = fit_circle_to(with_noise(arc(truth, 0, arc_rad, 80), 0.1, random));
       ASSERT_TRUE(fit);
       const Vector2d error = fit->circle.center - truth.center;
       sum += error.dot(fit->center_covariance.llt().solve(error));
@@ -86,7 +86,7 @@ TEST(FitRobustCircle, CovarianceMatchesScatter) {
 
 TEST(FitRobustCircle, RmsMatchesScatter) {
   Random random(6);
-  const auto fit = circle_of(with_noise(arc({{300, 200}, 40}, 0, 2 * pi, 2000), 0.1, random));
+  const auto fit = fit_circle_to(with_noise(arc({{300, 200}, 40}, 0, 2 * pi, 2000), 0.1, random));
   ASSERT_TRUE(fit);
   EXPECT_NEAR(fit->rms, 0.1, 0.005);
 }
@@ -102,31 +102,32 @@ TEST(FitRobustCircle, UsesWeights) {
   const auto fit = fit_robust_circle(points, weights, kTolerance);
   ASSERT_TRUE(fit);
   EXPECT_THAT(fit->circle.center, IsNear(heavy.center, 1e-3));
-  EXPECT_GT((circle_of(points)->circle.center - heavy.center).norm(), 0.02);
+  EXPECT_GT((fit_circle_to(points)->circle.center - heavy.center).norm(), 0.02);
 }
 
 TEST(FitRobustCircle, IsDeterministic) {
   Random random(3);
   const Points points =
       with_line(with_noise(arc({{300, 200}, 40}, 0, 4, 60), 0.1, random), 30, {0, 0}, {300, 200});
-  const auto one = circle_of(points), other = circle_of(points);
-  ASSERT_TRUE(one && other);
-  EXPECT_EQ(one->circle.center, other->circle.center);
-  EXPECT_EQ(one->circle.radius, other->circle.radius);
-  EXPECT_EQ(one->inliers, other->inliers);
+  const auto first_fit = fit_circle_to(points), second_fit = fit_circle_to(points);
+  ASSERT_TRUE(first_fit && second_fit);
+  EXPECT_EQ(first_fit->circle.center, second_fit->circle.center);
+  EXPECT_EQ(first_fit->circle.radius, second_fit->circle.radius);
+  EXPECT_EQ(first_fit->inliers, second_fit->inliers);
 }
 
 TEST(FitRobustCircle, ReturnsNulloptForLessThanFiveInliers) {
   for (const std::size_t count : {0U, 1U, 3U, 4U}) {
-    EXPECT_FALSE(circle_of(arc({{300, 200}, 40}, 0, 2 * pi, count))) << count;
+    EXPECT_FALSE(fit_circle_to(arc({{300, 200}, 40}, 0, 2 * pi, count))) << count;
   }
-  EXPECT_FALSE(circle_of(Points(20, Vector2d(3, 4))));
-  EXPECT_FALSE(circle_of({{0, 0}, {100, 3}, {52, 71}, {-20, 55}, {33, 150}, {150, 90}, {7, 99}}));
+  EXPECT_FALSE(fit_circle_to(Points(20, Vector2d(3, 4))));
+  EXPECT_FALSE(
+      fit_circle_to({{0, 0}, {100, 3}, {52, 71}, {-20, 55}, {33, 150}, {150, 90}, {7, 99}}));
 }
 
 TEST(FitRobustCircle, ReturnsNulloptForCollinearPoints) {
-  EXPECT_FALSE(circle_of(with_line({}, 50, {0, 0}, {300, 200})));
-  EXPECT_FALSE(circle_of(with_line({}, 5, {3, 0}, {3, 10})));
+  EXPECT_FALSE(fit_circle_to(with_line({}, 50, {0, 0}, {300, 200})));
+  EXPECT_FALSE(fit_circle_to(with_line({}, 5, {3, 0}, {3, 10})));
 }
 
 }  // namespace

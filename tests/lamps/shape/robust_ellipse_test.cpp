@@ -123,17 +123,17 @@ TEST(FitRobustEllipse, MatchesOpenCvWithoutOutliers) {
 TEST(FitRobustEllipse, MatchesAccuracyOfCircleFitForCircles) {
   Random random(9);
   const Circle truth{{300, 200}, 40};
-  double of_circle = 0, of_ellipse = 0;
+  double circle_squares = 0, ellipse_squares = 0;
   for (int i = 0; i < 500; ++i) {
     const Points points = with_noise(arc(truth, 0, 2 * pi, 80), 0.1, random);
     const auto circle = fit_robust_circle(points, std::vector<double>(80, 1), 0.35);
     const auto ellipse = ellipse_of(points);
     ASSERT_TRUE(circle && ellipse);
-    of_circle += (circle->circle.center - truth.center).squaredNorm();
-    of_ellipse += (ellipse->center - truth.center).squaredNorm();
+    circle_squares += (circle->circle.center - truth.center).squaredNorm();
+    ellipse_squares += (ellipse->center - truth.center).squaredNorm();
     EXPECT_THAT(ellipse->center, IsNear(circle->circle.center, 0.02));
   }
-  EXPECT_NEAR(of_ellipse / of_circle, 1, 0.05);
+  EXPECT_NEAR(ellipse_squares / circle_squares, 1, 0.05);
 }
 
 TEST(FitRobustEllipse, ReturnsNulloptForLessThanSevenInliers) {

@@ -30,12 +30,12 @@ Points read_line_by_line(Points points, const Vector2d& center, const Vector2d& 
 }
 
 /// Camera that translates and rotates, and the outlines of lights that it records.
-class Room {
+class MovingCamera {
  public:
   Vector2d motion_at(const Vector2d& center) const {
     return v + w * Vector2d(-center.y(), center.x());
   }
-  OutlineSums seen(const Vector2d& center, double angle_rad, Random& random) const {
+  OutlineSums make_outline(const Vector2d& center, double angle_rad, Random& random) const {
     Points points = read_line_by_line(arc({center, kRadius}, 0.4, 0.4 + angle_rad, 90), center,
                                       motion_at(center));
     for (Vector2d& point : points) point += noise * Vector2d(random.normal(), random.normal());
@@ -50,39 +50,42 @@ class Room {
   double noise = 1e-4;
 };
 
-std::vector<OutlineSums> three_whole(const Room& room, Random& random) {
-  return {room.seen({0.4, 0.3}, 2 * pi, random), room.seen({-0.4, 0.2}, 2 * pi, random),
-          room.seen({0.1, -0.4}, 2 * pi, random)};
+std::vector<OutlineSums> three_whole(const MovingCamera& moving_camera, Random& random) {
+  return {moving_camera.make_outline({0.4, 0.3}, 2 * pi, random),
+          moving_camera.make_outline({-0.4, 0.2}, 2 * pi, random),
+          moving_camera.make_outline({0.1, -0.4}, 2 * pi, random)};
 }
 
 TEST(Shear, MatchesMotionOfTranslatingAndRotatingCamera) {
   Random random(1);
-  const Room room;
-  const auto lights = three_whole(room, random);
-  const auto shear = Shear::common(lights);
+  const MovingCamera moving_camera;
+  const auto lights = three_whole(moving_camera, random);
+  const auto shear = Shear::estimate(lights);
   ASSERT_TRUE(shear);
   const Vector2d at(-0.3, -0.3);
-  const Oval oval = shear->oval_of(room.seen(at, 2 * pi, random));
+  const Oval oval = shear->predict_oval(moving_camera.make_outline(at, 2 * pi, random));
   // With s along y alone, s (v_x + i v_y) / 2 is |s| (-v_y + i v_x) / 2.
-  const Vector2d motion = room.motion_at(at), expected = 300 * Vector2d(-motion.y(), motion.x());
+  const Vector2d motion = moving_camera.motion_at(at),
+                 expected = 300 * Vector2d(-motion.y(), motion.x());
   EXPECT_GT(expected.norm(), 0.005);
   EXPECT_THAT(oval.oval, IsNear(expected, 3e-4));
-  EXPECT_THAT(shear->motion_at(room.seen(at, 2 * pi, random)), IsNear(motion, 1e-6));
+  EXPECT_THAT(shear->motion_at(moving_camera.make_outline(at, 2 * pi, random)),
+              IsNear(motion, 1e-6));
 }
 
 TEST(Shear, CorrectsCenterOfPartialOutline) {
   Random random(2);
-  const Room room;
+  const MovingCamera moving_camera;
   const Vector2d center(-0.3, -0.3);
   double squared = 0, circle_squared = 0, chi_square = 0;
   constexpr int trials = 100;
   for (int trial = 0; trial < trials; ++trial) {
-    auto lights = three_whole(room, random);
-    lights.push_back(room.seen(center, 1.1 * pi, random));
+    auto lights = three_whole(moving_camera, random);
+    lights.push_back(moving_camera.make_outline(center, 1.1 * pi, random));
     const OutlineSums& part = lights.back();
-    const auto shear = Shear::common(lights);
+    const auto shear = Shear::estimate(lights);
     ASSERT_TRUE(shear);
-    const auto found = part.solved(shear->oval_of(part));
+    const auto found = part.solve_with_prior(shear->predict_oval(part));
     ASSERT_TRUE(found);
     const Vector2d by_circle = part.circle().center - center;
     const Vector2d error = (by_circle + kRadius * found->p.head<2>()) / kRadius;
@@ -99,38 +102,38 @@ TEST(Shear, CorrectsCenterOfPartialOutline) {
 
 TEST(Shear, ReturnsNulloptForStationaryCamera) {
   Random random(3);
-  Room room;
-  room.v.setZero();
-  room.w = 0;
+  MovingCamera moving_camera;
+  moving_camera.v.setZero();
+  moving_camera.w = 0;
   int found = 0;
   for (int trial = 0; trial < 300; ++trial) {
-    found += Shear::common(three_whole(room, random)).has_value();
+    found += Shear::estimate(three_whole(moving_camera, random)).has_value();
   }
   EXPECT_EQ(found, 0);
 }
 
 TEST(Shear, RejectsContradictingLight) {
   Random random(4);
-  const Room room;
-  auto lights = three_whole(room, random);
-  Room other;
-  other.v = -3 * room.v;
-  lights.push_back(other.seen({0.4, -0.3}, 2 * pi, random));
-  const auto shear = Shear::common(lights);
+  const MovingCamera moving_camera;
+  auto lights = three_whole(moving_camera, random);
+  MovingCamera other;
+  other.v = -3 * moving_camera.v;
+  lights.push_back(other.make_outline({0.4, -0.3}, 2 * pi, random));
+  const auto shear = Shear::estimate(lights);
   ASSERT_TRUE(shear);
-  const Vector2d motion = room.motion_at({-0.4, 0.2});
-  EXPECT_THAT(shear->oval_of(lights[1]).oval,
+  const Vector2d motion = moving_camera.motion_at({-0.4, 0.2});
+  EXPECT_THAT(shear->predict_oval(lights[1]).oval,
               IsNear(300 * Vector2d(-motion.y(), motion.x()), 5e-4));
 }
 
 TEST(Shear, ReturnsNulloptWithoutUsableLights) {
-  EXPECT_FALSE(Shear::common({}));
+  EXPECT_FALSE(Shear::estimate({}));
   // Three points of an outline do not determine the motion.
   const Points points{{1, 0}, {0, 1}, {-1, 0}};
   const OutlineSums few(points, std::vector<double>{1, 1, 1}, {true, true, true}, {{0, 0}, 1},
                         kLineSlope);
-  EXPECT_FALSE(few.solved(std::nullopt));
-  EXPECT_FALSE(Shear::common(std::vector{few}));
+  EXPECT_FALSE(few.solve_with_prior(std::nullopt));
+  EXPECT_FALSE(Shear::estimate(std::vector{few}));
 }
 
 }  // namespace

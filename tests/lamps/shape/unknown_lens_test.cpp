@@ -21,42 +21,43 @@ constexpr double kHalf_px = 500;  // half of its diagonal
 
 /// Image of a disc on a ceiling, for a camera tilted towards x, with a lens whose axis is at the
 /// image center. Positions and radii on the ceiling are slopes.
-struct SeenDisc {
+struct DiscProjection {
   Eigen::Vector2d shift_px, pixel;
   double radius_px;
 };
 
-std::optional<SeenDisc> seen(const Lens& lens, double lean_rad, const Eigen::Vector2d& place,
-                             double radius) {
+std::optional<DiscProjection> project_disc(const Lens& lens, double lean_rad,
+                                           const Eigen::Vector2d& place, double radius) {
   const Eigen::Matrix3d camera_from_level =
       Eigen::AngleAxisd(lean_rad, Eigen::Vector3d::UnitY()).toRotationMatrix();
-  const auto pixel_of = [&](const Eigen::Vector2d& on_ceiling) {
+  const auto project_to_pixel = [&](const Eigen::Vector2d& on_ceiling) {
     return lens.project(camera_from_level * on_ceiling.homogeneous());
   };
   std::vector<Eigen::Vector2d> rim;
   for (int i = 0; i < 200; ++i) {
     const double angle = 2 * std::numbers::pi * i / 200;
-    const auto pixel = pixel_of(place + radius * Eigen::Vector2d(std::cos(angle), std::sin(angle)));
+    const auto pixel =
+        project_to_pixel(place + radius * Eigen::Vector2d(std::cos(angle), std::sin(angle)));
     if (!pixel) return std::nullopt;
     rim.push_back(*pixel);
   }
   const std::vector<double> weights(rim.size(), 1);
   const auto fit = fit_robust_ellipse(rim, weights, 0.35);
-  const auto center = pixel_of(place);
+  const auto center = project_to_pixel(place);
   if (!fit || !center) return std::nullopt;
-  return SeenDisc{fit->center - *center, fit->center,
-                  std::sqrt(fit->rim_from_circle.determinant())};
+  return DiscProjection{fit->center - *center, fit->center,
+                        std::sqrt(fit->rim_from_circle.determinant())};
 }
 
 /// Returns the bound on the shift: the standard deviation is per axis.
-double bound_px(const SeenDisc& disc) {
+double bound_px(const DiscProjection& disc) {
   Light light{};
   light.pixel = disc.pixel;
   light.radius_px = disc.radius_px;
-  return std::numbers::sqrt2 * unknown_lens_sd_px(light, kUnknownLensImage);
+  return std::numbers::sqrt2 * compute_unknown_lens_sd_px(light, kUnknownLensImage);
 }
 
-Lens lens_of(LensModel model, double focal_px, std::vector<double> coefficients) {
+Lens make_lens(LensModel model, double focal_px, std::vector<double> coefficients) {
   std::vector<double> parameters = {focal_px, focal_px, (kUnknownLensImage.width - 1) / 2.0,
                                     (kUnknownLensImage.height - 1) / 2.0};
   parameters.insert(parameters.end(), coefficients.begin(), coefficients.end());
@@ -64,11 +65,11 @@ Lens lens_of(LensModel model, double focal_px, std::vector<double> coefficients)
 }
 
 TEST(UnknownLensSd, CoversEquidistantLens) {
-  const Lens equidistant = lens_of(LensModel::fisheye, kHalf_px, {0, 0, 0, 0});
+  const Lens equidistant = make_lens(LensModel::fisheye, kHalf_px, {0, 0, 0, 0});
   int discs = 0;
   for (const double off_axis : {0.1, 0.3, 0.5, 0.7, 0.9}) {
     for (const double radius : {0.02, 0.05, 0.08}) {
-      const auto disc = seen(equidistant, 0, {std::tan(off_axis), 0}, radius);
+      const auto disc = project_disc(equidistant, 0, {std::tan(off_axis), 0}, radius);
       ASSERT_TRUE(disc) << off_axis;
       EXPECT_LT(disc->shift_px.norm(), bound_px(*disc)) << off_axis << ", " << radius;
       if (off_axis > 0.3) {
@@ -82,11 +83,11 @@ TEST(UnknownLensSd, CoversEquidistantLens) {
 }
 
 TEST(UnknownLensSd, CoversTiltedCamera) {
-  const Lens pinhole = lens_of(LensModel::pinhole, kHalf_px, {});
+  const Lens pinhole = make_lens(LensModel::pinhole, kHalf_px, {});
   for (const double lean_deg : {2.0, 5.0, 10.0}) {
     const double lean_rad = rad_from_deg(lean_deg);
     // The disc is at the image center.
-    const auto disc = seen(pinhole, lean_rad, {-std::tan(lean_rad), 0}, 0.06);
+    const auto disc = project_disc(pinhole, lean_rad, {-std::tan(lean_rad), 0}, 0.06);
     ASSERT_TRUE(disc);
     EXPECT_LT(disc->shift_px.norm(), 1.03 * bound_px(*disc));
     const double expected_px = std::pow(disc->radius_px, 2) * std::tan(lean_rad) / kHalf_px;
@@ -98,20 +99,21 @@ TEST(UnknownLensSd, IncreasesWithRadiusAndDistanceFromImageCenter) {
   Light light{};
   light.pixel = {399.5, 299.5};
   light.radius_px = 30;
-  const double in_the_middle = unknown_lens_sd_px(light, kUnknownLensImage);
+  const double in_the_middle = compute_unknown_lens_sd_px(light, kUnknownLensImage);
   light.pixel.x() += 300;
-  const double off_axis = unknown_lens_sd_px(light, kUnknownLensImage);
+  const double off_axis = compute_unknown_lens_sd_px(light, kUnknownLensImage);
   EXPECT_GT(off_axis, 3 * in_the_middle);
   light.radius_px = 60;
-  EXPECT_DOUBLE_EQ(unknown_lens_sd_px(light, kUnknownLensImage), 4 * off_axis);
+  EXPECT_DOUBLE_EQ(compute_unknown_lens_sd_px(light, kUnknownLensImage), 4 * off_axis);
   light.shape = ShapeKind::rectangle;
-  EXPECT_EQ(unknown_lens_sd_px(light, kUnknownLensImage), 0) << "a rectangle's edges say it";
+  EXPECT_EQ(compute_unknown_lens_sd_px(light, kUnknownLensImage), 0)
+      << "a rectangle's edges say it";
 }
 
 /// Returns the score of a scene without its lens: errors relative to the reported sigma.
 Score without_lens(const std::string& scene, std::size_t step) {
   const Captures captures(scene, "check");
-  DetectorCamera camera = detector_camera(captures.calibration());
+  DetectorCamera camera = make_detector_camera(captures.calibration());
   camera.lens.reset();
   return captures.score(step, LightDetector(captures.lamps(), camera));
 }

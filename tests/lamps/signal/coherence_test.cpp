@@ -19,12 +19,13 @@ const cv::Size kPictureSize(200, 160);
 double coherence_in(const cv::Mat& pixels, const DrawnLamp& lamp) {
   const ImageView image = image_view(pixels);
   const Eigen::Vector2d half(lamp.radius_px, lamp.radius_px);
-  return coherence_of(image, chords_of(lamp.center - half, lamp.center + half, image.size()),
-                      background_of(image), lamp.stripes.period_lines);
+  return compute_coherence(
+      image, find_chords_in_ellipse(lamp.center - half, lamp.center + half, image.size()),
+      estimate_background(image), lamp.stripes.period_lines);
 }
 
 double coherence_of_drawn(const DrawnLamp& lamp) {
-  return coherence_in(drawn({lamp}, kPictureSize, CV_16U, 0.5), lamp);
+  return coherence_in(render_lamps({lamp}, kPictureSize, CV_16U, 0.5), lamp);
 }
 
 TEST(ComputeCoherence, ReturnsNearlyOneForLampsOfAnyShape) {
@@ -41,7 +42,7 @@ TEST(ComputeCoherence, IgnoresOneHiddenPart) {
 }
 
 TEST(ComputeCoherence, RejectsTiltedBars) {
-  const auto of_leaning = [](double degrees) {
+  const auto coherence_of_tilted_bars = [](double degrees) {
     DrawnLamp lamp;
     lamp.stripes.period_lines = 0.9 * lamp.radius_px;  // two periods
     const double slope = std::tan(degrees * std::numbers::pi / 180);
@@ -57,8 +58,8 @@ TEST(ComputeCoherence, RejectsTiltedBars) {
     image.convertTo(levels, CV_16U);
     return coherence_in(levels, lamp);
   };
-  EXPECT_GT(of_leaning(2), kMinCoherence);
-  EXPECT_LT(of_leaning(12), kMinCoherence);
+  EXPECT_GT(coherence_of_tilted_bars(2), kMinCoherence);
+  EXPECT_LT(coherence_of_tilted_bars(12), kMinCoherence);
 }
 
 TEST(ComputeCoherence, RejectsIndependentParts) {
@@ -74,8 +75,8 @@ TEST(ComputeCoherence, RejectsIndependentParts) {
       }
     }
     const ImageView image = image_view(pixels);
-    coherent += coherence_of(image, chords_of({40, 40}, {80, 80}, image.size()), {10, 1, 14.5},
-                             4 * patch) > kMinCoherence;
+    coherent += compute_coherence(image, find_chords_in_ellipse({40, 40}, {80, 80}, image.size()),
+                                  {10, 1, 14.5}, 4 * patch) > kMinCoherence;
   }
   EXPECT_LE(coherent, 10);
 }
@@ -85,7 +86,8 @@ TEST(ComputeCoherence, ReturnsZeroForTooFewLines) {
   EXPECT_EQ(coherence_of_drawn(lamp), 0);
   const cv::Mat pixels(120, 120, CV_8U, cv::Scalar(10));
   const ImageView image = image_view(pixels);
-  EXPECT_EQ(coherence_of(image, chords_of({200, 20}, {240, 60}, image.size()), {10, 1, 14.5}, 8),
+  EXPECT_EQ(compute_coherence(image, find_chords_in_ellipse({200, 20}, {240, 60}, image.size()),
+                              {10, 1, 14.5}, 8),
             0);
 }
 

@@ -35,20 +35,20 @@ TEST(LampClassifierFile, ReadReturnsWrittenClassifier) {
   EXPECT_EQ(read.lamps[1].center, sample().lamps[1].center);
   EXPECT_EQ(read.row_time_s, 3e-5);
   write_lamp_classifier(folder / "b.yaml", read);
-  EXPECT_EQ(TemporaryFolder::content_of(folder / "a.yaml"),
-            TemporaryFolder::content_of(folder / "b.yaml"));
+  EXPECT_EQ(TemporaryFolder::read_content(folder / "a.yaml"),
+            TemporaryFolder::read_content(folder / "b.yaml"));
 }
 
 TEST(ReadLampClassifier, ThrowsForInvalidFile) {
   const TemporaryFolder folder;
   write_lamp_classifier(folder / "good.yaml", sample());
-  const std::string good = TemporaryFolder::content_of(folder / "good.yaml");
+  const std::string valid_yaml = TemporaryFolder::read_content(folder / "good.yaml");
   const auto refusal = [&](const std::string& from, const std::string& to) {
-    std::string yaml = good;
+    std::string yaml = valid_yaml;
     const auto at = yaml.find(from);
     EXPECT_NE(at, std::string::npos) << from;
     const auto file = folder.file("bad.yaml", yaml.replace(at, from.size(), to));
-    return refusal_of([&] { read_lamp_classifier(file); });
+    return rejection_message([&] { read_lamp_classifier(file); });
   };
   EXPECT_THAT(refusal("vlp-classifier/1", "vlp-classifier/2"), HasSubstr("bad.yaml:1: format"));
   EXPECT_THAT(refusal("row_time_s: 0.00003", "row_time_s: 30"),
@@ -67,10 +67,10 @@ TEST(ReadLampClassifier, ThrowsForInvalidFile) {
 TEST(ReadLampClassifier, ThrowsForTruncatedFile) {
   const TemporaryFolder folder;
   write_lamp_classifier(folder / "good.yaml", sample());
-  const std::string good = TemporaryFolder::content_of(folder / "good.yaml");
-  for (std::size_t length = 0; length + 1 < good.size(); ++length) {
-    const auto file = folder.file("cut.yaml", good.substr(0, length));
-    EXPECT_NE(refusal_of([&] { read_lamp_classifier(file); }), "") << length;
+  const std::string valid_yaml = TemporaryFolder::read_content(folder / "good.yaml");
+  for (std::size_t length = 0; length + 1 < valid_yaml.size(); ++length) {
+    const auto file = folder.file("cut.yaml", valid_yaml.substr(0, length));
+    EXPECT_NE(rejection_message([&] { read_lamp_classifier(file); }), "") << length;
   }
 }
 

@@ -12,95 +12,95 @@
 namespace vlp {
 namespace {
 
-struct Made {
+struct LampSpec {
   int lamp;
   double period_lines, duty;
 };
 
 /// Returns lights of lamps in typical sizes and phases, one of each lamp in every image.
-std::vector<LabelledLight> lights_of(const std::vector<Made>& lamps, std::size_t images,
-                                     std::uint64_t seed) {
+std::vector<LabelledLight> make_lights(const std::vector<LampSpec>& lamps, std::size_t images,
+                                       std::uint64_t seed) {
   Random random(seed);
   std::vector<LabelledLight> lights;
   for (std::size_t image = 0; image < images; ++image) {
-    for (const Made& lamp : lamps) {
+    for (const LampSpec& lamp : lamps) {
       const auto lines = static_cast<int>(random.uniform(45, 75));
-      lights.push_back(
-          {lamp.lamp,
-           stripes_of(noisy_square_wave(lines, lamp.period_lines, lamp.duty, 1.67, 0.02, random)),
-           image});
+      lights.push_back({lamp.lamp,
+                        measure_stripes(noisy_square_wave(lines, lamp.period_lines, lamp.duty, 1.67,
+                                                          0.02, random)),
+                        image});
     }
   }
   return lights;
 }
 
-const std::vector<Made> kLamps{{4, 16.7, 0.5}, {7, 13.3, 0.5}, {9, 10.8, 0.5}};
+const std::vector<LampSpec> kLamps{{4, 16.7, 0.5}, {7, 13.3, 0.5}, {9, 10.8, 0.5}};
 /// Two lamps of the same period, which only their duty distinguishes.
-const std::vector<Made> kTwins{{1, 12, 0.35}, {2, 12, 0.7}};
+const std::vector<LampSpec> kTwins{{1, 12, 0.35}, {2, 12, 0.7}};
 
 TEST(LampClassifier, IdentifiesTrainedLamps) {
-  const LampClassifier classifier = train_classifier(lights_of(kLamps, 30, 1));
+  const LampClassifier classifier = train_classifier(make_lights(kLamps, 30, 1));
   ASSERT_EQ(classifier.lamps.size(), 3);
   EXPECT_EQ(classifier.lamps[0].lamp, 4);
-  const Confusion confusion = confusion_of(classifier, lights_of(kLamps, 100, 2));
+  const Confusion confusion = compute_confusion(classifier, make_lights(kLamps, 100, 2));
   EXPECT_EQ(confusion.lamps, (std::vector<int>{4, 7, 9}));
   EXPECT_EQ(confusion.wrong(), 0);
   EXPECT_GE(confusion.right(), 297);
   EXPECT_EQ(confusion.right() + confusion.unknown(), 300);
-  EXPECT_TRUE(inseparable(classifier).empty());
+  EXPECT_TRUE(find_inseparable_lamps(classifier).empty());
 }
 
 TEST(LampClassifier, SeparatesLampsOfEqualPeriodByDuty) {
-  const LampClassifier classifier = train_classifier(lights_of(kTwins, 40, 1));
-  const Confusion confusion = confusion_of(classifier, lights_of(kTwins, 100, 2));
+  const LampClassifier classifier = train_classifier(make_lights(kTwins, 40, 1));
+  const Confusion confusion = compute_confusion(classifier, make_lights(kTwins, 100, 2));
   EXPECT_EQ(confusion.wrong(), 0);
   EXPECT_GE(confusion.right(), 150) << confusion.counts;
 }
 
 TEST(LampClassifier, ReportsUnknownForUntrainedLamps) {
-  const LampClassifier classifier = train_classifier(lights_of(kLamps, 30, 1));
+  const LampClassifier classifier = train_classifier(make_lights(kLamps, 30, 1));
   const Confusion confusion =
-      confusion_of(classifier, lights_of({{5, 11.9, 0.5}, {6, 6, 0.5}}, 50, 2));
+      compute_confusion(classifier, make_lights({{5, 11.9, 0.5}, {6, 6, 0.5}}, 50, 2));
   EXPECT_EQ(confusion.unknown(), 100);
 }
 
 TEST(LampClassifier, ReportsUnknownForInseparableLamps) {
-  const std::vector<Made> alike{{4, 16.7, 0.5}, {7, 13.3, 0.5}, {9, 13.35, 0.5}};
-  const LampClassifier classifier = train_classifier(lights_of(alike, 30, 1));
-  const Confusion confusion = confusion_of(classifier, lights_of(alike, 100, 2));
+  const std::vector<LampSpec> similar_lamps{{4, 16.7, 0.5}, {7, 13.3, 0.5}, {9, 13.35, 0.5}};
+  const LampClassifier classifier = train_classifier(make_lights(similar_lamps, 30, 1));
+  const Confusion confusion = compute_confusion(classifier, make_lights(similar_lamps, 100, 2));
   EXPECT_EQ(confusion.counts(0, 0), 100);
   EXPECT_GE(confusion.unknown(), 190);
-  const auto pairs = inseparable(classifier);
+  const auto pairs = find_inseparable_lamps(classifier);
   ASSERT_EQ(pairs.size(), 1);
   EXPECT_EQ(pairs[0].first, 7);
   EXPECT_EQ(pairs[0].second, 9);
 }
 
 TEST(TrainClassifier, RejectsWrongLabels) {
-  auto lights = lights_of(kLamps, 30, 1);
+  auto lights = make_lights(kLamps, 30, 1);
   lights[0].lamp = 9, lights[4].lamp = 4, lights[8].lamp = 7;
   const LampClassifier classifier = train_classifier(lights);
   int used = 0;
   for (const auto& lamp : classifier.lamps) used += lamp.examples;
   EXPECT_LE(used, 87);
   EXPECT_GE(used, 80);
-  const Confusion confusion = confusion_of(classifier, lights_of(kLamps, 100, 2));
+  const Confusion confusion = compute_confusion(classifier, make_lights(kLamps, 100, 2));
   EXPECT_EQ(confusion.wrong(), 0);
   EXPECT_GE(confusion.right(), 297);
 }
 
 TEST(LampClassifier, AcceptsUnclearStripesOnlyCloseToLamp) {
-  const LampClassifier classifier = train_classifier(lights_of(kLamps, 30, 1));
-  Stripes stripes = lights_of(kLamps, 1, 3)[1].stripes;
-  ASSERT_EQ(lamp_of(classifier, stripes), 7);
+  const LampClassifier classifier = train_classifier(make_lights(kLamps, 30, 1));
+  Stripes stripes = make_lights(kLamps, 1, 3)[1].stripes;
+  ASSERT_EQ(identify_lamp(classifier, stripes), 7);
   stripes.period_lines *= 1.025;
-  EXPECT_EQ(lamp_of(classifier, stripes), 7);
+  EXPECT_EQ(identify_lamp(classifier, stripes), 7);
   stripes.clarity = 0.6;
-  EXPECT_EQ(lamp_of(classifier, stripes), std::nullopt);
+  EXPECT_EQ(identify_lamp(classifier, stripes), std::nullopt);
 }
 
 TEST(TrainClassifier, IsIndependentOfOrderOfLights) {
-  auto lights = lights_of(kLamps, 20, 1);
+  auto lights = make_lights(kLamps, 20, 1);
   const LampClassifier a = train_classifier(lights);
   std::reverse(lights.begin(), lights.end());
   const LampClassifier b = train_classifier(lights);
@@ -112,7 +112,7 @@ TEST(TrainClassifier, IsIndependentOfOrderOfLights) {
 }
 
 TEST(CrossValidate, CountsEachLightOnce) {
-  const Confusion confusion = cross_validated(lights_of(kLamps, 40, 1), train_classifier);
+  const Confusion confusion = cross_validate(make_lights(kLamps, 40, 1), train_classifier);
   EXPECT_EQ(confusion.counts.sum(), 120);
   EXPECT_EQ(confusion.wrong(), 0);
   EXPECT_GE(confusion.right(), 117);
@@ -121,10 +121,10 @@ TEST(CrossValidate, CountsEachLightOnce) {
 TEST(CrossValidate, ExcludesHeldOutImagesFromTraining) {
   // All lights of lamp 9 are in one fifth of the images: the classifier for this fold was not
   // trained on lamp 9.
-  auto lights = lights_of(kLamps, 40, 1);
+  auto lights = make_lights(kLamps, 40, 1);
   std::erase_if(lights,
                 [](const LabelledLight& light) { return light.lamp == 9 && light.image % 5 != 0; });
-  const Confusion confusion = cross_validated(lights, train_classifier);
+  const Confusion confusion = cross_validate(lights, train_classifier);
   EXPECT_EQ(confusion.counts(2, 2), 0);
   EXPECT_EQ(confusion.counts(2, 3), 8);
 }
@@ -135,7 +135,7 @@ TEST(CrossValidate, UsesGivenTrainingFunction) {
     std::swap(classifier.lamps.front().lamp, classifier.lamps.back().lamp);
     return classifier;
   };
-  const Confusion confusion = cross_validated(lights_of(kLamps, 40, 1), mistaken);
+  const Confusion confusion = cross_validate(make_lights(kLamps, 40, 1), mistaken);
   EXPECT_GE(confusion.wrong(), 78);
 }
 

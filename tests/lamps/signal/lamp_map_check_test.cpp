@@ -17,7 +17,7 @@ Lamp lamp(int id, double frequency_hz, std::optional<double> duty = 0.5) {
   return {id, {double(id), 0, 1.6}, make_disc(0.18), frequency_hz, duty};
 }
 
-/// Returns the ratio of the RMS error of many measured periods to period_sd().
+/// Returns the ratio of the RMS error of many measured periods to predict_period_sd().
 double measured_over_stated(double period, double lines, double exposure_lines) {
   Random random(5);
   constexpr int draws = 300;
@@ -25,10 +25,10 @@ double measured_over_stated(double period, double lines, double exposure_lines) 
   for (int draw = 0; draw < draws; ++draw) {
     const auto used = static_cast<int>(kUsedHeight * lines);
     const Stripes stripes =
-        stripes_of(noisy_square_wave(used, period, 0.5, exposure_lines, 0.02, random));
+        measure_stripes(noisy_square_wave(used, period, 0.5, exposure_lines, 0.02, random));
     squares += std::pow(stripes.period_lines / period - 1, 2);
   }
-  return std::sqrt(squares / draws) / period_sd(period, lines, exposure_lines);
+  return std::sqrt(squares / draws) / predict_period_sd(period, lines, exposure_lines);
 }
 
 TEST(PredictPeriodSd, MatchesMeasuredErrors) {
@@ -53,22 +53,22 @@ TEST(PredictPeriodSd, BoundsErrorsForIntegerPeriods) {
 }
 
 TEST(PredictPeriodSd, ReturnsInfinityForTooFewPeriods) {
-  EXPECT_EQ(period_sd(40, 50, 1), std::numeric_limits<double>::infinity());
+  EXPECT_EQ(predict_period_sd(40, 50, 1), std::numeric_limits<double>::infinity());
 }
 
 TEST(ComputeLinesOnLamp, ComputesNumberOfLines) {
-  EXPECT_NEAR(lines_on(lamp(1, 2000), kConditions).value(), 58.5, 1e-9);
+  EXPECT_NEAR(compute_lines_on_lamp(lamp(1, 2000), kConditions).value(), 58.5, 1e-9);
   Lamp unknown = lamp(1, 2000);
   unknown.shape.size_m.reset();
-  EXPECT_FALSE(lines_on(unknown, kConditions));
+  EXPECT_FALSE(compute_lines_on_lamp(unknown, kConditions));
   StripeConditions above = kConditions;
   above.camera_height_m = 2;
-  EXPECT_FALSE(lines_on(lamp(1, 2000), above));
+  EXPECT_FALSE(compute_lines_on_lamp(lamp(1, 2000), above));
 }
 
 TEST(FindAmbiguousLamps, ReportsLampsOfNearlyEqualFrequency) {
   const LampMap map{{lamp(1, 2000), lamp(2, 2500), lamp(3, 2530), lamp(4, 3100)}};
-  const auto pairs = lamps_alike(map, kConditions);
+  const auto pairs = find_ambiguous_lamps(map, kConditions);
   ASSERT_EQ(pairs.size(), 1);
   EXPECT_EQ(pairs[0].first, 2);
   EXPECT_EQ(pairs[0].second, 3);
@@ -77,19 +77,21 @@ TEST(FindAmbiguousLamps, ReportsLampsOfNearlyEqualFrequency) {
 }
 
 TEST(FindAmbiguousLamps, AcceptsLampsOfDifferentDuty) {
-  EXPECT_TRUE(lamps_alike({{lamp(2, 2500, 0.3), lamp(3, 2500, 0.7)}}, kConditions).empty());
-  EXPECT_EQ(lamps_alike({{lamp(2, 2500, 0.4), lamp(3, 2500, 0.6)}}, kConditions).size(), 1);
-  EXPECT_EQ(lamps_alike({{lamp(2, 2500, 0.3), lamp(3, 2500, {})}}, kConditions).size(), 1);
+  EXPECT_TRUE(
+      find_ambiguous_lamps({{lamp(2, 2500, 0.3), lamp(3, 2500, 0.7)}}, kConditions).empty());
+  EXPECT_EQ(find_ambiguous_lamps({{lamp(2, 2500, 0.4), lamp(3, 2500, 0.6)}}, kConditions).size(),
+            1);
+  EXPECT_EQ(find_ambiguous_lamps({{lamp(2, 2500, 0.3), lamp(3, 2500, {})}}, kConditions).size(), 1);
 }
 
 TEST(FindAmbiguousLamps, RequiresLargerDifferenceForFewerLines) {
   const LampMap map{{lamp(1, 2500), lamp(2, 2560)}};
-  EXPECT_TRUE(lamps_alike(map, kConditions).empty());
+  EXPECT_TRUE(find_ambiguous_lamps(map, kConditions).empty());
   StripeConditions sharp = kConditions, far = kConditions;
   sharp.exposure_s.reset();
-  EXPECT_EQ(lamps_alike(map, sharp).size(), 1);
+  EXPECT_EQ(find_ambiguous_lamps(map, sharp).size(), 1);
   far.camera_height_m = -1.5;
-  EXPECT_EQ(lamps_alike(map, far).size(), 1);
+  EXPECT_EQ(find_ambiguous_lamps(map, far).size(), 1);
 }
 
 TEST(ExplainMissingRoom, NamesTheRoomsOfLampsWithOneFrequency) {
@@ -123,16 +125,17 @@ TEST(ExplainMissingRoom, ListsTenRoomsAtMost) {
 TEST(FindAmbiguousLamps, MatchesIdentificationByFrequency) {
   StripeConditions conditions = kConditions;
   conditions.exposure_s.reset();
-  const auto needed = lamps_alike({{lamp(1, 2500), lamp(2, 2501)}}, conditions)[0].needed;
+  const auto needed = find_ambiguous_lamps({{lamp(1, 2500), lamp(2, 2501)}}, conditions)[0].needed;
   const LampMap map{{lamp(1, 2500), lamp(2, 2500 * (1 + needed))}};
   Random random(6);
   int right = 0, wrong = 0;
   for (int draw = 0; draw < 400; ++draw) {
     const double period = 1 / (2500 * conditions.row_time_s);
-    const auto lines = static_cast<int>(kUsedHeight * *lines_on(map.lamps[0], conditions));
-    const auto id =
-        lamp_by_frequency(map, conditions.row_time_s,
-                          stripes_of(noisy_square_wave(lines, period, 0.5, 0.02, 0.02, random)));
+    const auto lines =
+        static_cast<int>(kUsedHeight * *compute_lines_on_lamp(map.lamps[0], conditions));
+    const auto id = identify_lamp_by_frequency(
+        map, conditions.row_time_s,
+        measure_stripes(noisy_square_wave(lines, period, 0.5, 0.02, 0.02, random)));
     right += id == 1;
     wrong += id == 2;
   }
@@ -142,7 +145,7 @@ TEST(FindAmbiguousLamps, MatchesIdentificationByFrequency) {
 
 TEST(FindUnreadableLamps, ReportsLampsWithoutReadableStripes) {
   const LampMap map{{lamp(1, 600), lamp(2, 2500), lamp(3, 19000)}};
-  const auto unreadable = lamps_unreadable(map, kConditions);
+  const auto unreadable = find_unreadable_lamps(map, kConditions);
   ASSERT_EQ(unreadable.size(), 2);
   EXPECT_EQ(unreadable[0].lamp, 1);
   EXPECT_LT(unreadable[0].periods, kMinPeriods);

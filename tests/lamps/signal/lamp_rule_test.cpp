@@ -18,13 +18,13 @@ Stripes stripes(double frequency_hz, double duty = 0.5) {
   stripes.contrast = stripes.clarity = 0.9;
   stripes.period_lines = 1 / (frequency_hz * kRowTime_s);
   stripes.periods = 5;
-  stripes.regular = true;
+  stripes.is_regular = true;
   stripes.duty = duty;
   return stripes;
 }
 
 std::optional<int> identified(const std::vector<Lamp>& lamps, const Stripes& stripes) {
-  return lamp_by_frequency({lamps}, kRowTime_s, stripes);
+  return identify_lamp_by_frequency({lamps}, kRowTime_s, stripes);
 }
 
 TEST(IdentifyLampByFrequency, ReturnsLampOfMatchingFrequency) {
@@ -51,7 +51,7 @@ TEST(IdentifyLampByFrequency, RejectsUnclearIrregularStripes) {
   const std::vector<Lamp> lamps{rule_lamp(1, 2000)};
   Stripes unclear = stripes(2000);
   unclear.clarity = 0.6;
-  unclear.regular = false;
+  unclear.is_regular = false;
   EXPECT_EQ(identified(lamps, unclear), std::nullopt);
   unclear.clarity = 0.75;
   EXPECT_EQ(identified(lamps, unclear), 1);

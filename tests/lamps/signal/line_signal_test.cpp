@@ -13,7 +13,8 @@ TEST(ComputeLineSignal, ReturnsMeanOfEachLineAboveDark) {
     cv::Mat pixels(100, 120, depth, cv::Scalar(10));
     for (int row = 31; row <= 69; ++row) pixels(cv::Rect(40, row, 41, 1)) = 2 * row;
     const ImageView image = image_view(pixels);
-    const auto signal = line_signal(image, chords_of({40, 30}, {80, 70}, image.size()), 10);
+    const auto signal =
+        compute_line_signal(image, find_chords_in_ellipse({40, 30}, {80, 70}, image.size()), 10);
     ASSERT_EQ(signal.size(), 37U);  // nine tenths of the height: lines 32 to 68
     for (std::size_t i = 0; i < signal.size(); ++i) {
       EXPECT_DOUBLE_EQ(signal[i], 2.0 * (32 + double(i)) - 10);
@@ -24,11 +25,22 @@ TEST(ComputeLineSignal, ReturnsMeanOfEachLineAboveDark) {
 TEST(ComputeLineSignal, IgnoresScanlinesOutsideImage) {
   const cv::Mat pixels(100, 120, CV_8U, cv::Scalar(50));
   const ImageView image = image_view(pixels);
-  EXPECT_EQ(line_signal(image, chords_of({40, -20}, {80, 20}, image.size()), 10).size(), 19U);
-  EXPECT_EQ(line_signal(image, chords_of({-10, 80}, {30, 120}, image.size()), 10).size(), 18U);
-  EXPECT_TRUE(line_signal(image, chords_of({40, 200}, {80, 240}, image.size()), 10).empty());
-  EXPECT_TRUE(line_signal(image, chords_of({200, 20}, {240, 60}, image.size()), 10).empty());
-  for (const double value : line_signal(image, chords_of({-10, 80}, {30, 120}, image.size()), 10))
+  EXPECT_EQ(
+      compute_line_signal(image, find_chords_in_ellipse({40, -20}, {80, 20}, image.size()), 10)
+          .size(),
+      19U);
+  EXPECT_EQ(
+      compute_line_signal(image, find_chords_in_ellipse({-10, 80}, {30, 120}, image.size()), 10)
+          .size(),
+      18U);
+  EXPECT_TRUE(
+      compute_line_signal(image, find_chords_in_ellipse({40, 200}, {80, 240}, image.size()), 10)
+          .empty());
+  EXPECT_TRUE(
+      compute_line_signal(image, find_chords_in_ellipse({200, 20}, {240, 60}, image.size()), 10)
+          .empty());
+  for (const double value :
+       compute_line_signal(image, find_chords_in_ellipse({-10, 80}, {30, 120}, image.size()), 10))
     EXPECT_EQ(value, 40);
 }
 

@@ -21,7 +21,7 @@ constexpr std::array kLampPeriods_lines{9.0, 11.0, 14.5, 18.0, 24.0};
 std::vector<ModulatedLight> find_lights(const cv::Mat& image, std::span<const double> periods) {
   const ImageView view = image_view(image);
   const std::array boxes{PixelBox{0, 0, view.width, view.height}};
-  return find_modulated_lights(view, boxes, background_of(view), periods);
+  return find_modulated_lights(view, boxes, estimate_background(view), periods);
 }
 
 DrawnLamp make_glow(const Eigen::Vector2d& center, double period_lines) {
@@ -34,9 +34,9 @@ TEST(FindModulatedLights, IdentifiesGlowsAndTheirCenters) {
   for (std::size_t i = 0; i < kLampPeriods_lines.size(); ++i) {
     for (const int depth : {CV_8U, CV_16U}) {
       const Eigen::Vector2d center(203.3, 131.6);
-      const auto lights =
-          find_lights(drawn({make_glow(center, kLampPeriods_lines[i])}, kSearchSize, depth, 1),
-                      kLampPeriods_lines);
+      const auto lights = find_lights(
+          render_lamps({make_glow(center, kLampPeriods_lines[i])}, kSearchSize, depth, 1),
+          kLampPeriods_lines);
       ASSERT_EQ(lights.size(), 1U) << kLampPeriods_lines[i];
       EXPECT_EQ(lights[0].lamp, i);
       EXPECT_LT((lights[0].center - center).norm(), 2);
@@ -48,7 +48,7 @@ TEST(FindModulatedLights, IdentifiesGlowsAndTheirCenters) {
 
 TEST(FindModulatedLights, FindsPeriodWithoutLampPeriods) {
   const auto lights =
-      find_lights(drawn({make_glow({203.3, 131.6}, 13)}, kSearchSize, CV_8U, 1), {});
+      find_lights(render_lamps({make_glow({203.3, 131.6}, 13)}, kSearchSize, CV_8U, 1), {});
   ASSERT_EQ(lights.size(), 1U);
   EXPECT_FALSE(lights[0].lamp);
   EXPECT_NEAR(lights[0].stripes.period_lines, 13, 0.2);
@@ -57,7 +57,7 @@ TEST(FindModulatedLights, FindsPeriodWithoutLampPeriods) {
 TEST(FindModulatedLights, ReportsNoLampForUnknownPeriod) {
   for (const double period : {10.0, 12.6, 16.0, 21.0}) {
     for (const ModulatedLight& light :
-         find_lights(drawn({make_glow({203.3, 131.6}, period)}, kSearchSize, CV_8U, 1),
+         find_lights(render_lamps({make_glow({203.3, 131.6}, period)}, kSearchSize, CV_8U, 1),
                      kLampPeriods_lines)) {
       EXPECT_FALSE(light.lamp) << period;
     }
@@ -95,7 +95,8 @@ TEST(FindModulatedLights, SigmaCoversOffsetOfBrightCore) {
     DrawnLamp lamp{.center = {203.3, 131.6}, .radius_px = 60, .stripes = {.period_lines = 11}};
     lamp.recess = DrawnRecess{.core_off_px = 30 * Eigen::Vector2d(std::cos(angle), std::sin(angle)),
                               .walls = 0.2};
-    const auto lights = find_lights(drawn({lamp}, kSearchSize, CV_8U, 1), kLampPeriods_lines);
+    const auto lights =
+        find_lights(render_lamps({lamp}, kSearchSize, CV_8U, 1), kLampPeriods_lines);
     ASSERT_EQ(lights.size(), 1U);
     EXPECT_EQ(lights[0].lamp, 1U);
     squares +=
@@ -107,8 +108,9 @@ TEST(FindModulatedLights, SigmaCoversOffsetOfBrightCore) {
 
 TEST(FindModulatedLights, ReturnsNoneForSteadyLightNoiseAndEmptyBoxes) {
   const DrawnLamp steady{.center = {203.3, 131.6}, .radius_px = 70, .stripes = {.duty = 1}};
-  EXPECT_TRUE(find_lights(drawn({steady}, kSearchSize, CV_8U, 1), kLampPeriods_lines).empty());
-  EXPECT_TRUE(find_lights(drawn({}, kSearchSize, CV_8U, 2), kLampPeriods_lines).empty());
+  EXPECT_TRUE(
+      find_lights(render_lamps({steady}, kSearchSize, CV_8U, 1), kLampPeriods_lines).empty());
+  EXPECT_TRUE(find_lights(render_lamps({}, kSearchSize, CV_8U, 2), kLampPeriods_lines).empty());
   EXPECT_TRUE(find_lights(cv::Mat(1, 1, CV_8U, cv::Scalar(200)), kLampPeriods_lines).empty());
   EXPECT_TRUE(find_lights(cv::Mat(2, 100, CV_8U, cv::Scalar(200)), {}).empty());
 }

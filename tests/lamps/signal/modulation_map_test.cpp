@@ -94,7 +94,7 @@ TEST(FindModulatedRegions, SeparatesLampsAndExcludesSteadyLight) {
   const DrawnLamp one{.center = {90, 100}, .stripes = {.period_lines = 12}};
   const DrawnLamp other{.center = {300, 90}, .stripes = {.period_lines = 16}};
   const DrawnLamp steady{.center = {195, 100}, .radius_px = 30, .stripes = {.duty = 1}};
-  const cv::Mat image = drawn({one, other, steady}, size, CV_8U, 1);
+  const cv::Mat image = render_lamps({one, other, steady}, size, CV_8U, 1);
   const ModulationMap map = make_map(image, 1, 255 * kDark);
   auto regions = find_modulated_regions(map, min_significant_amplitude(2, 12));
   std::erase_if(regions, [](const ModulatedRegion& region) { return region.cells < 100; });
@@ -105,7 +105,7 @@ TEST(FindModulatedRegions, SeparatesLampsAndExcludesSteadyLight) {
 }
 
 TEST(FindModulatedRegions, ReturnsNoneForNoise) {
-  const cv::Mat image = drawn({}, {400, 300}, CV_8U, 3);
+  const cv::Mat image = render_lamps({}, {400, 300}, CV_8U, 3);
   EXPECT_TRUE(
       find_modulated_regions(make_map(image, 1, 255 * kDark), min_significant_amplitude(3, 12))
           .empty());

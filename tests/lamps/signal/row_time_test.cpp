@@ -16,7 +16,7 @@ using testing::HasSubstr;
 
 constexpr double kTrue_s = 2.1e-5;
 
-LampMap map_of(const std::vector<double>& frequencies_hz) {
+LampMap make_lamp_map(const std::vector<double>& frequencies_hz) {
   LampMap map;
   for (const double frequency_hz : frequencies_hz) {
     const int id = static_cast<int>(map.lamps.size()) + 1;
@@ -33,17 +33,17 @@ void add(std::vector<MeasuredPeriod>& lights, double frequency_hz, int count, do
   }
 }
 
-RowTimeResult row_time_of(const std::vector<MeasuredPeriod>& lights, const LampMap& map) {
+RowTimeResult find_row_time(const std::vector<MeasuredPeriod>& lights, const LampMap& map) {
   return choose_row_time(estimate_row_time(lights, map));
 }
 
-const LampMap kMap = map_of({2000, 2500, 3000, 3500, 4000});
+const LampMap kMap = make_lamp_map({2000, 2500, 3000, 3500, 4000});
 
 TEST(EstimateRowTime, IsExactWithoutNoise) {
   Random random(1);
   std::vector<MeasuredPeriod> lights;
   for (const Lamp& lamp : kMap.lamps) add(lights, *lamp.frequency_hz, 1, 0, random);
-  const auto result = row_time_of(lights, kMap);
+  const auto result = find_row_time(lights, kMap);
   ASSERT_TRUE(result.found) << result.problem;
   EXPECT_NEAR(result.found->row_time_s, kTrue_s, 1e-12 * kTrue_s);
   EXPECT_EQ(result.found->lamps, 5);
@@ -60,7 +60,7 @@ TEST(EstimateRowTime, SdMatchesScatter) {
     for (const Lamp& lamp : kMap.lamps) {
       add(lights, *lamp.frequency_hz * std::exp(0.005 * random.normal()), 20, 0.002, random);
     }
-    const auto result = row_time_of(lights, kMap);
+    const auto result = find_row_time(lights, kMap);
     ASSERT_TRUE(result.found) << result.problem;
     chi_square += std::pow((result.found->row_time_s - kTrue_s) / result.found->sd_s, 2);
   }
@@ -75,7 +75,7 @@ TEST(EstimateRowTime, IsRobustAgainstWrongLampFrequency) {
   for (const double frequency_hz : {2089.0, 2511.0, 3006.0, 3533.0, 4014.0}) {
     lights.push_back({1 / (frequency_hz * kTrue_s), {}});
   }
-  const auto result = row_time_of(lights, kMap);
+  const auto result = find_row_time(lights, kMap);
   ASSERT_TRUE(result.found) << result.problem;
   EXPECT_NEAR(result.found->row_time_s / kTrue_s, 1, 0.006);
   EXPECT_LT(std::abs(result.found->row_time_s - kTrue_s), 3 * result.found->sd_s);
@@ -87,15 +87,15 @@ TEST(EstimateRowTime, IsRobustAgainstOtherLights) {
   for (const Lamp& lamp : kMap.lamps) add(lights, *lamp.frequency_hz, 20, 0.002, random);
   add(lights, 2700, 20, 0.002, random);  // a lamp that the map lacks
   for (int i = 0; i < 30; ++i) lights.push_back({random.uniform(5, 40), {}});
-  const auto result = row_time_of(lights, kMap);
+  const auto result = find_row_time(lights, kMap);
   ASSERT_TRUE(result.found) << result.problem;
   EXPECT_NEAR(result.found->row_time_s / kTrue_s, 1, 0.001);
   EXPECT_EQ(result.found->lamps, 5);
 }
 
 TEST(EstimateRowTime, NeedsNoLabelsForSingleFrequency) {
-  const auto result =
-      row_time_of(std::vector<MeasuredPeriod>{{1 / (2500 * kTrue_s), {}}}, map_of({2500, 2500}));
+  const auto result = find_row_time(std::vector<MeasuredPeriod>{{1 / (2500 * kTrue_s), {}}},
+                                    make_lamp_map({2500, 2500}));
   ASSERT_TRUE(result.found) << result.problem;
   EXPECT_NEAR(result.found->row_time_s, kTrue_s, 1e-12);
   EXPECT_EQ(result.found->lamps, 1);
@@ -104,7 +104,7 @@ TEST(EstimateRowTime, NeedsNoLabelsForSingleFrequency) {
 void expect_ambiguous(const std::vector<double>& seen_hz, const LampMap& map) {
   std::vector<MeasuredPeriod> lights;
   for (const double frequency_hz : seen_hz) lights.push_back({1 / (frequency_hz * kTrue_s), {}});
-  const auto result = row_time_of(lights, map);
+  const auto result = find_row_time(lights, map);
   EXPECT_FALSE(result.found);
   EXPECT_THAT(result.problem, HasSubstr("add captures that show more lamps, or a table"));
 }
@@ -112,15 +112,16 @@ void expect_ambiguous(const std::vector<double>& seen_hz, const LampMap& map) {
 TEST(ChooseRowTime, ReturnsProblemWhenAmbiguous) {
   expect_ambiguous({2500}, kMap);
   // All ratios are equal, and one lamp is not detected.
-  const LampMap even = map_of({1600, 2000, 2500, 3125});
+  const LampMap even = make_lamp_map({1600, 2000, 2500, 3125});
   expect_ambiguous({1600, 2000, 2500}, even);
   expect_ambiguous({2000, 2500, 3125}, even);
 }
 
 /// Returns lights of these lamps of `map`, with their duties.
-std::vector<MeasuredPeriod> with_duties(const LampMap& map, const std::vector<std::size_t>& seen) {
+std::vector<MeasuredPeriod> with_duties(const LampMap& map,
+                                        const std::vector<std::size_t>& lamp_indices) {
   std::vector<MeasuredPeriod> lights;
-  for (const std::size_t i : seen) {
+  for (const std::size_t i : lamp_indices) {
     const Lamp& lamp = map.lamps[i];
     lights.push_back({1 / (*lamp.frequency_hz * kTrue_s), {}, lamp.duty});
   }
@@ -128,7 +129,7 @@ std::vector<MeasuredPeriod> with_duties(const LampMap& map, const std::vector<st
 }
 
 TEST(EstimateRowTime, ReturnsAllCandidatesWithTheirLamps) {
-  const LampMap even = map_of({1600, 2000, 2500, 3125});
+  const LampMap even = make_lamp_map({1600, 2000, 2500, 3125});
   const auto result = estimate_row_time(with_duties(even, {1, 2, 3}), even);
   ASSERT_EQ(result.groups.size(), 3);
   ASSERT_EQ(result.candidates.size(), 2) << result.problem;
@@ -148,25 +149,25 @@ TEST(EstimateRowTime, ReturnsAllCandidatesWithTheirLamps) {
 }
 
 TEST(EstimateRowTime, ResolvesAmbiguityByDuties) {
-  LampMap even = map_of({1600, 2000, 2500, 3125});
+  LampMap even = make_lamp_map({1600, 2000, 2500, 3125});
   const std::vector duties{0.3, 0.7, 0.4, 0.7};
   for (std::size_t i = 0; i < 4; ++i) even.lamps[i].duty = duties[i];
   auto lights = with_duties(even, {1, 2, 3});
   // Blur and saturation may change duties by this amount.
   for (MeasuredPeriod& light : lights) *light.duty += 0.08;
-  const auto result = row_time_of(lights, even);
+  const auto result = find_row_time(lights, even);
   ASSERT_TRUE(result.found) << result.problem;
   EXPECT_NEAR(result.found->row_time_s, kTrue_s, 1e-9 * kTrue_s);
   // If one lamp has no duty, no duties are used.
   even.lamps[0].duty.reset();
-  EXPECT_FALSE(row_time_of(lights, even).found);
+  EXPECT_FALSE(find_row_time(lights, even).found);
   // Equal duties do not resolve the ambiguity.
   for (Lamp& lamp : even.lamps) lamp.duty = 0.5;
-  EXPECT_FALSE(row_time_of(with_duties(even, {1, 2, 3}), even).found);
+  EXPECT_FALSE(find_row_time(with_duties(even, {1, 2, 3}), even).found);
 }
 
 TEST(ChooseRowTime, AddsPositionCosts) {
-  const LampMap even = map_of({1600, 2000, 2500, 3125});
+  const LampMap even = make_lamp_map({1600, 2000, 2500, 3125});
   const auto found = estimate_row_time(with_duties(even, {1, 2, 3}), even);
   ASSERT_EQ(found.candidates.size(), 2);
   for (const std::size_t right : {0U, 1U}) {
@@ -182,21 +183,21 @@ TEST(ChooseRowTime, AddsPositionCosts) {
 }
 
 TEST(EstimateRowTime, ResolvesAmbiguityByLabels) {
-  const LampMap even = map_of({1600, 2000, 2500, 3125});
+  const LampMap even = make_lamp_map({1600, 2000, 2500, 3125});
   const std::vector<MeasuredPeriod> lights{{1 / (2000 * kTrue_s), 2}, {1 / (2500 * kTrue_s), 3}};
-  const auto result = row_time_of(lights, even);
+  const auto result = find_row_time(lights, even);
   ASSERT_TRUE(result.found) << result.problem;
   EXPECT_NEAR(result.found->row_time_s, kTrue_s, 1e-12);
 }
 
 TEST(ChooseRowTime, ReportsReasonWithoutRowTime) {
-  EXPECT_THAT(row_time_of({}, kMap).problem, HasSubstr("no light has clear stripes"));
-  EXPECT_THAT(row_time_of(std::vector<MeasuredPeriod>{{10, 77}}, kMap).problem,
+  EXPECT_THAT(find_row_time({}, kMap).problem, HasSubstr("no light has clear stripes"));
+  EXPECT_THAT(find_row_time(std::vector<MeasuredPeriod>{{10, 77}}, kMap).problem,
               HasSubstr("no lamp of the map"));
   // Periods of random lights.
   std::vector<MeasuredPeriod> lights;
   for (const double period : {5.0, 7.3, 11.9, 19.1, 30.7, 46.0}) lights.push_back({period, {}});
-  const auto result = row_time_of(lights, map_of({2000, 2200}));
+  const auto result = find_row_time(lights, make_lamp_map({2000, 2200}));
   EXPECT_FALSE(result.found);
   EXPECT_NE(result.problem, "");
 }
@@ -207,7 +208,7 @@ TEST(GroupPeriods, ReturnsOneGroupForEachPeriod) {
   add(lights, 2000, 40, 0.003, random);
   add(lights, 2500, 30, 0.003, random);
   for (int i = 0; i < 5; ++i) lights.push_back({random.uniform(30, 60), {}});
-  const auto groups = period_groups(lights);
+  const auto groups = group_periods(lights);
   ASSERT_EQ(groups.size(), 2);
   EXPECT_EQ(groups[0].lights.size(), 40);
   EXPECT_NEAR(std::exp(groups[0].log_period) * 2000 * kTrue_s, 1, 0.002);

@@ -22,8 +22,8 @@ inline std::vector<double> noisy_square_wave(int lines, double period, double du
   std::vector<double> signal;
   for (int line = 0; line < lines; ++line) {
     const double begin = line + phase;
-    const double share = (lit_until(begin + exposure_lines) - lit_until(begin)) / exposure_lines;
-    signal.push_back(200 * (share + noise * random.normal()));
+    const double fraction = (lit_until(begin + exposure_lines) - lit_until(begin)) / exposure_lines;
+    signal.push_back(200 * (fraction + noise * random.normal()));
   }
   return signal;
 }

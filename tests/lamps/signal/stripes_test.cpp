@@ -17,7 +17,7 @@ constexpr double kDarkCounts = 10, kBrightCounts = 200;
 
 /// Returns the fraction of the time from `begin` to `begin` + `exposure`, in line times, during
 /// which a square wave is on.
-double lit_share(double begin, double exposure, double period, double duty) {
+double lit_fraction(double begin, double exposure, double period, double duty) {
   const auto lit_until = [&](double time) {
     const double whole = std::floor(time / period);
     return whole * duty * period + std::min(time - whole * period, duty * period);
@@ -29,8 +29,8 @@ std::vector<double> square_wave(int lines, double period, double duty, double ph
                                 double exposure = 1) {
   std::vector<double> signal;
   for (int line = 0; line < lines; ++line) {
-    const double share = lit_share(line + phase * period, exposure, period, duty);
-    signal.push_back(kDarkCounts + (kBrightCounts - kDarkCounts) * share);
+    const double fraction = lit_fraction(line + phase * period, exposure, period, duty);
+    signal.push_back(kDarkCounts + (kBrightCounts - kDarkCounts) * fraction);
   }
   return signal;
 }
@@ -47,7 +47,7 @@ TEST_P(MeasureStripesOfSquareWave, ReturnsPeriodAndDuty) {
     for (const double duty : {0.3, 0.5, 0.7}) {
       for (const double phase : {0.0, 0.2, 0.4, 0.6, 0.8}) {
         SCOPED_TRACE(testing::Message() << lines << " lines, duty " << duty << ", phase " << phase);
-        const Stripes stripes = stripes_of(square_wave(lines, period, duty, phase));
+        const Stripes stripes = measure_stripes(square_wave(lines, period, duty, phase));
         EXPECT_NEAR(stripes.period_lines, period, 0.01 * period);
         EXPECT_NEAR(stripes.duty, duty, 0.05);
         EXPECT_NEAR(stripes.contrast, 1 - kDarkCounts / kBrightCounts, 1e-9);
@@ -69,7 +69,7 @@ TEST_P(MeasureStripesOfSquareWave, ReturnsPeriodUnderExposure) {
           SCOPED_TRACE(testing::Message() << lines << " lines, duty " << duty << ", phase " << phase
                                           << ", exposure " << exposure);
           const Stripes stripes =
-              stripes_of(square_wave(lines, period, duty, phase, exposure * period));
+              measure_stripes(square_wave(lines, period, duty, phase, exposure * period));
           EXPECT_NEAR(stripes.period_lines, period, 0.01 * period);
           EXPECT_GT(stripes.clarity, 0.5);
         }
@@ -87,7 +87,7 @@ TEST(MeasureStripes, ReturnsPeriodAndClarityOfSine) {
     for (int line = 0; line < 50; ++line) {
       signal.push_back(100 + 80 * std::sin(2 * std::numbers::pi * line / period));
     }
-    const Stripes stripes = stripes_of(signal);
+    const Stripes stripes = measure_stripes(signal);
     EXPECT_NEAR(stripes.period_lines, period, 0.01 * period);
     EXPECT_GT(stripes.clarity, 0.96);
   }
@@ -98,7 +98,7 @@ TEST(MeasureStripes, ReturnsPeriodAndDutyInNoise) {
   for (int draw = 0; draw < 100; ++draw) {
     std::vector<double> signal = square_wave(60, 9.3, 0.5, random.uniform(0, 1), 2);
     for (double& value : signal) value += 5 * random.normal();
-    const Stripes stripes = stripes_of(signal);
+    const Stripes stripes = measure_stripes(signal);
     EXPECT_NEAR(stripes.period_lines, 9.3, 0.02 * 9.3) << draw;
     EXPECT_NEAR(stripes.duty, 0.5, 0.08) << draw;
   }
@@ -109,14 +109,14 @@ TEST(MeasureStripes, ReturnsLowContrastAndClarityForSteadyLight) {
   for (int draw = 0; draw < 100; ++draw) {
     std::vector<double> signal(60);
     for (double& value : signal) value = 150 + 2 * random.normal();
-    const Stripes stripes = stripes_of(signal);
+    const Stripes stripes = measure_stripes(signal);
     EXPECT_LT(stripes.contrast, 0.1);
     EXPECT_LT(stripes.clarity, 0.5);
   }
 }
 
 void expect_no_stripes(const std::vector<double>& signal) {
-  const Stripes stripes = stripes_of(signal);
+  const Stripes stripes = measure_stripes(signal);
   EXPECT_EQ(stripes.contrast, 0);
   EXPECT_EQ(stripes.clarity, 0);
   EXPECT_TRUE(std::isfinite(stripes.period_lines) && std::isfinite(stripes.periods));
@@ -125,14 +125,14 @@ void expect_no_stripes(const std::vector<double>& signal) {
 
 TEST(MeasureStripes, ReturnsNoStripesForShortSignals) {
   for (int lines = 0; lines < 8; ++lines) expect_no_stripes(square_wave(lines, 4, 0.5, 0));
-  EXPECT_GT(stripes_of(square_wave(8, 4, 0.5, 0)).contrast, 0.5);
+  EXPECT_GT(measure_stripes(square_wave(8, 4, 0.5, 0)).contrast, 0.5);
 }
 
 TEST(MeasureStripes, ReturnsNoStripesForConstantSignals) {
   for (const double level : {0.0, 1e-3, 0.1, 100.1, 200.0 / 3, -5.0}) {
     for (const std::size_t lines : {8U, 41U, 60U, 67U}) {
       SCOPED_TRACE(testing::Message() << level << ", " << lines);
-      const Stripes stripes = stripes_of(std::vector<double>(lines, level));
+      const Stripes stripes = measure_stripes(std::vector<double>(lines, level));
       EXPECT_EQ(stripes.contrast, 0);
       EXPECT_LT(stripes.clarity, 0.5);
       EXPECT_TRUE(stripes.duty >= 0 && stripes.duty <= 1) << stripes.duty;
@@ -145,7 +145,7 @@ TEST(MeasureStripes, ReturnsFiniteDutyForSignalWithOneOutlier) {
   for (const double odd : {0.0, 300.0}) {
     std::vector<double> signal(60, 100);
     signal[20] = odd;
-    const Stripes stripes = stripes_of(signal);
+    const Stripes stripes = measure_stripes(signal);
     EXPECT_EQ(stripes.contrast, 0);
     EXPECT_TRUE(std::isfinite(stripes.duty));
   }

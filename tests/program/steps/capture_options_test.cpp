@@ -22,7 +22,7 @@ TEST(MotionOptions, ReturnNulloptWithoutSpeed) {
 TEST(CheckEvery, ThrowsWithoutVideo) {
   check_every(1, {"boards"});
   check_every(5, {"boards", "boards.mp4"});
-  EXPECT_EQ(refusal_of<std::invalid_argument>([] { check_every(5, {"boards"}); }),
+  EXPECT_EQ(rejection_message<std::invalid_argument>([] { check_every(5, {"boards"}); }),
             "--every is for videos, and there is none");
 }
 

@@ -16,7 +16,7 @@ namespace vlp {
 namespace {
 
 /// A program with options of each kind, as called with `arguments`.
-HistoryEntry entry_of(const std::string& arguments, const std::vector<std::string>& inputs) {
+HistoryEntry make_entry(const std::string& arguments, const std::vector<std::string>& inputs) {
   CLI::App app("Something", "vlp-something");
   std::string images, lamps, output, method;
   std::vector<double> numbers;
@@ -31,7 +31,7 @@ HistoryEntry entry_of(const std::string& arguments, const std::vector<std::strin
   app.add_flag("--refine-map", flag);
   app.add_flag("-q,--quiet", quiet);
   app.parse(arguments);
-  return history_entry(app, inputs);
+  return make_program_history_entry(app, inputs);
 }
 
 TEST(Sha256, MatchesFips180Examples) {  // FIPS 180-2, appendix B
@@ -49,7 +49,7 @@ TEST(InputDigests, MatchSha256sumForFolder) {
   folder.file("notes.txt", "no image");
   const auto oracle =
       run_program("cd '" + (folder / "").string() + "' && sha256sum *.png | sha256sum");
-  EXPECT_EQ(InputDigests().of_images(folder / ""), oracle.output.substr(0, 64));
+  EXPECT_EQ(InputDigests().digest_images(folder / ""), oracle.output.substr(0, 64));
 }
 
 TEST(HistoryEntry, IsIndependentOfMachine) {
@@ -58,25 +58,25 @@ TEST(HistoryEntry, IsIndependentOfMachine) {
   folder.file("spot/0.png", "an image");
   const std::string images = (folder / "spot").string() + "/";
   const std::string lamps = folder.file("lamps.yaml", "abc").string();
-  const HistoryEntry entry =
-      entry_of("--refine-map --threads 3 -q --numbers 1.5 -2 --method axis -o /else/where.yaml '" +
-                   images + "' --lamps '" + lamps + "'",
-               {images, lamps, ""});
+  const HistoryEntry entry = make_entry(
+      "--refine-map --threads 3 -q --numbers 1.5 -2 --method axis -o /else/where.yaml '" + images +
+          "' --lamps '" + lamps + "'",
+      {images, lamps, ""});
   EXPECT_EQ(entry.program, "vlp-something");
   EXPECT_EQ(entry.version, VLP_VERSION);
   EXPECT_EQ(entry.options, "--lamps lamps.yaml --method axis --numbers 1.5 -2 --refine-map");
   ASSERT_EQ(entry.inputs.size(), 2U);
   EXPECT_EQ(entry.inputs[0].file, "spot");
-  EXPECT_EQ(entry.inputs[0].sha256, InputDigests().of_images(images));
+  EXPECT_EQ(entry.inputs[0].sha256, InputDigests().digest_images(images));
   EXPECT_EQ(entry.inputs[1].file, "lamps.yaml");
   EXPECT_EQ(entry.inputs[1].sha256, sha256_of_file(lamps));
 }
 
 TEST(HistoryEntry, IsEmptyWithoutOptionsAndThrowsForUnreadableInput) {
   const TemporaryFolder folder;
-  EXPECT_EQ(entry_of("images", {}).options, "");
+  EXPECT_EQ(make_entry("images", {}).options, "");
   const std::string missing = (folder / "missing").string();
-  EXPECT_EQ(refusal_of([&] { entry_of("images", {missing}); }),
+  EXPECT_EQ(rejection_message([&] { make_entry("images", {missing}); }),
             missing + ": cannot be opened: No such file or directory");
 }
 

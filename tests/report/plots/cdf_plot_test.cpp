@@ -12,11 +12,11 @@ using testing::Not;
 
 TEST(CdfPlot, HasStepForEachErrorAndMarksP50AndP90) {
   const CdfPlot plot{"a", {{"it's", {0.004, 0.001, 0.003, 0.002}, 0.002, 0.004}}};
-  const Drawing drawing = drawing_of(plot);
+  const Drawing drawing = make_drawing(plot);
   EXPECT_THAT(drawing.commands, HasSubstr("0 0 \n1 25 \n2 50 \n3 75 \n4 100 \n"));
   EXPECT_THAT(drawing.commands, HasSubstr("2 50 \n4 90 \n"));
   EXPECT_THAT(drawing.commands, Not(HasSubstr("off the picture")));
-  const std::string svg = svg_of(drawing);
+  const std::string svg = render_svg(drawing);
   EXPECT_THAT(svg, HasSubstr("<title>cdf</title>"));
   EXPECT_THAT(svg, HasSubstr("it's: p50 2 mm, p90 4 mm"));
 }
@@ -25,20 +25,20 @@ TEST(CdfPlot, ReportsClippedLargestError) {
   std::vector<double> errors_m(100, 0.001);
   errors_m[50] = 1;
   const CdfPlot plot{"a", {{"b", errors_m, 0.001, 0.001}}};
-  EXPECT_THAT(drawing_of(plot).commands, HasSubstr("the largest, 1000 mm, is off the picture"));
+  EXPECT_THAT(make_drawing(plot).commands, HasSubstr("the largest, 1000 mm, is off the picture"));
 }
 
 TEST(CdfPlot, KeepsLargestOfManyErrors) {
   std::vector<double> errors_m;
   for (int i = 100'000; i > 0; --i) errors_m.push_back(1e-8 * i);
   const CdfPlot plot{"a", {{"b", errors_m, 0.0005, 0.0009}, {"c", errors_m, 0.0005, 0.0009}}};
-  const Drawing drawing = drawing_of(plot);
+  const Drawing drawing = make_drawing(plot);
   EXPECT_THAT(drawing.commands, HasSubstr("\n1 100 \n"));
-  EXPECT_LT(svg_of(drawing).size(), 100'000u);
+  EXPECT_LT(render_svg(drawing).size(), 100'000u);
 }
 
 TEST(CdfPlot, RendersAllZeroErrors) {
-  EXPECT_THAT(svg_of(drawing_of(CdfPlot{"a", {{"b", {0, 0}, 0, 0}}})), HasSubstr("<svg"));
+  EXPECT_THAT(render_svg(make_drawing(CdfPlot{"a", {{"b", {0, 0}, 0, 0}}})), HasSubstr("<svg"));
 }
 
 }  // namespace

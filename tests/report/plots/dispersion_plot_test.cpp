@@ -22,30 +22,30 @@ class DispersionPlotTest : public testing::Test {
                       {{{0.001, 0}, {0, 0.001}}, {{0, 0}, 0.001}},
                       {}};
 
-  std::string drawn(const char* name) {
-    draw(folder / name, drawing_of(plot));
-    return TemporaryFolder::content_of(folder / name);
+  std::string rendered(const char* name) {
+    draw(folder / name, make_drawing(plot));
+    return TemporaryFolder::read_content(folder / name);
   }
 };
 
 TEST_F(DispersionPlotTest, RendersReproduciblePngOrSvgByExtension) {
-  EXPECT_THAT(drawn("a.png"), StartsWith("\x89PNG"));
-  EXPECT_EQ(drawn("a.png"), drawn("a.png"));
-  EXPECT_THAT(drawn("a.svg"), HasSubstr("a 'title'"));
-  EXPECT_THAT(refusal_of([&] { draw(folder / "a.gif", drawing_of(plot)); }),
+  EXPECT_THAT(rendered("a.png"), StartsWith("\x89PNG"));
+  EXPECT_EQ(rendered("a.png"), rendered("a.png"));
+  EXPECT_THAT(rendered("a.svg"), HasSubstr("a 'title'"));
+  EXPECT_THAT(rejection_message([&] { draw(folder / "a.gif", make_drawing(plot)); }),
               HasSubstr("a.gif: a picture's name should end in"));
 }
 
 TEST_F(DispersionPlotTest, MarksOutliersIfAny) {
-  EXPECT_THAT(drawn("a.svg"), Not(HasSubstr("left out")));
+  EXPECT_THAT(rendered("a.svg"), Not(HasSubstr("left out")));
   plot.outliers_m = {{0.05, 0.05}};
-  EXPECT_THAT(drawn("a.svg"), HasSubstr("left out"));
+  EXPECT_THAT(rendered("a.svg"), HasSubstr("left out"));
 }
 
 TEST_F(DispersionPlotTest, RendersSingleFix) {
   plot.before = {{{0.01, 0}}, {{0.01, 0}, 0}};
   plot.after = {{{0, 0}}, {{0, 0}, 0}};
-  EXPECT_THAT(drawn("a.svg"), HasSubstr("<svg"));
+  EXPECT_THAT(rendered("a.svg"), HasSubstr("<svg"));
 }
 
 }  // namespace

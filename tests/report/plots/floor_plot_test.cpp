@@ -25,9 +25,9 @@ class FloorPlotTest : public testing::Test {
 
 TEST_F(FloorPlotTest, RendersPngOrSvgByExtension) {
   draw_floor_plot(folder / "a.png", plot, lamps);
-  EXPECT_THAT(TemporaryFolder::content_of(folder / "a.png"), StartsWith("\x89PNG"));
+  EXPECT_THAT(TemporaryFolder::read_content(folder / "a.png"), StartsWith("\x89PNG"));
   draw_floor_plot(folder / "a.svg", plot, lamps);
-  const std::string svg = TemporaryFolder::content_of(folder / "a.svg");
+  const std::string svg = TemporaryFolder::read_content(folder / "a.svg");
   EXPECT_THAT(svg, HasSubstr("<svg"));
   EXPECT_THAT(svg, HasSubstr("a 'title'"));
   EXPECT_THAT(svg, HasSubstr(">7<"));
@@ -36,24 +36,24 @@ TEST_F(FloorPlotTest, RendersPngOrSvgByExtension) {
 TEST_F(FloorPlotTest, IsReproducible) {
   for (const char* name : {"a.png", "a.svg"}) {
     draw_floor_plot(folder / name, plot, lamps);
-    const std::string first = TemporaryFolder::content_of(folder / name);
+    const std::string first = TemporaryFolder::read_content(folder / name);
     draw_floor_plot(folder / name, plot, lamps);
-    EXPECT_EQ(TemporaryFolder::content_of(folder / name), first);
+    EXPECT_EQ(TemporaryFolder::read_content(folder / name), first);
   }
 }
 
 TEST_F(FloorPlotTest, RejectsOtherExtension) {
-  EXPECT_THAT(refusal_of([&] { draw_floor_plot(folder / "a.gif", plot, lamps); }),
+  EXPECT_THAT(rejection_message([&] { draw_floor_plot(folder / "a.gif", plot, lamps); }),
               HasSubstr("a.gif: a picture's name should end in .png or .svg"));
 }
 
 TEST_F(FloorPlotTest, KeepsExistingFileWhenGnuplotFails) {
   const auto file = folder.file("a.png", "old");
-  EXPECT_THAT(refusal_of([&] {
+  EXPECT_THAT(rejection_message([&] {
                 draw(file, {"a", 100, 100, "plot nonsense\n"});
               }),
               HasSubstr("a.png: cannot be drawn"));
-  EXPECT_EQ(TemporaryFolder::content_of(file), "old");
+  EXPECT_EQ(TemporaryFolder::read_content(file), "old");
 }
 
 TEST_F(FloorPlotTest, ReportsWhyScriptCannotBeMade) {
@@ -62,7 +62,8 @@ TEST_F(FloorPlotTest, ReportsWhyScriptCannotBeMade) {
   rlimit none = before;
   none.rlim_cur = 0;
   ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &none), 0);
-  const std::string refusal = refusal_of([&] { draw_floor_plot(folder / "a.png", plot, lamps); });
+  const std::string refusal =
+      rejection_message([&] { draw_floor_plot(folder / "a.png", plot, lamps); });
   ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &before), 0);
   EXPECT_THAT(refusal, HasSubstr("a.png: cannot be drawn: gnuplot's script cannot be made: "
                                  "Too many open files"));

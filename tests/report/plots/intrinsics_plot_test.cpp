@@ -21,11 +21,11 @@ using testing::StartsWith;
 class IntrinsicsPlotTest : public testing::Test {
  protected:
   /// gnuplot's stderr is passed through to the user; it has to be empty.
-  std::string svg_of(const IntrinsicsPlot& drawn) const {
+  std::string render_svg(const IntrinsicsPlot& intrinsics_plot) const {
     testing::internal::CaptureStderr();
-    draw(folder / "a.svg", drawing_of(drawn));
+    draw(folder / "a.svg", make_drawing(intrinsics_plot));
     EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
-    return TemporaryFolder::content_of(folder / "a.svg");
+    return TemporaryFolder::read_content(folder / "a.svg");
   }
 
   TemporaryFolder folder;
@@ -40,41 +40,41 @@ class IntrinsicsPlotTest : public testing::Test {
 };
 
 TEST_F(IntrinsicsPlotTest, ReportsCountsAndMagnification) {
-  const std::string svg = svg_of(plot);
+  const std::string svg = render_svg(plot);
   for (const char* text : {"a 'title'", "2 corners", "1 outliers", "200 times as long",
                            "standard deviation (px)", "0.05", "0.1", "0.2", "0.5"}) {
     EXPECT_THAT(svg, HasSubstr(text));
   }
   EXPECT_THAT(svg, AllOf(HasSubstr("u (px)"), HasSubstr("v (px)")));
   plot.corners.pop_back();
-  EXPECT_THAT(svg_of(plot), Not(HasSubstr("outliers")));
+  EXPECT_THAT(render_svg(plot), Not(HasSubstr("outliers")));
 }
 
 TEST_F(IntrinsicsPlotTest, RendersReproduciblePngOrSvgByExtension) {
-  draw(folder / "a.png", drawing_of(plot));
-  const std::string first = TemporaryFolder::content_of(folder / "a.png");
+  draw(folder / "a.png", make_drawing(plot));
+  const std::string first = TemporaryFolder::read_content(folder / "a.png");
   EXPECT_THAT(first, StartsWith("\x89PNG"));
-  draw(folder / "a.png", drawing_of(plot));
-  EXPECT_EQ(TemporaryFolder::content_of(folder / "a.png"), first);
-  EXPECT_EQ(svg_of(plot), svg_of(plot));
-  EXPECT_THAT(refusal_of([&] { draw(folder / "a.gif", drawing_of(plot)); }),
+  draw(folder / "a.png", make_drawing(plot));
+  EXPECT_EQ(TemporaryFolder::read_content(folder / "a.png"), first);
+  EXPECT_EQ(render_svg(plot), render_svg(plot));
+  EXPECT_THAT(rejection_message([&] { draw(folder / "a.gif", make_drawing(plot)); }),
               HasSubstr("a.gif: a picture's name should end in .png or .svg"));
 }
 
 TEST_F(IntrinsicsPlotTest, LeavesUnknownValuesBlank) {
-  const std::string whole = svg_of(plot);
+  const std::string whole = render_svg(plot);
   plot.sd_px[0] = std::numeric_limits<double>::infinity();
-  const std::string part = svg_of(plot);
+  const std::string part = render_svg(plot);
   EXPECT_NE(part, whole);
   EXPECT_THAT(part, HasSubstr("0.05"));
   plot.sd_px.assign(9, std::nan(""));
-  EXPECT_THAT(svg_of(plot), AllOf(HasSubstr("not determined"), HasSubstr("2 corners")));
+  EXPECT_THAT(render_svg(plot), AllOf(HasSubstr("not determined"), HasSubstr("2 corners")));
 }
 
 TEST_F(IntrinsicsPlotTest, RendersConstantMapAndZeroResiduals) {
   plot.sd_px.assign(9, 0.2);
   for (auto& corner : plot.corners) corner = {corner.seen_px, {0, 0}, false};
-  EXPECT_THAT(svg_of(plot), AllOf(HasSubstr("3 corners"), HasSubstr("1 times as long")));
+  EXPECT_THAT(render_svg(plot), AllOf(HasSubstr("3 corners"), HasSubstr("1 times as long")));
 }
 
 TEST(ResidualMagnification, ReturnsRoundNumberWithinBounds) {

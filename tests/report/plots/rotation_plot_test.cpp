@@ -19,14 +19,14 @@ TEST(RotationPlot, LabelsLampsRotationCenterAndPrincipalPoint) {
                            {43, {{150, 200}, {250, 200}, {200, 250}}, {201, 199}, {50, 50.5}}},
                           {203, 198},
                           {210, 190}};
-  draw(folder / "a.svg", drawing_of(plot));
-  const std::string svg = TemporaryFolder::content_of(folder / "a.svg");
+  draw(folder / "a.svg", make_drawing(plot));
+  const std::string svg = TemporaryFolder::read_content(folder / "a.svg");
   for (const char* part : {"unit 'seven'", ">42<", ">43<", "principal point", "rotation centre"}) {
     EXPECT_THAT(svg, HasSubstr(part));
   }
   EXPECT_THAT(svg, Not(HasSubstr(">44<")));
-  draw(folder / "b.svg", drawing_of(plot));
-  EXPECT_EQ(TemporaryFolder::content_of(folder / "b.svg"), svg);
+  draw(folder / "b.svg", make_drawing(plot));
+  EXPECT_EQ(TemporaryFolder::read_content(folder / "b.svg"), svg);
 }
 
 }  // namespace

@@ -61,8 +61,8 @@ class ArchiveRuns : public testing::Test {
 
   std::vector<RunRecord> runs() const {
     std::vector<RunRecord> all;
-    for (const auto& session : sessions_of_archive(folder / "archive").sessions) {
-      all.push_back(run_of(session));
+    for (const auto& session : read_archive_sessions(folder / "archive").sessions) {
+      all.push_back(load_archive_run(session));
     }
     return all;
   }
@@ -72,7 +72,7 @@ class ArchiveRuns : public testing::Test {
 };
 
 TEST_F(ArchiveRuns, ReturnsDatedSessionsInChronologicalOrder) {
-  const auto archive = sessions_of_archive(folder / "archive");
+  const auto archive = read_archive_sessions(folder / "archive");
   EXPECT_EQ(archive.undated, 1U);
   EXPECT_EQ(archive.crashed, 1U);
   const auto runs = this->runs();
@@ -83,19 +83,19 @@ TEST_F(ArchiveRuns, ReturnsDatedSessionsInChronologicalOrder) {
   EXPECT_THAT((std::vector{runs[0].verdict, runs[1].verdict, runs[2].verdict, runs[3].verdict}),
               ElementsAre("PASS", "PASS", "FAIL", "INVALID"));
   EXPECT_EQ(runs[0].station, "archive");
-  EXPECT_EQ(sessions_of_archive(folder / "archive/").sessions[0].run.station, "archive");
+  EXPECT_EQ(read_archive_sessions(folder / "archive/").sessions[0].run.station, "archive");
   EXPECT_EQ(runs[0].config_sha256, "key");
   EXPECT_EQ(runs[1].calibration, "format: vlp-calibration/1\n");
   EXPECT_EQ(runs[2].first_cause(), "rms_px is 2 px, at most 1 px is asked for");
   EXPECT_EQ(runs[3].program, "vlp-calibrate 1.2.3");
-  ASSERT_THAT(runs[2].figures, SizeIs(4));
-  EXPECT_EQ(runs[2].figures[0].value, 2);
-  EXPECT_FALSE(runs[2].figures[0].met());
-  EXPECT_EQ(runs[2].figures[0].asked, Direction::at_most);
-  EXPECT_EQ(runs[2].figures[2].name, "residual_ratio");
-  EXPECT_FALSE(runs[2].figures[2].limit);
-  EXPECT_EQ(runs[2].figures[3].asked, Direction::at_least);
-  EXPECT_FALSE(runs[2].figures[3].value);
+  ASSERT_THAT(runs[2].metrics, SizeIs(4));
+  EXPECT_EQ(runs[2].metrics[0].value, 2);
+  EXPECT_FALSE(runs[2].metrics[0].passed());
+  EXPECT_EQ(runs[2].metrics[0].direction, Direction::at_most);
+  EXPECT_EQ(runs[2].metrics[2].name, "residual_ratio");
+  EXPECT_FALSE(runs[2].metrics[2].limit);
+  EXPECT_EQ(runs[2].metrics[3].direction, Direction::at_least);
+  EXPECT_FALSE(runs[2].metrics[3].value);
 }
 
 TEST_F(ArchiveRuns, AreStoredOnceIfReadTwice) {
@@ -104,26 +104,28 @@ TEST_F(ArchiveRuns, AreStoredOnceIfReadTwice) {
     for (const RunRecord& run : runs()) records.keep(run);
   }
   EXPECT_THAT(records.list({}), SizeIs(4));
-  EXPECT_THAT(values_of(judged_values(records, "rms_px", {})), ElementsAre(0.3, 0.1, 2));
-  EXPECT_THAT(values_of(judged_values(records, "mean_mm", {})), ElementsAre(0.5, 0.5, 0.5));
-  EXPECT_EQ(gate_of("rms_px", nullptr, records, judged_values(records, "rms_px", {})), 1);
-  EXPECT_STREQ(run_figure("mean_mm").unit, "mm");
+  EXPECT_THAT(extract_values(load_judged_values(records, "rms_px", {})), ElementsAre(0.3, 0.1, 2));
+  EXPECT_THAT(extract_values(load_judged_values(records, "mean_mm", {})),
+              ElementsAre(0.5, 0.5, 0.5));
+  EXPECT_EQ(find_gate("rms_px", nullptr, records, load_judged_values(records, "rms_px", {})), 1);
+  EXPECT_STREQ(find_run_metric("mean_mm").unit, "mm");
   EXPECT_TRUE(records.check("").problems.empty());
 }
 
 TEST_F(ArchiveRuns, ThrowsForFilesNotWrittenByReprocessing) {
-  EXPECT_THAT(refusal_of([&] { sessions_of_archive(folder / "none"); }), HasSubstr("summary.csv"));
+  EXPECT_THAT(rejection_message([&] { read_archive_sessions(folder / "none"); }),
+              HasSubstr("summary.csv"));
   write("archive/sessions/a/s1/session.json", "{\"metrics\": 1}\n");
-  EXPECT_THAT(refusal_of([&] { runs(); }),
+  EXPECT_THAT(rejection_message([&] { runs(); }),
               HasSubstr("a/s1/session.json: is not as vlp-calibrate writes it"));
   std::filesystem::remove(folder / "archive/sessions/a/s1/session.json");
-  EXPECT_THAT(refusal_of([&] { runs(); }), HasSubstr("a/s1/session.json: cannot be opened"));
+  EXPECT_THAT(rejection_message([&] { runs(); }), HasSubstr("a/s1/session.json: cannot be opened"));
 }
 
 TEST_F(ArchiveRuns, SkipsRowsWithInvalidIds) {
-  const std::size_t before = sessions_of_archive(folder / "archive").sessions.size();
+  const std::size_t before = read_archive_sessions(folder / "archive").sessions.size();
   row("..,s1,pass,2026-03-19,,1.2.3,key");
-  const ReprocessedArchive archive = sessions_of_archive(folder / "archive");
+  const ReprocessedArchive archive = read_archive_sessions(folder / "archive");
   EXPECT_EQ(archive.sessions.size(), before);
   ASSERT_EQ(archive.refused.size(), 1U);
   EXPECT_THAT(archive.refused.front(), HasSubstr("summary.csv:8: '..' is no id of a camera"));
@@ -134,7 +136,8 @@ TEST_F(ArchiveRuns, RejectsLinksOutOfArchive) {
   std::filesystem::remove(folder / "archive/sessions/a/s1/calibration.yaml");
   std::filesystem::create_symlink(folder / "secret.yaml",
                                   folder / "archive/sessions/a/s1/calibration.yaml");
-  EXPECT_THAT(refusal_of([&] { runs(); }), HasSubstr("calibration.yaml: is a symbolic link"));
+  EXPECT_THAT(rejection_message([&] { runs(); }),
+              HasSubstr("calibration.yaml: is a symbolic link"));
 }
 
 /// Comparing all pairs would take minutes.
@@ -152,13 +155,13 @@ TEST_F(ArchiveRuns, ReadsManyMetricsInProportionalTime) {
   const std::vector<RunRecord> read = runs();
   const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - begun;
   EXPECT_TRUE(
-      std::ranges::any_of(read, [&](const RunRecord& run) { return run.figures.size() == count; }));
+      std::ranges::any_of(read, [&](const RunRecord& run) { return run.metrics.size() == count; }));
   EXPECT_LT(taken.count(), 30);
 }
 
 TEST_F(ArchiveRuns, RejectsDeeplyNestedJson) {
   write("archive/sessions/a/s1/session.json", std::string(1'000'000, '['));
-  EXPECT_THAT(refusal_of([&] { runs(); }), HasSubstr("it has more than 16 levels"));
+  EXPECT_THAT(rejection_message([&] { runs(); }), HasSubstr("it has more than 16 levels"));
 }
 
 }  // namespace

@@ -22,10 +22,10 @@ using testing::Not;
 Calibration measured() {
   Calibration calibration = read_calibration(kExample + "calibration.yaml");
   const auto size = static_cast<Eigen::Index>(calibration.camera.intrinsics.size());
-  Eigen::VectorXd sds_px = Eigen::VectorXd::Constant(size, 1e-3);
-  sds_px.head<4>() << 0.01, 0.02, 0.03, 0.04;
+  Eigen::VectorXd corner_sds_px = Eigen::VectorXd::Constant(size, 1e-3);
+  corner_sds_px.head<4>() << 0.01, 0.02, 0.03, 0.04;
   calibration.intrinsics_report = IntrinsicsReport{36, 4000, 0, 0.1, {}, {}};
-  calibration.intrinsics_report->covariance = MatrixX(sds_px.cwiseAbs2().asDiagonal());
+  calibration.intrinsics_report->covariance = MatrixX(corner_sds_px.cwiseAbs2().asDiagonal());
   RotationCenter& center = *calibration.rotation_center;
   center.covariance = Matrix2(Eigen::Vector2d(0.05 * 0.05, 0.06 * 0.06).asDiagonal());
   center.lever_arm_m = Eigen::Vector2d(1e-3, -2e-3);
@@ -44,15 +44,15 @@ RunRecord certified_run() {
   record.program = "vlp-station 0";
   record.config_sha256 = std::string(64, 'a');
   record.calibration = "format: vlp-calibration/1\n";
-  record.verdict = name_of(Verdict::pass);
-  record.figures = check_all({{"rms_px", 0.3}, {"check_mean_mm", 1, GuardBand{0.02, 1.645}}},
+  record.verdict = to_string(Verdict::pass);
+  record.metrics = check_all({{"rms_px", 0.3}, {"check_mean_mm", 1, GuardBand{0.02, 1.645}}},
                              {{"rms_px", 0.123456}, {"check_mean_mm", 0.9600001}}, unit_metrics());
   return record;
 }
 
 TEST(CertifiedValue, DescribeRoundsExpandedUncertaintyToTwoDigits) {
   const auto words = [](double value, std::optional<double> u) {
-    return words_of(CertifiedValue{"", "px", value, u});
+    return describe(CertifiedValue{"", "px", value, u});
   };
   EXPECT_EQ(words(520.12345, 0.006), "520.123 \u00b1 0.012\u00a0px");
   EXPECT_EQ(words(520.12345, 0.0498), "520.12 \u00b1 0.10\u00a0px");  // not 0.0996, nor 0.100
@@ -64,7 +64,7 @@ TEST(CertifiedValue, DescribeRoundsExpandedUncertaintyToTwoDigits) {
 
 TEST(CertifiedValues, ReturnsUncertaintiesOfCalibration) {
   const Calibration calibration = measured();
-  const auto values = certified_values(calibration);
+  const auto values = collect_certified_values(calibration);
   ASSERT_EQ(values.size(), 10u);
   const std::vector<double> u{0.01, 0.02, 0.03, 0.04, 0.05, 0.06};
   for (std::size_t i = 0; i < u.size(); ++i) {
@@ -82,21 +82,21 @@ TEST(CertifiedValues, ReturnsUncertaintiesOfCalibration) {
   const auto lens = static_cast<Eigen::Index>(known.camera.intrinsics.size());
   known.rotation_center->by_intrinsics = MatrixX::Zero(2, lens);
   const double zenith_deg = 0.05 / 520 * 180 / std::numbers::pi;
-  EXPECT_NEAR(certified_values(known)[6].standard_uncertainty.value(), zenith_deg, 1e-12);
+  EXPECT_NEAR(collect_certified_values(known)[6].standard_uncertainty.value(), zenith_deg, 1e-12);
   // The zenith depends on the principal point, whose standard deviation is 0.03 px.
   known.rotation_center->by_intrinsics->operator()(0, 2) = 1 / 520.0;
-  EXPECT_NEAR(certified_values(known)[6].standard_uncertainty.value(),
+  EXPECT_NEAR(collect_certified_values(known)[6].standard_uncertainty.value(),
               std::hypot(0.05, 0.03) / 520 * 180 / std::numbers::pi, 1e-12);
   // A calibration without uncertainties.
   for (const CertifiedValue& value :
-       certified_values(read_calibration(kExample + "calibration.yaml"))) {
+       collect_certified_values(read_calibration(kExample + "calibration.yaml"))) {
     EXPECT_FALSE(value.standard_uncertainty) << value.name;
   }
 }
 
 TEST(Certificate, ContainsDataOfRecord) {
-  const std::string page = certificate(certified_run(), measured());
-  EXPECT_EQ(certificate(certified_run(), measured()), page);
+  const std::string page = make_certificate(certified_run(), measured());
+  EXPECT_EQ(make_certificate(certified_run(), measured()), page);
   EXPECT_THAT(
       page, AllOf(HasSubstr("Calibration certificate: camera &lt;0001&gt;"), HasSubstr("conforms"),
                   HasSubstr("20261121T134501Z-0001"), HasSubstr("2026-11-21T13:50:01Z"),
@@ -113,37 +113,37 @@ TEST(Certificate, ContainsDataOfRecord) {
 }
 
 TEST(Certificate, ContainsPrintErrorOfBoard) {
-  EXPECT_THAT(certificate(certified_run(), measured()),
+  EXPECT_THAT(make_certificate(certified_run(), measured()),
               HasSubstr("The board and the known points are taken as exact"));
   RunRecord record = certified_run();
-  record.figures.push_back({"board_print_px", "px", 0.0625, {}, Direction::at_most});
-  EXPECT_THAT(certificate(record, measured()),
+  record.metrics.push_back({"board_print_px", "px", 0.0625, {}, Direction::at_most});
+  EXPECT_THAT(make_certificate(record, measured()),
               AllOf(HasSubstr("includes the print of the board"), HasSubstr("0.0625 px, rms"),
                     Not(HasSubstr("The board and"))));
 }
 
 TEST(Certificate, StatesNonconformityOfFailedUnit) {
   RunRecord record = certified_run();
-  record.figures[0].value = 0.4;
-  record.judge({{"the lens is poor", true}});
-  EXPECT_THAT(certificate(record, measured()),
+  record.metrics[0].value = 0.4;
+  record.set_verdict({{"the lens is poor", true}});
+  EXPECT_THAT(make_certificate(record, measured()),
               AllOf(HasSubstr("FAIL"), HasSubstr("does not conform: the lens is poor."),
                     HasSubstr("<td>no</td>"), Not(HasSubstr("conforms with all"))));
 }
 
 TEST(Certificate, ThrowsForGoldenInvalidOrEditedRuns) {
   const auto refusal = [](const RunRecord& record) {
-    return refusal_of([&] { certificate(record, measured()); });
+    return rejection_message([&] { make_certificate(record, measured()); });
   };
   RunRecord golden = certified_run();
   golden.kind = "golden";
   EXPECT_THAT(refusal(golden), HasSubstr("is of the golden unit"));
   RunRecord invalid = certified_run();
-  invalid.judge({{"lamp 5 is loose", false}});
+  invalid.set_verdict({{"lamp 5 is loose", false}});
   EXPECT_THAT(refusal(invalid),
               AllOf(HasSubstr("20261121T134501Z-0001"), HasSubstr("not judged (lamp 5 is loose)")));
   RunRecord changed = certified_run();
-  changed.figures[0].value = 0.4;
+  changed.metrics[0].value = 0.4;
   EXPECT_THAT(refusal(changed), HasSubstr("it was changed by hand: it has no certificate"));
   RunRecord without = certified_run();
   without.calibration.clear();

@@ -44,7 +44,7 @@ class GoldenProblem : public testing::Test {
     config.type.imager_px = {800, 600};
     config.type.lens_model = LensModel::opencv8;
     config.type.intrinsics = {520, 520, 399.5, 299.5, 0, 0, 0, 0, 0, 0, 0, 0};
-    config.verify_due = VerifyDue{24, 2};
+    config.verify_due = VerificationInterval{24, 2};
   }
   void note(const std::string& kind, const std::string& verdict,
             const std::string& ended_utc = now_utc()) const {
@@ -53,7 +53,7 @@ class GoldenProblem : public testing::Test {
     run.kind = kind;
     run.verdict = verdict;
     run.ended_utc = ended_utc;
-    note_for_golden(config, run);
+    update_golden_note(config, run);
   }
   std::string problem() const { return golden_problem(config); }
 
@@ -96,7 +96,7 @@ TEST_F(GoldenProblem, ReportsExpiredHours) {
 
 /// The unit was started before the limits expired.
 TEST_F(GoldenProblem, IgnoresLimitsExpiredBeforeVerdict) {
-  const auto at_verdict = [&] { return golden_problem(config, GoldenAt::verdict); };
+  const auto at_verdict = [&] { return golden_problem(config, GoldenCheckTime::verdict); };
   EXPECT_THAT(at_verdict(), HasSubstr("not measured"));
   note("golden", "PASS", "2026-01-01T00:00:00Z");
   EXPECT_THAT(problem(), HasSubstr("not within 24 h"));
@@ -182,19 +182,19 @@ TEST_F(GoldenProblem, RejectsSymbolicLinkAsNote) {
   EXPECT_THAT(problem(), HasSubstr("is a symbolic link"));
   EXPECT_THROW(note("unit", "PASS"), InputError);
   std::filesystem::create_symlink(mine, file);
-  EXPECT_FALSE(forget_golden(config, "RUN"));
+  EXPECT_FALSE(invalidate_golden_note(config, "RUN"));
   note("golden", "PASS");
   EXPECT_EQ(problem(), "");
-  EXPECT_EQ(TemporaryFolder::content_of(mine), "mine\n");
+  EXPECT_EQ(TemporaryFolder::read_content(mine), "mine\n");
 }
 
 TEST_F(GoldenProblem, ReportsUnmeasuredGoldenUnitAfterVoiding) {
   note("golden", "PASS");
-  forget_golden(config, "another");
+  invalidate_golden_note(config, "another");
   EXPECT_EQ(problem(), "");
-  forget_golden(config, "RUN");
+  invalidate_golden_note(config, "RUN");
   EXPECT_THAT(problem(), HasSubstr("not measured here yet"));
-  forget_golden(config, "RUN");
+  invalidate_golden_note(config, "RUN");
 }
 
 TEST_F(GoldenProblem, ReturnsEmptyWithoutVerifyDue) {

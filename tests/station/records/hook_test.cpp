@@ -27,7 +27,7 @@ RunRecord judged_run() {
   run.run = "20261121T134501Z-0123456789abcdef";
   run.camera = "a";
   run.verdict = "PASS";
-  run.figures = {{"rms_px", "px", 0.25, 1, Direction::at_most, {}}};
+  run.metrics = {{"rms_px", "px", 0.25, 1, Direction::at_most, {}}};
   // More than a pipe holds.
   for (int i = 0; i < 2000; ++i) {
     run.images.push_back({"boards", std::to_string(i) + ".png", std::string(64, 'a'), ""});
@@ -52,8 +52,8 @@ TEST_F(RunHook, PassesRunOnStdinInHookFolder) {
   const RunEvent event = run("cat >seen.json; echo first; echo label 7; echo");
   EXPECT_EQ(event.what, kHookDone);
   EXPECT_EQ(event.text, "label 7");
-  const std::string seen = TemporaryFolder::content_of(folder / "seen.json");
-  EXPECT_EQ(seen, hook_json(judged_run()));
+  const std::string seen = TemporaryFolder::read_content(folder / "seen.json");
+  EXPECT_EQ(seen, make_hook_json(judged_run()));
   const auto json = nlohmann::json::parse(seen);
   EXPECT_EQ(json["verdict"], "PASS");
   EXPECT_EQ(json["figures"]["rms_px"]["met"], true);
@@ -84,15 +84,15 @@ TEST_F(RunHook, KillsHookAndChildrenAtTimeLimit) {
   EXPECT_EQ(event.what, kHookFailed);
   EXPECT_EQ(event.text, "no end within 0.3 s, killed: waits");
   EXPECT_LT(took_s, 5);
-  std::string child = TemporaryFolder::content_of(folder / "child");
+  std::string child = TemporaryFolder::read_content(folder / "child");
   ASSERT_FALSE(child.empty());
   child.pop_back();
   // A zombie process has no command line.
   const std::string its = "/proc/" + child + "/cmdline";
-  for (int i = 0; i < 100 && !TemporaryFolder::content_of(its).empty(); ++i) {
+  for (int i = 0; i < 100 && !TemporaryFolder::read_content(its).empty(); ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
-  EXPECT_EQ(TemporaryFolder::content_of(its), "");
+  EXPECT_EQ(TemporaryFolder::read_content(its), "");
 }
 
 TEST_F(RunHook, KillsHookThatFloodsOutputOrLeftItsGroup) {
@@ -112,7 +112,7 @@ TEST_F(RunHook, KillsChildrenInOwnSessions) {
   EXPECT_EQ(event.text, "no end within 1 s, killed");
   EXPECT_LT(took_s, 5);
   for (const char* name : {"child", "other"}) {
-    std::string process = TemporaryFolder::content_of(folder / name);
+    std::string process = TemporaryFolder::read_content(folder / name);
     ASSERT_FALSE(process.empty());
     process.pop_back();
     EXPECT_FALSE(std::filesystem::exists("/proc/" + process)) << name;
@@ -156,31 +156,31 @@ TEST_F(RunHook, InheritsNoSignalsOrDescriptors) {
 
 TEST_F(RunHook, IsOpenUntilHookSucceeds) {
   RunRecord run = judged_run();
-  EXPECT_FALSE(hook_is_open(run));
+  EXPECT_FALSE(is_hook_open(run));
   EXPECT_EQ(hook_problem(run), "");
-  run.events.push_back(hook_wanted({{"label", "it"}, {}, 1}, "Ann"));
+  run.events.push_back(make_hook_request({{"label", "it"}, {}, 1}, "Ann"));
   EXPECT_EQ(run.events.back().text, "label it");
   EXPECT_THAT(run.events.back().who, testing::MatchesRegex("Ann [(][^@]+@[^@]*[)]"));
-  EXPECT_TRUE(hook_is_open(run));
+  EXPECT_TRUE(is_hook_open(run));
   EXPECT_EQ(hook_problem(run), "was not run to its end");
-  run.events.push_back(new_event(kHookFailed, "exit code 3"));
+  run.events.push_back(make_event(kHookFailed, "exit code 3"));
   EXPECT_EQ(hook_problem(run), "failed: exit code 3");
-  run.events.push_back(new_event(kHookDone, ""));
-  EXPECT_FALSE(hook_is_open(run));
+  run.events.push_back(make_event(kHookDone, ""));
+  EXPECT_FALSE(is_hook_open(run));
   EXPECT_EQ(hook_problem(run), "");
   // Requested again for a voided run.
-  run.events.push_back(new_event(kHookWanted, "label it"));
-  EXPECT_TRUE(hook_is_open(run));
+  run.events.push_back(make_event(kHookRequested, "label it"));
+  EXPECT_TRUE(is_hook_open(run));
   EXPECT_EQ(hook_problem(run), "was not run to its end");
-  run.events.push_back(new_event(kHookDone, ""));
-  EXPECT_FALSE(hook_is_open(run));
+  run.events.push_back(make_event(kHookDone, ""));
+  EXPECT_FALSE(is_hook_open(run));
 }
 
 TEST_F(RunHook, IsCalledByOneProgramAtATime) {
   const std::string name = judged_run().run;
   {
-    const HookLock one(folder / ".", name), other(folder / ".", name);
-    EXPECT_TRUE(one.held());
+    const HookLock first_lock(folder / ".", name), other(folder / ".", name);
+    EXPECT_TRUE(first_lock.held());
     EXPECT_FALSE(other.held());
     EXPECT_TRUE(HookLock(folder / ".", "another").held());
   }

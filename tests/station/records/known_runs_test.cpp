@@ -31,13 +31,13 @@ class KnownRunsTest : public testing::Test {
     config.results = folder / "results";
   }
   std::string keep(int number, double rms_px = 0.1) const {
-    const RunRecord run = sample(run_of(number), "a", rms_px);
+    const RunRecord run = make_sample_record(numbered_run_id(number), "a", rms_px);
     Records(config.records).keep(run);
     return run.run;
   }
   /// Makes the records unavailable.
   std::string keep_waiting(int number) const {
-    const RunRecord run = sample(run_of(number), "b", 0.1);
+    const RunRecord run = make_sample_record(numbered_run_id(number), "b", 0.1);
     Spool(config.spool, config.records).keep(run);
     return run.run;
   }
@@ -46,7 +46,7 @@ class KnownRunsTest : public testing::Test {
     filter.*text = value;
     return filter;
   }
-  void take_records_away() const {
+  void make_records_unavailable() const {
     std::filesystem::rename(config.records, folder / "elsewhere.db");
   }
 
@@ -63,14 +63,14 @@ TEST_F(KnownRunsTest, ReturnsStoredAndWaitingRuns) {
     EXPECT_THAT(known.list({}),
                 ElementsAre(Field(&RunSummary::run, kept),
                             AllOf(Field(&RunSummary::run, waits), Field(&RunSummary::causes, ""))));
-    EXPECT_THAT(known.whole({}), SizeIs(2));
+    EXPECT_THAT(known.load_all({}), SizeIs(2));
     EXPECT_EQ(known.last({}).run, waits);
     EXPECT_EQ(known.last(only(&RunFilter::camera, "a")).run, kept);
     EXPECT_EQ(known.find(kept).camera, "a");
     EXPECT_THROW(known.find("none"), std::invalid_argument);
     EXPECT_THROW(known.last(only(&RunFilter::camera, "c")), std::invalid_argument);
   }
-  take_records_away();
+  make_records_unavailable();
   const std::string alone = keep_waiting(3);
   KnownRuns known(config);
   EXPECT_THAT(known.list({}), ElementsAre(AllOf(Field(&RunSummary::run, alone),
@@ -79,7 +79,7 @@ TEST_F(KnownRunsTest, ReturnsStoredAndWaitingRuns) {
   EXPECT_THAT(known.list(only(&RunFilter::until, "2026")), IsEmpty());
   EXPECT_EQ(known.find(alone).camera, "b");
   EXPECT_THROW(known.records(), std::runtime_error) << "these are not all";
-  EXPECT_THROW(known.whole({}), std::runtime_error);
+  EXPECT_THROW(known.load_all({}), std::runtime_error);
 }
 
 TEST_F(KnownRunsTest, ThrowsWithoutRecords) {
@@ -121,7 +121,8 @@ TEST(CountRuns, ComputesFirstPassYieldAndRework) {
 }
 
 TEST_F(KnownRunsTest, FiltersByOperatorAndShift) {
-  RunRecord night = sample(run_of(1), "a", 0.1), day = sample(run_of(2), "a", 0.1);
+  RunRecord night = make_sample_record(numbered_run_id(1), "a", 0.1),
+            day = make_sample_record(numbered_run_id(2), "a", 0.1);
   night.operator_name = "Ann";
   night.shift = "night";
   day.operator_name = "Bea";
@@ -135,7 +136,7 @@ TEST_F(KnownRunsTest, FiltersByOperatorAndShift) {
     EXPECT_THAT(known.list(only(&RunFilter::operator_name, "Cat")), IsEmpty());
   };
   expect_only_the_night();
-  take_records_away();
+  make_records_unavailable();
   for (const RunRecord* run : {&night, &day}) Spool(config.spool, config.records).keep(*run);
   expect_only_the_night();
 }
@@ -166,7 +167,7 @@ TEST_F(KnownRunsTest, VoidRunRecordsOperatorAndReasonOnce) {
 }
 
 TEST_F(KnownRunsTest, VoidRunRenamesCalibrationOfPassedRun) {
-  const RunRecord run = sample(run_of(1), "a", 0.1);
+  const RunRecord run = make_sample_record(numbered_run_id(1), "a", 0.1);
   ASSERT_TRUE(run.passed());
   Records(config.records).keep(run);
   const auto results = config.results / "a" / run.run;
@@ -176,8 +177,8 @@ TEST_F(KnownRunsTest, VoidRunRenamesCalibrationOfPassedRun) {
   KnownRuns known(config);
   EXPECT_EQ(void_run(known, run.run, "Ann", "wrong serial").files_problem, "");
   EXPECT_FALSE(std::filesystem::exists(results / "calibration.yaml"));
-  EXPECT_EQ(TemporaryFolder::content_of(results / "voided-calibration.yaml"), run.calibration);
-  EXPECT_THAT(TemporaryFolder::content_of(folder / "told.json"),
+  EXPECT_EQ(TemporaryFolder::read_content(results / "voided-calibration.yaml"), run.calibration);
+  EXPECT_THAT(TemporaryFolder::read_content(folder / "told.json"),
               testing::StartsWith("{\n \"event\": \"voided\",\n"));
   // Only the station has the location of the files.
   const std::string second = keep(2);
@@ -193,12 +194,12 @@ TEST_F(KnownRunsTest, VoidRunCompletesVoidingByRecordsAlone) {
     KnownRuns records(config.records);
     void_run(records, run, "Ann", "wrong serial");
   }
-  EXPECT_EQ(TemporaryFolder::content_of(folder / "told.json"), "");
+  EXPECT_EQ(TemporaryFolder::read_content(folder / "told.json"), "");
   KnownRuns known(config);
-  const Voided finished = void_run(known, run, "Ben", "again");
+  const VoidedRun finished = void_run(known, run, "Ben", "again");
   EXPECT_EQ(finished.problem, "");
   EXPECT_EQ(finished.run.events.back().what, kHookDone);
-  EXPECT_THAT(TemporaryFolder::content_of(folder / "told.json"), HasSubstr("wrong serial"));
+  EXPECT_THAT(TemporaryFolder::read_content(folder / "told.json"), HasSubstr("wrong serial"));
   EXPECT_THROW(void_run(known, run, "Ben", "again"), std::invalid_argument) << "nothing is left";
 }
 
@@ -212,22 +213,22 @@ TEST_F(KnownRunsTest, VoidRunCallsHook) {
     EXPECT_EQ(problem, "");
     EXPECT_EQ(files_problem, "");
     EXPECT_EQ(record.events.back().what, kHookDone);
-    EXPECT_THAT(known.with_open_hook(), IsEmpty());
+    EXPECT_THAT(known.find_open_hooks(), IsEmpty());
   }
-  EXPECT_THAT(TemporaryFolder::content_of(folder / "told.json"),
+  EXPECT_THAT(TemporaryFolder::read_content(folder / "told.json"),
               AllOf(HasSubstr(run), HasSubstr("\"voided\""), HasSubstr("wrong serial")));
   const auto record = Records(config.records).find(run);
   ASSERT_THAT(record->events, SizeIs(3));
   EXPECT_EQ(record->events[2].text, "taken back");
   // A hook that succeeded at the verdict is open again if it fails now.
   config.hook = Hook{{"false"}, folder / ".", 20};
-  RunRecord second = sample(run_of(2), "a", 0.1);
-  second.events = {new_event(kHookWanted, "label"), new_event(kHookDone, "")};
+  RunRecord second = make_sample_record(numbered_run_id(2), "a", 0.1);
+  second.events = {make_event(kHookRequested, "label"), make_event(kHookDone, "")};
   Records(config.records).keep(second);
   KnownRuns known(config);
-  EXPECT_THAT(known.with_open_hook(), IsEmpty());
+  EXPECT_THAT(known.find_open_hooks(), IsEmpty());
   EXPECT_EQ(hook_problem(void_run(known, second.run, "Ann", "again").run), "failed: exit code 1");
-  EXPECT_THAT(known.with_open_hook(), ElementsAre(second.run));
+  EXPECT_THAT(known.find_open_hooks(), ElementsAre(second.run));
 }
 
 TEST_F(KnownRunsTest, VoidRunCallsNoHookOfAnotherStation) {

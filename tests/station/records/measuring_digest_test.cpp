@@ -27,7 +27,7 @@ class MeasuringDigest : public testing::Test {
            "captures: captures");
   }
   void change(const std::string& file, const std::string& from, const std::string& to) {
-    std::string text = TemporaryFolder::content_of(folder / file);
+    std::string text = TemporaryFolder::read_content(folder / file);
     const auto at = text.find(from);
     ASSERT_NE(at, std::string::npos) << from;
     folder.file(file, text.replace(at, from.size(), to));
@@ -35,7 +35,7 @@ class MeasuringDigest : public testing::Test {
   std::string digest() const { return measuring_digest(read_station(folder / "station.yaml")); }
   /// Returns the digest with a temporary change.
   std::string digest_with(const std::string& file, const std::string& from, const std::string& to) {
-    const std::string before = TemporaryFolder::content_of(folder / file);
+    const std::string before = TemporaryFolder::read_content(folder / file);
     change(file, from, to);
     std::string changed = digest();
     folder.file(file, before);

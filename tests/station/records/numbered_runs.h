@@ -26,12 +26,12 @@ inline RunRecord numbered_run(int number) {
   run.camera = "camera-" + std::to_string(number);
   run.begun_utc = begun_utc(run.run);
   run.ended_utc = "2026-11-21T13:50:01Z";
-  run.judge({{"the lens is \"blurred\"", true}, {"second", false}});
+  run.set_verdict({{"the lens is \"blurred\"", true}, {"second", false}});
   run.program = "vlp-station 0";
   run.libraries = "none";
   run.config_sha256 = std::string(64, 'a');
   run.calibration = "format: vlp-calibration/1\n";
-  run.figures = check_all({{"rms_px", 1, GuardBand{0.01, 1.645}}, {"tilt_deg", 2}},
+  run.metrics = check_all({{"rms_px", 1, GuardBand{0.01, 1.645}}, {"tilt_deg", 2}},
                           {{"rms_px", 0.1 + 0.2}, {"coverage", 1.0 / 3}}, unit_metrics());
   for (std::size_t i = 0; i < kImagesOfARun; ++i) {
     run.images.push_back({"boards", std::to_string(1000 + i) + ".png",
@@ -47,13 +47,13 @@ inline std::set<std::string> whole_runs(const std::string& where) {
   for (const RunSummary& run : records.list({})) {
     const auto kept = records.find(run.run);
     EXPECT_THAT(kept->images, testing::SizeIs(kImagesOfARun));
-    EXPECT_THAT(kept->figures, testing::SizeIs(3));
+    EXPECT_THAT(kept->metrics, testing::SizeIs(3));
     EXPECT_TRUE(names.insert(run.run).second);
   }
   return names;
 }
 
-inline double seconds_of(const std::function<void()>& action) {
+inline double measure_seconds(const std::function<void()>& action) {
   const auto begun = std::chrono::steady_clock::now();
   action();
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();

@@ -21,9 +21,9 @@ RunRecord passed() {
   record.run = "20261121T134501Z-0001";
   record.camera = "0001";
   record.station = "station-1";
-  record.verdict = name_of(Verdict::pass);
+  record.verdict = to_string(Verdict::pass);
   record.calibration =
-      TemporaryFolder::content_of(fs::path(VLP_SOURCE_DIR) / "datasets/example/calibration.yaml");
+      TemporaryFolder::read_content(fs::path(VLP_SOURCE_DIR) / "datasets/example/calibration.yaml");
   return record;
 }
 
@@ -31,33 +31,33 @@ TEST(PublishRun, WritesMissingFiles) {
   const TemporaryFolder folder;
   const RunRecord record = passed();
   const fs::path results = publish_run(record, {}, folder / "results");
-  const std::string report = TemporaryFolder::content_of(results / "report.html");
-  EXPECT_EQ(TemporaryFolder::content_of(results / "calibration.yaml"), record.calibration);
+  const std::string report = TemporaryFolder::read_content(results / "report.html");
+  EXPECT_EQ(TemporaryFolder::read_content(results / "calibration.yaml"), record.calibration);
   // The missing file is written again, the other one stays.
   fs::remove(results / "calibration.yaml");
   folder.file((results / "report.html").string(), "with pictures");
   publish_run(record, {}, folder / "results");
-  EXPECT_EQ(TemporaryFolder::content_of(results / "calibration.yaml"), record.calibration);
-  EXPECT_EQ(TemporaryFolder::content_of(results / "report.html"), "with pictures");
+  EXPECT_EQ(TemporaryFolder::read_content(results / "calibration.yaml"), record.calibration);
+  EXPECT_EQ(TemporaryFolder::read_content(results / "report.html"), "with pictures");
   fs::remove(results / "report.html");
   publish_run(record, {}, folder / "results");
-  EXPECT_EQ(TemporaryFolder::content_of(results / "report.html"), report);
+  EXPECT_EQ(TemporaryFolder::read_content(results / "report.html"), report);
 }
 
 TEST(PublishRun, ReplacesDifferentReportOnRequest) {
   const TemporaryFolder folder;
   const RunRecord record = passed();
   const fs::path results = publish_run(record, {}, folder / "results");
-  const std::string report = TemporaryFolder::content_of(results / "report.html");
+  const std::string report = TemporaryFolder::read_content(results / "report.html");
   publish_run(record, {}, folder / "results", ExistingReport::replace);
   EXPECT_FALSE(fs::exists(results / "replaced-report.html")) << "it was the record's";
   folder.file((results / "report.html").string(), "planted");
   publish_run(record, {}, folder / "results", ExistingReport::replace);
-  EXPECT_EQ(TemporaryFolder::content_of(results / "report.html"), report);
-  EXPECT_EQ(TemporaryFolder::content_of(results / "replaced-report.html"), "planted");
+  EXPECT_EQ(TemporaryFolder::read_content(results / "report.html"), report);
+  EXPECT_EQ(TemporaryFolder::read_content(results / "replaced-report.html"), "planted");
   folder.file((results / "report.html").string(), "again");
   publish_run(record, {}, folder / "results", ExistingReport::replace);
-  EXPECT_EQ(TemporaryFolder::content_of(results / "replaced-report.html"), "planted");
+  EXPECT_EQ(TemporaryFolder::read_content(results / "replaced-report.html"), "planted");
   EXPECT_TRUE(mark_files_voided(record, folder / "results"));
   EXPECT_FALSE(fs::exists(results / "replaced-report.html"));
 }
@@ -67,19 +67,20 @@ TEST(PublishRun, WritesNothingOutsideResults) {
   fs::create_directory(folder / "elsewhere");
   RunRecord record = passed();
   record.camera = "..";
-  EXPECT_THAT(refusal_of([&] { publish_run(record, {}, folder / "results"); }),
+  EXPECT_THAT(rejection_message([&] { publish_run(record, {}, folder / "results"); }),
               HasSubstr("'..' is no id of a camera"));
   record.camera = "0001";
   record.run = "../../../x";
-  EXPECT_THAT(refusal_of([&] { publish_run(record, {}, folder / "results"); }),
+  EXPECT_THAT(rejection_message([&] { publish_run(record, {}, folder / "results"); }),
               HasSubstr("'../../../x' is no id of a run"));
-  EXPECT_THAT(refusal_of([&] { mark_files_voided(passed(), folder / "results"); }), "");
+  EXPECT_THAT(rejection_message([&] { mark_files_voided(passed(), folder / "results"); }), "");
   EXPECT_FALSE(fs::exists(folder / "results"));
   record = passed();
   fs::create_directory(folder / "results");
   fs::create_directory_symlink(folder / "elsewhere", folder / "results/0001");
   const auto expect_link = [&](const auto& action) {
-    EXPECT_THAT(refusal_of(action), HasSubstr("0001: is a symbolic link, which is not followed"));
+    EXPECT_THAT(rejection_message(action),
+                HasSubstr("0001: is a symbolic link, which is not followed"));
   };
   expect_link([&] { publish_run(record, {}, folder / "results"); });
   expect_link([&] { mark_files_voided(record, folder / "results"); });
@@ -92,8 +93,8 @@ TEST(CheckResults, OverwritesNoTargetOfSymbolicLink) {
   const fs::path mine = folder.file("mine.txt", "mine");
   fs::create_directories(folder / "results/0001");
   fs::create_symlink(mine, folder / "results/0001/.writable");
-  EXPECT_EQ(refusal_of([&] { check_results(folder / "results", "0001"); }), "");
-  EXPECT_EQ(TemporaryFolder::content_of(mine), "mine");
+  EXPECT_EQ(rejection_message([&] { check_results(folder / "results", "0001"); }), "");
+  EXPECT_EQ(TemporaryFolder::read_content(mine), "mine");
   EXPECT_FALSE(fs::is_symlink(folder / "results/0001/.writable"));
 }
 
@@ -102,7 +103,7 @@ TEST(PublishRun, ThrowsForDifferentCalibration) {
   const RunRecord record = passed();
   const fs::path results = publish_run(record, {}, folder / "results");
   const auto expect_refused = [&] {
-    EXPECT_THAT(refusal_of([&] { publish_run(record, {}, folder / "results"); }),
+    EXPECT_THAT(rejection_message([&] { publish_run(record, {}, folder / "results"); }),
                 HasSubstr("calibration.yaml: is not what the record has: move it away"));
   };
   const fs::path file = folder.file((results / "calibration.yaml").string(), "another\n");
@@ -110,7 +111,7 @@ TEST(PublishRun, ThrowsForDifferentCalibration) {
   const std::string long_content(3 * record.calibration.size(), 'x');
   folder.file(file.string(), long_content);
   expect_refused();
-  EXPECT_EQ(TemporaryFolder::content_of(file), long_content);
+  EXPECT_EQ(TemporaryFolder::read_content(file), long_content);
   fs::remove(file);
   fs::create_symlink(folder / "mine.yaml", file);
   expect_refused();
@@ -120,9 +121,9 @@ TEST(PublishRun, ThrowsForDifferentCalibration) {
 TEST(PublishRun, NamesCalibrationByVerdict) {
   const TemporaryFolder folder;
   RunRecord record = passed();
-  record.judge({{"the lens is decentred", true}});
+  record.set_verdict({{"the lens is decentred", true}});
   EXPECT_TRUE(fs::exists(publish_run(record, {}, folder / "a") / "failed-calibration.yaml"));
-  record.judge({{"lamp 5 is loose", false}});
+  record.set_verdict({{"lamp 5 is loose", false}});
   EXPECT_TRUE(fs::exists(publish_run(record, {}, folder / "b") / "invalid-calibration.yaml"));
 }
 
@@ -143,16 +144,16 @@ TEST(MarkFilesVoided, RenamesAllFiles) {
   mark_files_voided(record, folder / "results");
   mark_files_voided(record, folder / "none");
   // A run that is published after it was voided.
-  record.events.push_back(new_event(kVoided, "wrong serial", "Ann"));
+  record.events.push_back(make_event(kVoided, "wrong serial", "Ann"));
   EXPECT_TRUE(fs::exists(publish_run(record, {}, folder / "a") / "voided-calibration.yaml"));
   EXPECT_FALSE(fs::exists(folder / "a" / record.camera / record.run / "report.html"));
 }
 
 TEST(CheckResults, ThrowsIfFolderCannotBeCreated) {
   const TemporaryFolder folder;
-  EXPECT_EQ(refusal_of([&] { check_results(folder / "results", "0001"); }), "");
+  EXPECT_EQ(rejection_message([&] { check_results(folder / "results", "0001"); }), "");
   EXPECT_TRUE(fs::is_empty(folder / "results/0001"));
-  EXPECT_THAT(refusal_of([&] { check_results(folder.file("file", ""), "0001"); }),
+  EXPECT_THAT(rejection_message([&] { check_results(folder.file("file", ""), "0001"); }),
               HasSubstr("file: cannot be made"));
 }
 

@@ -35,7 +35,7 @@ using testing::StartsWith;
 
 /// Returns a record with a different text in each of its fields.
 RunRecord with_all_texts() {
-  RunRecord record = sample(run_of(7), "a", 0.5);
+  RunRecord record = make_sample_record(numbered_run_id(7), "a", 0.5);
   for (const RunField& field : run_fields()) {
     record.*field.text = std::string("the '") + field.name + "' of \"it\"\n";
   }
@@ -54,20 +54,21 @@ void check_all_texts(Records& records) {
 
 /// Checks that events are added to a stored run once and remain.
 void check_events(Records& records) {
-  RunRecord run = sample(run_of(8), "e", 0.5), other = sample(run_of(6), "e", 0.5);
-  run.events = {new_event(kHookWanted, "label 'x'")};
-  other.events = {new_event(kHookWanted, "label"), new_event(kHookDone, "")};
+  RunRecord run = make_sample_record(numbered_run_id(8), "e", 0.5),
+            other = make_sample_record(numbered_run_id(6), "e", 0.5);
+  run.events = {make_event(kHookRequested, "label 'x'")};
+  other.events = {make_event(kHookRequested, "label"), make_event(kHookDone, "")};
   for (const RunRecord& each : {run, other, run}) records.keep(each);
-  EXPECT_THAT(records.with_open_hook("station-1"), ElementsAre(run.run));
-  EXPECT_THAT(records.with_open_hook(""), ElementsAre(run.run));
-  EXPECT_THAT(records.with_open_hook("another"), IsEmpty());
+  EXPECT_THAT(records.find_open_hooks("station-1"), ElementsAre(run.run));
+  EXPECT_THAT(records.find_open_hooks(""), ElementsAre(run.run));
+  EXPECT_THAT(records.find_open_hooks("another"), IsEmpty());
   const RunEvent wanted = run.events.front();
-  run.events.push_back(new_event(kHookFailed, "exit code 3"));
+  run.events.push_back(make_event(kHookFailed, "exit code 3"));
   records.keep(run);
-  EXPECT_THAT(records.with_open_hook("station-1"), ElementsAre(run.run));
-  run.events = {new_event(kHookDone, "")};  // by a program without the other events
+  EXPECT_THAT(records.find_open_hooks("station-1"), ElementsAre(run.run));
+  run.events = {make_event(kHookDone, "")};  // by a program without the other events
   records.keep(run);
-  EXPECT_THAT(records.with_open_hook("station-1"), IsEmpty());
+  EXPECT_THAT(records.find_open_hooks("station-1"), IsEmpty());
   const auto found = records.find(run.run);
   ASSERT_TRUE(found);
   ASSERT_THAT(found->events, SizeIs(3));
@@ -82,30 +83,32 @@ void check_events(Records& records) {
 /// Part of check_records(): a voided run remains, but is not counted.
 void check_voided(Records& records) {
   const std::size_t before = records.trend("rms_px", {}).size();
-  RunRecord run = sample(run_of(0), "a", 0);
-  run.events = {new_event(kVoided, "wrong serial", "Ann")};
+  RunRecord run = make_sample_record(numbered_run_id(0), "a", 0);
+  run.events = {make_event(kVoided, "wrong serial", "Ann")};
   records.keep(run);
   const auto found = records.find(run.run);
   ASSERT_TRUE(found);
-  EXPECT_THAT(why_no_verdict(*found),
+  EXPECT_THAT(find_verdict_problem(*found),
               testing::MatchesRegex("was voided by Ann [(].*@.*: wrong serial"));
   EXPECT_THAT(records.trend("rms_px", {}), SizeIs(before - 1));
   EXPECT_EQ(records.list({})[0].run, run.run);
   EXPECT_EQ(records.list({})[0].voided, "wrong serial");
   EXPECT_EQ(records.list({})[1].voided, "");
-  EXPECT_EQ(records.owner_of(std::string(64, 'b'), "b"), (ImageOwner{"a", run_of(1)}));
+  EXPECT_EQ(records.find_owner(std::string(64, 'b'), "b"), (ImageOwner{"a", numbered_run_id(1)}));
 }
 
 /// Checks the properties of records in every database.
 void check_records(const std::string& where) {
   Records records(where);
   for (int i = 0; i < 4; ++i) {
-    records.keep(sample(run_of(i), i == 2 ? "b" : "a", i == 3 ? 1.5 : 0.1 * i));
+    records.keep(
+        make_sample_record(numbered_run_id(i), i == 2 ? "b" : "a", i == 3 ? 1.5 : 0.1 * i));
   }
   // Stored once; a different run of its id is rejected.
-  records.keep(sample(run_of(0), "a", 0));
-  EXPECT_THAT(refusal_of([&] { records.keep(sample(run_of(0), "other", 0.7)); }),
-              HasSubstr("has another run " + run_of(0)));
+  records.keep(make_sample_record(numbered_run_id(0), "a", 0));
+  EXPECT_THAT(rejection_message(
+                  [&] { records.keep(make_sample_record(numbered_run_id(0), "other", 0.7)); }),
+              HasSubstr("has another run " + numbered_run_id(0)));
   const auto all = records.list({});
   ASSERT_THAT(all, SizeIs(4));
   EXPECT_EQ(all[0].camera, "a");
@@ -113,35 +116,35 @@ void check_records(const std::string& where) {
   EXPECT_EQ(all[3].station, "station-1");
   EXPECT_THAT(all[3].causes, StartsWith("it's \"blurred\""));
   // The owner of an image is the first run that uses it, and no run of the camera itself.
-  EXPECT_EQ(records.owner_of(std::string(64, 'b'), "b"), (ImageOwner{"a", run_of(0)}));
-  EXPECT_EQ(records.owner_of(std::string(64, 'b'), "a"), (ImageOwner{"b", run_of(2)}));
-  EXPECT_EQ(records.owner_of(std::string(64, 'c'), "b"), ImageOwner{}) << "it was refused there";
-  EXPECT_EQ(refusal_of([&] { records.check_writable(); }), "");
+  EXPECT_EQ(records.find_owner(std::string(64, 'b'), "b"), (ImageOwner{"a", numbered_run_id(0)}));
+  EXPECT_EQ(records.find_owner(std::string(64, 'b'), "a"), (ImageOwner{"b", numbered_run_id(2)}));
+  EXPECT_EQ(records.find_owner(std::string(64, 'c'), "b"), ImageOwner{}) << "it was refused there";
+  EXPECT_EQ(rejection_message([&] { records.check_writable(); }), "");
   RunFilter filter;
   filter.camera = "a";
   EXPECT_THAT(records.list(filter), SizeIs(3));
   filter.verdict = "PASS";
   filter.last = 1;
   ASSERT_THAT(records.list(filter), SizeIs(1));
-  EXPECT_EQ(records.list(filter)[0].run, run_of(1));
+  EXPECT_EQ(records.list(filter)[0].run, numbered_run_id(1));
 
   EXPECT_FALSE(records.find("another"));
-  const auto found = records.find(run_of(3));
+  const auto found = records.find(numbered_run_id(3));
   ASSERT_TRUE(found);
-  const RunRecord expected = sample(run_of(3), "a", 1.5);
+  const RunRecord expected = make_sample_record(numbered_run_id(3), "a", 1.5);
   EXPECT_EQ(found->causes, expected.causes);
   EXPECT_EQ(found->calibration, expected.calibration);
-  ASSERT_THAT(found->figures, SizeIs(3));
-  EXPECT_EQ(found->figures[0].value, 1.5);
-  EXPECT_FALSE(found->figures[0].met());
-  EXPECT_EQ(found->figures[0].unit, "px");
-  ASSERT_TRUE(found->figures[0].guard);
-  EXPECT_EQ(found->figures[0].guard->standard_uncertainty, 0.1 + 0.2);  // to the last bit
-  EXPECT_EQ(found->figures[0].guard->k, 1.5);
-  EXPECT_FALSE(found->figures[1].guard);
-  EXPECT_FALSE(found->figures[1].limit);
-  EXPECT_EQ(found->figures[1].asked, Direction::at_least);
-  EXPECT_FALSE(found->figures[2].value);
+  ASSERT_THAT(found->metrics, SizeIs(3));
+  EXPECT_EQ(found->metrics[0].value, 1.5);
+  EXPECT_FALSE(found->metrics[0].passed());
+  EXPECT_EQ(found->metrics[0].unit, "px");
+  ASSERT_TRUE(found->metrics[0].guard);
+  EXPECT_EQ(found->metrics[0].guard->standard_uncertainty, 0.1 + 0.2);  // to the last bit
+  EXPECT_EQ(found->metrics[0].guard->k, 1.5);
+  EXPECT_FALSE(found->metrics[1].guard);
+  EXPECT_FALSE(found->metrics[1].limit);
+  EXPECT_EQ(found->metrics[1].direction, Direction::at_least);
+  EXPECT_FALSE(found->metrics[2].value);
   ASSERT_THAT(found->images, SizeIs(2));
   EXPECT_EQ(found->images[1].refused, "too dark");
 
@@ -168,7 +171,8 @@ void check_two_writers(const std::string& where) {
     children.push_back(start_child([&] {
       Records records(where);
       for (int i = 0; i < each; ++i) {
-        records.keep(sample(run_of(100 * (writer + 1) + i), writer == 0 ? "a" : "b", 0.1));
+        records.keep(make_sample_record(numbered_run_id(100 * (writer + 1) + i),
+                                        writer == 0 ? "a" : "b", 0.1));
       }
     }));
   }
@@ -209,14 +213,14 @@ INSERT INTO images VALUES ('20261121T134501Z-0001', 'boards', '0000.png', 'bb', 
 )";
 
 /// Returns tables, their columns, the version and the metrics.
-std::string state_of(const std::string& where) {
-  const bool is_server = where.starts_with("postgresql://");
-  return answer_of(where,
-                   std::string(is_server ? "SELECT table_name, column_name, data_type FROM "
-                                           "information_schema.columns WHERE table_schema = "
-                                           "'public' ORDER BY table_name, ordinal_position;"
-                                         : "SELECT sql FROM sqlite_master ORDER BY name;") +
-                       "\nSELECT * FROM vlp_schema;\nSELECT * FROM figures ORDER BY place;\n");
+std::string read_state(const std::string& where) {
+  const bool is_server_address = where.starts_with("postgresql://");
+  return run_database_client(
+      where, std::string(is_server_address ? "SELECT table_name, column_name, data_type FROM "
+                                             "information_schema.columns WHERE table_schema = "
+                                             "'public' ORDER BY table_name, ordinal_position;"
+                                           : "SELECT sql FROM sqlite_master ORDER BY name;") +
+                 "\nSELECT * FROM vlp_schema;\nSELECT * FROM figures ORDER BY place;\n");
 }
 
 /// Checks the migration of a database with kVersion1.
@@ -228,18 +232,18 @@ void check_migration(const std::string& where) {
   EXPECT_EQ(found->operator_name, "");
   EXPECT_EQ(found->begun_utc, "2026-11-21T13:45:01Z");
   EXPECT_EQ(found->calibration, "format: vlp-calibration/1");
-  ASSERT_THAT(found->figures, SizeIs(5));
-  EXPECT_EQ(words_of(found->figures[0]), "rms_px is 1.5 px, at most 1 px is asked for");
-  EXPECT_EQ(words_of(found->figures[1]), "coverage is not known, at least 0.7 is asked for");
-  EXPECT_EQ(found->figures[2].unit, "deg");
-  EXPECT_EQ(found->figures[3].unit, "mm");
-  EXPECT_EQ(found->figures[4].unit, "%");
-  EXPECT_FALSE(found->figures[0].guard);
+  ASSERT_THAT(found->metrics, SizeIs(5));
+  EXPECT_EQ(describe(found->metrics[0]), "rms_px is 1.5 px, at most 1 px is asked for");
+  EXPECT_EQ(describe(found->metrics[1]), "coverage is not known, at least 0.7 is asked for");
+  EXPECT_EQ(found->metrics[2].unit, "deg");
+  EXPECT_EQ(found->metrics[3].unit, "mm");
+  EXPECT_EQ(found->metrics[4].unit, "%");
+  EXPECT_FALSE(found->metrics[0].guard);
   EXPECT_THAT(found->images, SizeIs(1));
-  records.keep(sample(run_of(5), "b", 0.1));
+  records.keep(make_sample_record(numbered_run_id(5), "b", 0.1));
   EXPECT_THAT(records.list({}), SizeIs(2));
-  EXPECT_EQ(records.find(run_of(5))->figures[0].unit, "px");
-  EXPECT_TRUE(records.find(run_of(5))->figures[0].guard);
+  EXPECT_EQ(records.find(numbered_run_id(5))->metrics[0].unit, "px");
+  EXPECT_TRUE(records.find(numbered_run_id(5))->metrics[0].guard);
   EXPECT_THAT(found->events, IsEmpty());
   check_events(records);
   EXPECT_THAT(records.check("").problems, IsEmpty());
@@ -250,8 +254,8 @@ void check_migration(const std::string& where) {
 void check_migration_by_another(const std::string& where) {
   const TemporaryFolder folder;
   const auto halfway = folder / "halfway";
-  const bool is_server = where.starts_with("postgresql://");
-  const std::string other = std::string(is_server ? "BEGIN;\n" : "BEGIN IMMEDIATE;\n") +
+  const bool is_server_address = where.starts_with("postgresql://");
+  const std::string other = std::string(is_server_address ? "BEGIN;\n" : "BEGIN IMMEDIATE;\n") +
                             "UPDATE vlp_schema SET version = version;\n"
                             "ALTER TABLE figures ADD COLUMN unit VARCHAR(16) NOT NULL DEFAULT '';\n"
                             "UPDATE figures SET unit = 'by another';\n"
@@ -259,38 +263,38 @@ void check_migration_by_another(const std::string& where) {
                             halfway.string() +
                             "'; sleep 0.5\n"
                             "UPDATE vlp_schema SET version = 2;\nCOMMIT;\n";
-  auto done = std::async(std::launch::async, [&] { return answer_of(where, other); });
+  auto done = std::async(std::launch::async, [&] { return run_database_client(where, other); });
   const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(20);
   while (!std::filesystem::exists(halfway) && std::chrono::steady_clock::now() < until) {
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
-  EXPECT_EQ(refusal_of([&] { Records records(where); }), "");
+  EXPECT_EQ(rejection_message([&] { Records records(where); }), "");
   done.get();
-  EXPECT_EQ(Records(where).find("20261121T134501Z-0001")->figures[0].unit, "by another");
+  EXPECT_EQ(Records(where).find("20261121T134501Z-0001")->metrics[0].unit, "by another");
 }
 
 /// Checks that a database with kVersion1 is unchanged if its migration fails.
 void check_stopped_migration(const std::string& where) {
-  const std::string before = state_of(where);
-  EXPECT_THAT(refusal_of([&] { Records records(where); }), HasSubstr("stopped"));
-  EXPECT_EQ(state_of(where), before);
+  const std::string before = read_state(where);
+  EXPECT_THAT(rejection_message([&] { Records records(where); }), HasSubstr("stopped"));
+  EXPECT_EQ(read_state(where), before);
 }
 
 /// Checks that a database of a later version is rejected and unchanged.
 void check_later_version(const std::string& where) {
-  answer_of(where, "UPDATE vlp_schema SET version = 99;\n");
-  const std::string before = state_of(where);
+  run_database_client(where, "UPDATE vlp_schema SET version = 99;\n");
+  const std::string before = read_state(where);
   EXPECT_THAT(
-      refusal_of([&] { Records records(where); }),
+      rejection_message([&] { Records records(where); }),
       HasSubstr(": holds records of version 99, this program knows those up to " +
                 std::to_string(kSchemaVersion) + ": use the newer vlp-station that wrote them"));
-  EXPECT_EQ(state_of(where), before);
+  EXPECT_EQ(read_state(where), before);
 }
 
 TEST(UtcProblem, AcceptsOnlyExistingDaysAndTimes) {
-  for (const char* good : {"2026-11-21", "2024-02-29", "2026-11-21T13:45", "2026-11-21T13:45:01",
-                           "2026-11-21T13:45:01Z"}) {
-    EXPECT_EQ(utc_problem(good), "");
+  for (const char* valid_text : {"2026-11-21", "2024-02-29", "2026-11-21T13:45",
+                                 "2026-11-21T13:45:01", "2026-11-21T13:45:01Z"}) {
+    EXPECT_EQ(utc_problem(valid_text), "");
   }
   for (const char* bad : {"", "2026", "2026-02-29", "2026-13-01", "2026-11-21T24:00",
                           "2026-11-21T13:60", "2026-11-21T13:45:60", "2026-11-21 13:45"}) {
@@ -301,14 +305,14 @@ TEST(UtcProblem, AcceptsOnlyExistingDaysAndTimes) {
 TEST(Records, MigratesVersion1InFile) {
   const TemporaryFolder folder;
   const std::string file = (folder / "records.db").string();
-  answer_of(file, kVersion1);
+  run_database_client(file, kVersion1);
   check_migration(file);
 }
 
 TEST(Records, MigratesVersion1InFileOnce) {
   const TemporaryFolder folder;
   const std::string file = (folder / "records.db").string();
-  answer_of(file, kVersion1);
+  run_database_client(file, kVersion1);
   check_migration_by_another(file);
 }
 
@@ -316,26 +320,28 @@ TEST(Records, CheckWritableThrowsForReadOnlyTables) {
   const TemporaryFolder folder;
   const std::string file = (folder / "records.db").string();
   { const Records made(file); }
-  answer_of(file,
-            "CREATE TRIGGER stop BEFORE UPDATE ON vlp_schema BEGIN SELECT RAISE(ABORT, 'stopped'); "
-            "END;\n");
+  run_database_client(
+      file,
+      "CREATE TRIGGER stop BEFORE UPDATE ON vlp_schema BEGIN SELECT RAISE(ABORT, 'stopped'); "
+      "END;\n");
   Records records(file);
-  EXPECT_THAT(refusal_of([&] { records.check_writable(); }), HasSubstr("stopped"));
+  EXPECT_THAT(rejection_message([&] { records.check_writable(); }), HasSubstr("stopped"));
 }
 
 TEST(Records, KeepsVersion1InFileWhenMigrationFails) {
   const TemporaryFolder folder;
   const std::string file = (folder / "records.db").string();
-  answer_of(file, kVersion1 +
-                      "CREATE TRIGGER stop BEFORE UPDATE ON figures BEGIN SELECT RAISE(ABORT, "
-                      "'stopped'); END;\n");
+  run_database_client(file,
+                      kVersion1 +
+                          "CREATE TRIGGER stop BEFORE UPDATE ON figures BEGIN SELECT RAISE(ABORT, "
+                          "'stopped'); END;\n");
   check_stopped_migration(file);
 }
 
 TEST(Records, RejectsLaterVersionInFile) {
   const TemporaryFolder folder;
   const std::string file = (folder / "records.db").string();
-  answer_of(file, kVersion1);
+  run_database_client(file, kVersion1);
   check_later_version(file);
 }
 
@@ -343,17 +349,18 @@ TEST(Records, TreatsOtherVersionsInPostgresLikeFiles) {
   if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
   const PostgresServer server;
   ASSERT_NE(server.uri(), "");
-  answer_of(server.uri(), kVersion1);
+  run_database_client(server.uri(), kVersion1);
   check_migration(server.uri());
-  answer_of(server.uri(), kDropAll + kVersion1);
+  run_database_client(server.uri(), kDropAll + kVersion1);
   check_migration_by_another(server.uri());
-  answer_of(server.uri(), kDropAll + kVersion1 +
-                              "CREATE FUNCTION stop() RETURNS trigger LANGUAGE plpgsql AS 'BEGIN "
-                              "RAISE EXCEPTION ''stopped''; END';\n"
-                              "CREATE TRIGGER stop BEFORE UPDATE ON figures FOR EACH ROW EXECUTE "
-                              "FUNCTION stop();\n");
+  run_database_client(server.uri(),
+                      kDropAll + kVersion1 +
+                          "CREATE FUNCTION stop() RETURNS trigger LANGUAGE plpgsql AS 'BEGIN "
+                          "RAISE EXCEPTION ''stopped''; END';\n"
+                          "CREATE TRIGGER stop BEFORE UPDATE ON figures FOR EACH ROW EXECUTE "
+                          "FUNCTION stop();\n");
   check_stopped_migration(server.uri());
-  answer_of(server.uri(), kDropAll + kVersion1);
+  run_database_client(server.uri(), kDropAll + kVersion1);
   check_later_version(server.uri());
 }
 
@@ -374,16 +381,16 @@ TEST(Records, StoresRunsInPostgres) {
   check_two_writers(server.uri());
   // A connection string without a parameter, as for psql.
   EXPECT_THAT(Records(server.plain_uri()).list({}), SizeIs(50));
-  answer_of(server.uri(), kDropAll);
+  run_database_client(server.uri(), kDropAll);
   check_records(server.uri());
 
   // The server closes the connection, as at a restart.
   Records records(server.uri());
-  answer_of(server.uri(),
-            "SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE pid <> "
-            "pg_backend_pid() AND backend_type = 'client backend';\n");
-  records.keep(sample(run_of(9), "c", 0.1));
-  EXPECT_TRUE(records.find(run_of(9)));
+  run_database_client(server.uri(),
+                      "SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE pid <> "
+                      "pg_backend_pid() AND backend_type = 'client backend';\n");
+  records.keep(make_sample_record(numbered_run_id(9), "c", 0.1));
+  EXPECT_TRUE(records.find(numbered_run_id(9)));
 }
 
 /// A program that waited creates nothing in addition to what it finds, here a single table: indices
@@ -394,14 +401,15 @@ TEST(Records, CreatesTablesInPostgresUnderLock) {
   ASSERT_NE(server.uri(), "");
   const TemporaryFolder folder;
   const auto begun = folder / "begun", go_on = folder / "go_on";
-  const std::string lock = std::to_string(kLockOfTables);
+  const std::string lock = std::to_string(kTableLockId);
   auto another = std::async(std::launch::async, [&] {
-    answer_of(server.uri(), "BEGIN;\nSELECT pg_advisory_xact_lock(" + lock + ");\n\\! touch " +
-                                begun.string() + "; while [ ! -e " + go_on.string() +
-                                " ]; do sleep 0.01; done\n"
-                                "CREATE TABLE vlp_schema (version INTEGER PRIMARY KEY);\n"
-                                "INSERT INTO vlp_schema VALUES (" +
-                                std::to_string(kSchemaVersion) + ");\nCOMMIT;\n");
+    run_database_client(server.uri(), "BEGIN;\nSELECT pg_advisory_xact_lock(" + lock +
+                                          ");\n\\! touch " + begun.string() + "; while [ ! -e " +
+                                          go_on.string() +
+                                          " ]; do sleep 0.01; done\n"
+                                          "CREATE TABLE vlp_schema (version INTEGER PRIMARY KEY);\n"
+                                          "INSERT INTO vlp_schema VALUES (" +
+                                          std::to_string(kSchemaVersion) + ");\nCOMMIT;\n");
   });
   const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(20);
   while (!std::filesystem::exists(begun) && std::chrono::steady_clock::now() < until) {
@@ -411,14 +419,16 @@ TEST(Records, CreatesTablesInPostgresUnderLock) {
   EXPECT_EQ(made.wait_for(std::chrono::milliseconds(500)), std::future_status::timeout);
   folder.file("go_on", "");
   another.get();
-  EXPECT_THAT(refusal_of([&] { made.get(); }), HasSubstr("relation \"runs\" does not exist"));
-  EXPECT_THAT(answer_of(server.uri(), "SELECT COUNT(to_regclass('runs'));"), Not(HasSubstr("1")));
+  EXPECT_THAT(rejection_message([&] { made.get(); }),
+              HasSubstr("relation \"runs\" does not exist"));
+  EXPECT_THAT(run_database_client(server.uri(), "SELECT COUNT(to_regclass('runs'));"),
+              Not(HasSubstr("1")));
 }
 
 TEST(Records, ThrowsForFileThatIsNoDatabase) {
   const TemporaryFolder folder;
   const auto file = folder.file("records.db", std::string(5000, 'x'));
-  EXPECT_THAT(refusal_of([&] { Records records(file.string()); }),
+  EXPECT_THAT(rejection_message([&] { Records records(file.string()); }),
               testing::AllOf(HasSubstr("records.db"), HasSubstr("not a database")));
 }
 
@@ -427,7 +437,7 @@ TEST(Records, OmitsPasswordOfServerFromErrors) {
                             "postgresql://vlp@/postgres?password=secret&host=/nowhere",
                             "postgresql://vlp@/postgres?host=/nowhere&password=a@secret"}) {
     EXPECT_THAT(
-        refusal_of([&] { Records records(where); }),
+        rejection_message([&] { Records records(where); }),
         testing::AllOf(
             StartsWith("postgresql:///nowhere/postgres: the server of the records cannot be "
                        "reached"),
@@ -438,14 +448,14 @@ TEST(Records, OmitsPasswordOfServerFromErrors) {
         // where libpq takes a part of the password for the host, the port or the database
         "postgresql://vlp:a@secret@/postgres", "postgresql://vlp:a/secret@nowhere/postgres",
         "postgresql://vlp:secret/postgres"}) {
-    EXPECT_THAT(refusal_of([&] { Records records(where); }),
+    EXPECT_THAT(rejection_message([&] { Records records(where); }),
                 testing::AllOf(HasSubstr("://...: is not of the form postgresql://USER@HOST/NAME"),
                                Not(HasSubstr("secret"))));
   }
 }
 
 TEST(Records, OmitsPasswordOfKeywordsFromErrors) {
-  EXPECT_THAT(refusal_of([&] { Records records("host=/nowhere user=vlp password=secret"); }),
+  EXPECT_THAT(rejection_message([&] { Records records("host=/nowhere user=vlp password=secret"); }),
               AllOf(HasSubstr("is not of the form postgresql://"), Not(HasSubstr("secret"))));
 }
 
@@ -455,8 +465,9 @@ std::string first_line(const std::string& text) { return text.substr(0, text.fin
 TEST(WriteRuns, WritesCsv) {
   const TemporaryFolder folder;
   const auto file = folder / "runs.csv";
-  write_runs(file, {sample(run_of(1), "a", 0.25), sample(run_of(2), "b", 1.5), with_all_texts()});
-  const std::string csv = TemporaryFolder::content_of(file);
+  write_runs(file, {make_sample_record(numbered_run_id(1), "a", 0.25),
+                    make_sample_record(numbered_run_id(2), "b", 1.5), with_all_texts()});
+  const std::string csv = TemporaryFolder::read_content(file);
   EXPECT_EQ(
       first_line(csv),
       "run,kind,station,camera,operator_name,shift,begun_utc,ended_utc,verdict,causes,program,"
@@ -474,10 +485,10 @@ TEST(WriteRuns, WritesCsv) {
     const std::string text = std::string("the '") + field.name + "' of ";
     EXPECT_EQ(csv.find(text) != std::string::npos, field.in_csv) << field.name;
   }
-  EXPECT_THAT(refusal_of([&] { write_runs(folder / "runs.txt", {}); }), HasSubstr(".csv"));
+  EXPECT_THAT(rejection_message([&] { write_runs(folder / "runs.txt", {}); }), HasSubstr(".csv"));
 }
 
-std::vector<std::string> keys_of(const nlohmann::ordered_json& json) {
+std::vector<std::string> list_keys(const nlohmann::ordered_json& json) {
   std::vector<std::string> keys;
   for (const auto& item : json.items()) keys.push_back(item.key());
   return keys;
@@ -487,26 +498,26 @@ TEST(WriteRuns, WritesJson) {
   const TemporaryFolder folder;
   const auto file = folder / "runs.json";
   const RunRecord all = with_all_texts();
-  write_runs(file, {sample(run_of(1), "a", 0.25), all});
-  const auto runs = nlohmann::ordered_json::parse(TemporaryFolder::content_of(file));
+  write_runs(file, {make_sample_record(numbered_run_id(1), "a", 0.25), all});
+  const auto runs = nlohmann::ordered_json::parse(TemporaryFolder::read_content(file));
   ASSERT_THAT(runs, SizeIs(2));
-  EXPECT_THAT(keys_of(runs[0]),
+  EXPECT_THAT(list_keys(runs[0]),
               ElementsAre("run", "kind", "station", "camera", "operator_name", "shift", "begun_utc",
                           "ended_utc", "verdict", "causes", "program", "libraries", "config_sha256",
                           "calibration", "figures", "images", "events"));
-  const auto& figures = runs[0]["figures"];
-  EXPECT_THAT(keys_of(figures), ElementsAre("rms_px", "coverage", "tilt_deg"));
-  EXPECT_THAT(keys_of(figures["tilt_deg"]),
+  const auto& metrics = runs[0]["figures"];
+  EXPECT_THAT(list_keys(metrics), ElementsAre("rms_px", "coverage", "tilt_deg"));
+  EXPECT_THAT(list_keys(metrics["tilt_deg"]),
               ElementsAre("value", "unit", "gate", "at_least", "met"));
-  EXPECT_THAT(keys_of(figures["rms_px"]),
+  EXPECT_THAT(list_keys(metrics["rms_px"]),
               ElementsAre("value", "unit", "gate", "at_least", "met", "uncertainty", "guard_k",
                           "conformance_probability"));
-  EXPECT_NEAR(figures["rms_px"]["conformance_probability"].get<double>(), 0.99379, 5e-6);
-  EXPECT_EQ(figures["rms_px"]["value"], 0.25);
-  EXPECT_EQ(figures["rms_px"]["unit"], "px");
-  EXPECT_TRUE(figures["tilt_deg"]["value"].is_null());
-  EXPECT_TRUE(figures["coverage"]["gate"].is_null());
-  EXPECT_THAT(keys_of(runs[0]["images"][1]), ElementsAre("step", "image", "sha256", "refused"));
+  EXPECT_NEAR(metrics["rms_px"]["conformance_probability"].get<double>(), 0.99379, 5e-6);
+  EXPECT_EQ(metrics["rms_px"]["value"], 0.25);
+  EXPECT_EQ(metrics["rms_px"]["unit"], "px");
+  EXPECT_TRUE(metrics["tilt_deg"]["value"].is_null());
+  EXPECT_TRUE(metrics["coverage"]["gate"].is_null());
+  EXPECT_THAT(list_keys(runs[0]["images"][1]), ElementsAre("step", "image", "sha256", "refused"));
   EXPECT_EQ(runs[0]["images"][1]["refused"], "too dark");
   for (const RunField& field : run_fields()) {
     EXPECT_THAT(runs[1][field.name].get<std::string>(),
@@ -517,15 +528,16 @@ TEST(WriteRuns, WritesJson) {
 TEST(WriteRuns, MatchesJsonSchemasOfRunsAndSpool) {
   const TemporaryFolder folder;
   const auto file = folder / "runs.json";
-  RunRecord golden = sample(run_of(2), "b", 1.5);
+  RunRecord golden = make_sample_record(numbered_run_id(2), "b", 1.5);
   golden.kind = "golden";
-  RunRecord invalid = sample(run_of(3), "c", 1.5);
-  invalid.verdict = name_of(Verdict::invalid);
-  write_runs(file, {sample(run_of(1), "a", 0.25), golden, invalid});
+  RunRecord invalid = make_sample_record(numbered_run_id(3), "c", 1.5);
+  invalid.verdict = to_string(Verdict::invalid);
+  write_runs(file, {make_sample_record(numbered_run_id(1), "a", 0.25), golden, invalid});
   EXPECT_EQ(problems_by_schema("runs", {file}), "");
   std::vector<std::filesystem::path> waiting;
-  for (const RunRecord& run : {sample(run_of(1), "a", 0.25), golden, invalid}) {
-    waiting.push_back(folder.file(run.camera + ".json", text_of_run({run, "records.db"})));
+  for (const RunRecord& run :
+       {make_sample_record(numbered_run_id(1), "a", 0.25), golden, invalid}) {
+    waiting.push_back(folder.file(run.camera + ".json", format_run({run, "records.db"})));
   }
   EXPECT_EQ(problems_by_schema("run", waiting), "");
 }

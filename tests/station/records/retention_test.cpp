@@ -58,7 +58,7 @@ class RetentionTest : public testing::Test {
 
 TEST_F(RetentionTest, FindsExpiredFolders) {
   keep(kOld, "a.b", "2020-01-01T01:00:00Z");
-  const std::string now = new_run(), resumed = "20200101T000000Z-fedcba9876543210";
+  const std::string now = make_run_id(), resumed = "20200101T000000Z-fedcba9876543210";
   keep(now, "a.b", now_utc());
   keep(resumed, "c", now_utc());  // begun long ago, ended now
   const fs::path images = with_file("captures/a.b." + kOld),
@@ -69,17 +69,18 @@ TEST_F(RetentionTest, FindsExpiredFolders) {
         std::string("results/a.b/notes"), "captures/a.b" + kOld, "captures/" + kOld}) {
     with_file(left);
   }
-  const fs::path of_nobody = with_file("captures/d." + kOld);  // the record is of another camera
-  const Retained found = look_for_expired(config, records);
+  const fs::path without_record =
+      with_file("captures/d." + kOld);  // the record is of another camera
+  const RetentionResult found = find_expired(config, records);
   ASSERT_THAT(found.expired, SizeIs(2));
   EXPECT_EQ(found.expired[0].folder, images);
   EXPECT_STREQ(found.expired[0].what, kImagesDeleted);
   EXPECT_EQ(found.expired[0].bytes, 1000U);
   EXPECT_EQ(found.expired[1].folder, results);
   EXPECT_STREQ(found.expired[1].what, kResultsDeleted);
-  EXPECT_THAT(found.without_record, ElementsAre(of_nobody));
+  EXPECT_THAT(found.without_record, ElementsAre(without_record));
   config.keep = {std::nullopt, 30'000};
-  EXPECT_THAT(look_for_expired(config, records).expired, IsEmpty());
+  EXPECT_THAT(find_expired(config, records).expired, IsEmpty());
 }
 
 /// Stations can share folders and records.
@@ -91,7 +92,7 @@ TEST_F(RetentionTest, IgnoresOtherStationsAndLinks) {
   with_file("results/a/" + other);
   fs::create_directory_symlink(with_file("elsewhere"), folder / "captures" / ("a." + kOld));
   fs::create_directory_symlink(folder / "nowhere", folder / "results" / "a" / kOld);
-  const Retained found = look_for_expired(config, records);
+  const RetentionResult found = find_expired(config, records);
   EXPECT_THAT(found.expired, IsEmpty());
   EXPECT_THAT(found.without_record, IsEmpty());
 }
@@ -100,7 +101,7 @@ TEST_F(RetentionTest, DeletesFolderWithoutFollowingLinks) {
   keep(kOld, "a", "2020-01-01T01:00:00Z");
   const fs::path images = with_file("captures/a." + kOld), elsewhere = with_file("elsewhere");
   fs::create_directory_symlink(elsewhere, images / "link");
-  const Retained found = look_for_expired(config, records);
+  const RetentionResult found = find_expired(config, records);
   ASSERT_THAT(found.expired, SizeIs(1));
   EXPECT_EQ(found.expired[0].bytes, 1000U);
   Spool spool(folder / "spool", (folder / "records.db").string());
@@ -108,11 +109,11 @@ TEST_F(RetentionTest, DeletesFolderWithoutFollowingLinks) {
   EXPECT_FALSE(fs::exists(images));
   EXPECT_TRUE(fs::exists(elsewhere / "check/0.png"));
   spool.deliver();
-  const auto told = records.find(kOld);
-  ASSERT_TRUE(told);
-  ASSERT_THAT(told->events, SizeIs(1));
-  EXPECT_EQ(told->events[0].what, kImagesDeleted);
-  EXPECT_EQ(told->events[0].text, "kept 90 days, 0.0 MB");
+  const auto record = records.find(kOld);
+  ASSERT_TRUE(record);
+  ASSERT_THAT(record->events, SizeIs(1));
+  EXPECT_EQ(record->events[0].what, kImagesDeleted);
+  EXPECT_EQ(record->events[0].text, "kept 90 days, 0.0 MB");
   EXPECT_THROW(delete_expired(found.expired[0], config, spool), InputError) << "it is not there";
 }
 
@@ -122,24 +123,24 @@ TEST_F(RetentionTest, KeepsFolderUsedByStation) {
   const fs::path results = with_file("results/a/" + kOld), images = with_file("captures/a." + kOld);
   config.inputs = {folder.file("station.yaml", ""),
                    folder.file("results/a/" + kOld + "/calibration.yaml", "")};
-  const Retained found = look_for_expired(config, records);
+  const RetentionResult found = find_expired(config, records);
   EXPECT_THAT(found.in_use, ElementsAre(results));
   ASSERT_THAT(found.expired, SizeIs(1));
   EXPECT_EQ(found.expired[0].folder, images);
   // Through a link, and by another name.
   fs::create_symlink(config.inputs[1], folder / "golden.yaml");
   config.inputs[1] = folder / "golden.yaml";
-  EXPECT_THAT(look_for_expired(config, records).in_use, ElementsAre(results));
+  EXPECT_THAT(find_expired(config, records).in_use, ElementsAre(results));
   config.inputs = {};
   config.spool = images / "spool";
-  EXPECT_THAT(look_for_expired(config, records).in_use, ElementsAre(images));
+  EXPECT_THAT(find_expired(config, records).in_use, ElementsAre(images));
 }
 
 TEST_F(RetentionTest, KeepsFolderUsedThroughLink) {
   keep(kOld, "a", "2020-01-01T01:00:00Z");
   const fs::path results = with_file("results/a/" + kOld);
   const auto expect_in_use = [&](const std::string& why) {
-    EXPECT_THAT(look_for_expired(config, records).in_use, ElementsAre(results)) << why;
+    EXPECT_THAT(find_expired(config, records).in_use, ElementsAre(results)) << why;
   };
   fs::create_symlink(folder.file("elsewhere.yaml", ""), results / "golden.yaml");
   config.inputs = {results / "golden.yaml"};
@@ -151,7 +152,7 @@ TEST_F(RetentionTest, KeepsFolderUsedThroughLink) {
   config.inputs = {folder / "loop"};
   expect_in_use("cannot be followed");
   config.inputs = {folder / "elsewhere.yaml", folder / "none"};
-  ASSERT_THAT(look_for_expired(config, records).in_use, IsEmpty());
+  ASSERT_THAT(find_expired(config, records).in_use, IsEmpty());
   const std::string script = "results/a/" + kOld + "/hook.py";
   config.hook = Hook{{"python3", script, std::string(5000, 'x')}, folder / ""};
   folder.file(script, "");
@@ -162,44 +163,44 @@ TEST_F(RetentionTest, DeletesNothingIfCameraFolderBecameLink) {
   keep(kOld, "a", "2020-01-01T01:00:00Z");
   with_file("results/a/" + kOld);
   const fs::path kept = with_file("elsewhere/" + kOld);
-  const Retained found = look_for_expired(config, records);
+  const RetentionResult found = find_expired(config, records);
   ASSERT_THAT(found.expired, SizeIs(1));
   fs::remove_all(folder / "results/a");
   fs::create_directory_symlink(folder / "elsewhere", folder / "results/a");
   Spool spool(folder / "spool", (folder / "records.db").string());
-  EXPECT_THAT(refusal_of([&] { delete_expired(found.expired[0], config, spool); }),
+  EXPECT_THAT(rejection_message([&] { delete_expired(found.expired[0], config, spool); }),
               HasSubstr("results/a: is a symbolic link"));
   EXPECT_TRUE(fs::exists(kept / "check/0.png"));
 }
 
 TEST_F(RetentionTest, CheckClockThrowsForClockYearsAhead) {
-  const auto refusal = [&] { return refusal_of([&] { check_clock(config, records); }); };
+  const auto refusal = [&] { return rejection_message([&] { check_clock(config, records); }); };
   EXPECT_EQ(refusal(), "") << "no run";
   keep(kOld, "a", "2020-01-01T01:00:00Z");
-  keep(new_run(), "a", now_utc(), "another");
+  keep(make_run_id(), "a", now_utc(), "another");
   EXPECT_THAT(refusal(),
               HasSubstr("the newest run ended 2020-01-01T01:00:00Z, more than a year before"));
   // The first run by such a clock does not make it right.
   const std::string today = now_utc();
-  keep(new_run(), "a", today);
+  keep(make_run_id(), "a", today);
   EXPECT_THAT(refusal(), HasSubstr("the runs since " + today + " ended more than a year after"));
-  keep(new_run(), "a", utc_days_ago(6));
+  keep(make_run_id(), "a", utc_days_ago(6));
   EXPECT_THAT(refusal(), HasSubstr("the runs since " + utc_days_ago(6)));
-  keep(new_run(), "a", utc_days_ago(8));
+  keep(make_run_id(), "a", utc_days_ago(8));
   EXPECT_EQ(refusal(), "");
 }
 
 TEST_F(RetentionTest, CheckClockThrowsForClockBehindRun) {
-  keep(new_run(), "a", utc_days_ago(0));
-  EXPECT_EQ(refusal_of([&] { check_clock(config, records); }), "");
-  const std::string run = new_run(), coming = utc_days_ago(-20 * 366);
+  keep(make_run_id(), "a", utc_days_ago(0));
+  EXPECT_EQ(rejection_message([&] { check_clock(config, records); }), "");
+  const std::string run = make_run_id(), coming = utc_days_ago(-20 * 366);
   keep(run, "a", coming);
-  EXPECT_THAT(refusal_of([&] { check_clock(config, records); }),
+  EXPECT_THAT(rejection_message([&] { check_clock(config, records); }),
               HasSubstr("the newest run ended " + coming + ", after the clock"));
   RunRecord voided_run = *records.find(run);
-  voided_run.events.push_back(new_event(kVoided, "wrong clock", "Ann"));
+  voided_run.events.push_back(make_event(kVoided, "wrong clock", "Ann"));
   records.keep(voided_run);
-  EXPECT_EQ(refusal_of([&] { check_clock(config, records); }), "");
+  EXPECT_EQ(rejection_message([&] { check_clock(config, records); }), "");
 }
 
 }  // namespace

@@ -28,14 +28,14 @@ TEST(SecondsSince, IsNotNegativeForNow) {
 TEST(RunName, ContainsStartTime) {
   EXPECT_EQ(begun_utc("20261121T134501Z-0123456789abcdef"), "2026-11-21T13:45:01Z");
   EXPECT_EQ(begun_utc("run"), "");
-  const std::string run = new_run();
+  const std::string run = make_run_id();
   EXPECT_THAT(run, SizeIs(33));
   EXPECT_LE(begun_utc(run), now_utc());
-  EXPECT_NE(run, new_run());
-  EXPECT_TRUE(is_name_of_run(run));
+  EXPECT_NE(run, make_run_id());
+  EXPECT_TRUE(is_run_id(run));
   for (const std::string& other : {std::string(), run + "0", "../../../" + run, "x" + run.substr(1),
                                    run.substr(0, 32) + "/"}) {
-    EXPECT_FALSE(is_name_of_run(other)) << other;
+    EXPECT_FALSE(is_run_id(other)) << other;
   }
 }
 

@@ -55,7 +55,7 @@ TEST(Spool, LimitsWaitForLockedFile) {
   EXPECT_TRUE(fs::exists(locked));
   Spool spool(folder / "spool", where);
   spool.keep(numbered_run(1));
-  EXPECT_LT(seconds_of([&] { spool.deliver(); }), 15);
+  EXPECT_LT(measure_seconds([&] { spool.deliver(); }), 15);
   EXPECT_THAT(spool.state(), AllOf(StartsWith("kept here, 1 waiting"), HasSubstr("locked")));
   folder.file("done", "");
   other.join();
@@ -83,12 +83,12 @@ TEST(Spool, KeepsRunsOnFullDisk) {
     spool.prepare();
     for (int i = 0; i < 40; ++i) spool.keep(numbered_run(i));
     spool.deliver();
-    const std::size_t there = whole_runs(where).size();
-    EXPECT_LT(there, 40u);
-    EXPECT_THAT(spool.waiting(), SizeIs(40 - there));
+    const std::size_t num_stored = whole_runs(where).size();
+    EXPECT_LT(num_stored, 40u);
+    EXPECT_THAT(spool.waiting(), SizeIs(40 - num_stored));
     EXPECT_THAT(spool.state(), HasSubstr("full"));
     // Full records are readable.
-    EXPECT_EQ(spool.owner_of("digest-0-1", "b"), (ImageOwner{"camera-0", numbered_run(0).run}));
+    EXPECT_EQ(spool.find_owner("digest-0-1", "b"), (ImageOwner{"camera-0", numbered_run(0).run}));
   }
   ASSERT_EQ(::mount("none", small.c_str(), "tmpfs", MS_REMOUNT, "size=8m"), 0);
   Spool(folder / "spool", where).deliver();
@@ -120,7 +120,7 @@ void kill_while_keeping(const TemporaryFolder& folder, const std::string& where,
   spool.prepare();
   EXPECT_EQ(spool.state(), "");
   const auto runs = whole_runs(where);
-  std::istringstream kept(TemporaryFolder::content_of(log));
+  std::istringstream kept(TemporaryFolder::read_content(log));
   int count = 0;
   for (std::string run; std::getline(kept, run); ++count) EXPECT_TRUE(runs.contains(run)) << run;
   EXPECT_GT(count, 0);
@@ -176,12 +176,12 @@ TEST(Spool, OmitsSqlFromNotice) {
   const std::string set_up =
       "psql -X -q '" + server.uri() + "' -c \"CREATE ROLE guest LOGIN PASSWORD 'guest'\"";
   ASSERT_EQ(std::system(set_up.c_str()), 0);
-  const auto spool_of = [&](const std::string& user, const std::string& name) {
+  const auto open_spool = [&](const std::string& user, const std::string& name) {
     return Spool(folder / name,
                  "postgresql://" + user + "@" + server.address() + "/postgres?connect_timeout=2");
   };
   // Its user has no right to the tables.
-  Spool guest = spool_of("guest:guest", "guest");
+  Spool guest = open_spool("guest:guest", "guest");
   guest.prepare();
   EXPECT_EQ(guest.notice(),
             "records are offline (access refused); runs are kept, delivered automatically");
@@ -192,7 +192,7 @@ TEST(Spool, OmitsSqlFromNotice) {
   EXPECT_THAT(guest.state(), AllOf(HasSubstr("permission denied"), Not(HasSubstr("SELECT")),
                                    Not(HasSubstr("UPDATE")), Not(HasSubstr("while"))));
   server.stop();
-  Spool offline = spool_of("vlp:right", "offline");
+  Spool offline = open_spool("vlp:right", "offline");
   offline.prepare();
   for (int run = 1; run <= 2; ++run) offline.keep(numbered_run(run));
   EXPECT_EQ(offline.notice(), "records are offline; 2 runs kept, delivered automatically");
@@ -242,21 +242,21 @@ TEST(Spool, KeepsRunsOfEightStationsOnOneServer) {
   const PostgresServer server;
   ASSERT_NE(server.uri(), "");
   const TemporaryFolder folder;
-  const auto spool_of = [&](int station) {
+  const auto open_spool = [&](int station) {
     return Spool(folder / ("spool-" + std::to_string(station)), server.uri());
   };
   std::vector<pid_t> children;
   for (int station = 0; station < stations; ++station) {
     children.push_back(start_child([&, station] {
-      Spool spool = spool_of(station);
+      Spool spool = open_spool(station);
       spool.prepare();  // one of them makes the tables
       for (int i = 0; i < each; ++i) {
         RunRecord run = numbered_run(1000 * station + i);
         run.station = "station-" + std::to_string(station);
-        run.events = {new_event(kHookWanted, "label")};
+        run.events = {make_event(kHookRequested, "label")};
         spool.keep(run);
         spool.deliver();
-        run.events.push_back(new_event(kHookDone, ""));
+        run.events.push_back(make_event(kHookDone, ""));
         spool.keep(run);
         spool.deliver();
       }
@@ -265,12 +265,12 @@ TEST(Spool, KeepsRunsOfEightStationsOnOneServer) {
   EXPECT_TRUE(end_well(children));
   for (int station = 0; station < stations; ++station) {
     // No station waited longer than allowed, unless this machine is busy.
-    Spool spool = spool_of(station);
+    Spool spool = open_spool(station);
     std::cout << "station-" << station << ": " << spool.waiting().size() << " waited\n";
     spool.deliver();
     EXPECT_EQ(spool.state(), "");
   }
-  EXPECT_THAT(Records(server.uri()).with_open_hook(""), IsEmpty());
+  EXPECT_THAT(Records(server.uri()).find_open_hooks(""), IsEmpty());
   const auto count = static_cast<std::size_t>(stations * each);
   EXPECT_THAT(whole_runs(server.uri()), SizeIs(count));
   const TrailCheck trail = Records(server.uri()).check("");
@@ -314,15 +314,17 @@ TEST(Spool, KeepsRunsWhenServerStops) {
   connected.prepare();
   EXPECT_EQ(connected.state(), "");
   server.freeze();
-  EXPECT_LT(seconds_of([&] { EXPECT_EQ(connected.owner_of("digest-1-1", "b"), ImageOwner{}); }), 8);
+  EXPECT_LT(
+      measure_seconds([&] { EXPECT_EQ(connected.find_owner("digest-1-1", "b"), ImageOwner{}); }),
+      8);
   connected.keep(numbered_run(-3));
-  EXPECT_LT(seconds_of([&] { connected.deliver(); }), 1);
+  EXPECT_LT(measure_seconds([&] { connected.deliver(); }), 1);
   EXPECT_FALSE(connected.find("another"));
-  EXPECT_THAT(connected.away(), HasSubstr("has not answered for 2 s"));
+  EXPECT_THAT(connected.offline_reason(), HasSubstr("has not answered for 2 s"));
   EXPECT_THAT(connected.state(),
               AllOf(StartsWith("kept here, 1 waiting: "), HasSubstr("has not answered for 2 s")));
   Spool fresh = spool();
-  EXPECT_LT(seconds_of([&] { fresh.prepare(); }), 8);
+  EXPECT_LT(measure_seconds([&] { fresh.prepare(); }), 8);
   EXPECT_THAT(fresh.state(), StartsWith("kept here, 1 waiting: "));
   server.thaw();
   deliver_to(3);
@@ -331,7 +333,7 @@ TEST(Spool, KeepsRunsWhenServerStops) {
   several.prepare();
   server.freeze();
   for (int i = 4; i < 10; ++i) several.keep(numbered_run(-i));
-  EXPECT_LT(seconds_of([&] { several.deliver(); }), 5);
+  EXPECT_LT(measure_seconds([&] { several.deliver(); }), 5);
   EXPECT_THAT(several.state(),
               AllOf(StartsWith("kept here, 6 waiting: "), HasSubstr("has not answered for 2 s")));
   server.thaw();

@@ -43,20 +43,20 @@ TEST(ReadRun, ReturnsWrittenRun) {
   for (const RunField& field : run_fields()) run.*field.text += "\"\\ \xc3\xbc{}";
   for (std::string* lines : {&run.causes, &run.calibration}) lines->append("\n\tof lines\n");
   run.images[1].refused = "too dark";
-  const auto [read, records] = read_run(folder.file("run.json", text_of_run({run, "records.db"})));
+  const auto [read, records] = read_run(folder.file("run.json", format_run({run, "records.db"})));
   EXPECT_EQ(records, "records.db");
   for (const RunField& field : run_fields()) EXPECT_EQ(read.*field.text, run.*field.text);
-  ASSERT_THAT(read.figures, SizeIs(run.figures.size()));
-  for (std::size_t i = 0; i < run.figures.size(); ++i) {
-    EXPECT_EQ(read.figures[i].name, run.figures[i].name);
-    EXPECT_EQ(read.figures[i].unit, run.figures[i].unit);
-    EXPECT_EQ(read.figures[i].value, run.figures[i].value);  // to the last bit
-    EXPECT_EQ(read.figures[i].limit, run.figures[i].limit);
-    EXPECT_EQ(read.figures[i].asked, run.figures[i].asked);
-    ASSERT_EQ(read.figures[i].guard.has_value(), i == 0);
-    if (!read.figures[i].guard) continue;
-    EXPECT_EQ(read.figures[i].guard->standard_uncertainty, 0.01);
-    EXPECT_EQ(read.figures[i].guard->k, 1.645);
+  ASSERT_THAT(read.metrics, SizeIs(run.metrics.size()));
+  for (std::size_t i = 0; i < run.metrics.size(); ++i) {
+    EXPECT_EQ(read.metrics[i].name, run.metrics[i].name);
+    EXPECT_EQ(read.metrics[i].unit, run.metrics[i].unit);
+    EXPECT_EQ(read.metrics[i].value, run.metrics[i].value);  // to the last bit
+    EXPECT_EQ(read.metrics[i].limit, run.metrics[i].limit);
+    EXPECT_EQ(read.metrics[i].direction, run.metrics[i].direction);
+    ASSERT_EQ(read.metrics[i].guard.has_value(), i == 0);
+    if (!read.metrics[i].guard) continue;
+    EXPECT_EQ(read.metrics[i].guard->standard_uncertainty, 0.01);
+    EXPECT_EQ(read.metrics[i].guard->k, 1.645);
   }
   ASSERT_THAT(read.images, SizeIs(run.images.size()));
   EXPECT_EQ(read.images[1].refused, "too dark");
@@ -67,18 +67,18 @@ TEST(ReadRun, AcceptsNamesThatAreInvalidText) {
   const TemporaryFolder folder;
   RunRecord run = numbered_run(1);
   run.images[0].name = "\xff\x1b[31m.png";
-  EXPECT_EQ(read_run(folder.file("run.json", text_of_run({run, "records.db"}))).run.images[0].name,
+  EXPECT_EQ(read_run(folder.file("run.json", format_run({run, "records.db"}))).run.images[0].name,
             "\\xff\\x1b[31m.png");
 }
 
 TEST(ReadRun, ThrowsWithFileForInvalidRun) {
   const TemporaryFolder folder;
-  const std::string text = text_of_run({numbered_run(1), "records.db"});
+  const std::string text = format_run({numbered_run(1), "records.db"});
   for (const std::string& bad :
        {std::string("{}\n"), std::string("[]\n"), text.substr(0, text.size() / 2) + "\n",
         std::string(text).replace(text.find("vlp-run/1"), 9, "vlp-run/2"),
         std::string(text).replace(text.find("\"figures\""), 9, "\"figurer\"")}) {
-    EXPECT_THAT(refusal_of([&] { read_run(folder.file("bad.json", bad)); }),
+    EXPECT_THAT(rejection_message([&] { read_run(folder.file("bad.json", bad)); }),
                 HasSubstr("bad.json: is no run of a station"));
   }
 }
@@ -88,7 +88,9 @@ TEST(ReadRun, RejectsIdsOfOtherFolders) {
   RunRecord run = numbered_run(1);
   run.camera = "../..";
   const auto refusal = [&] {
-    return refusal_of([&] { read_run(folder.file("bad.json", text_of_run({run, "records.db"}))); });
+    return rejection_message([&] {
+      read_run(folder.file("bad.json", format_run({run, "records.db"})));
+    });
   };
   EXPECT_THAT(refusal(), HasSubstr("its run or camera is no id"));
   run = numbered_run(1);
@@ -102,13 +104,14 @@ TEST(ReadRun, RejectsIdsOfOtherFolders) {
 TEST(ReadRun, RejectsSpecialFilesAndDeepNesting) {
   const TemporaryFolder folder;
   ASSERT_EQ(::mkfifo((folder / "pipe.json").c_str(), 0600), 0);
-  EXPECT_THAT(refusal_of([&] { read_run(folder / "pipe.json"); }),
+  EXPECT_THAT(rejection_message([&] { read_run(folder / "pipe.json"); }),
               HasSubstr("pipe.json: is no regular file"));
   std::filesystem::create_symlink("/dev/zero", folder / "link.json");
-  EXPECT_THAT(refusal_of([&] { read_run(folder / "link.json"); }),
+  EXPECT_THAT(rejection_message([&] { read_run(folder / "link.json"); }),
               HasSubstr("link.json: is a symbolic link"));
-  EXPECT_THAT(refusal_of([&] { read_run(folder.file("deep.json", std::string(1'000'000, '['))); }),
-              HasSubstr("it has more than 16 levels"));
+  EXPECT_THAT(
+      rejection_message([&] { read_run(folder.file("deep.json", std::string(1'000'000, '['))); }),
+      HasSubstr("it has more than 16 levels"));
 }
 
 TEST(Spool, KeepsRunsUntilRecordsAreOnline) {
@@ -123,9 +126,9 @@ TEST(Spool, KeepsRunsUntilRecordsAreOnline) {
   EXPECT_EQ(spool.find(numbered_run(1).run)->camera, "camera-1");
   EXPECT_FALSE(spool.find("another"));
   // Checks continue with the locally known runs.
-  EXPECT_EQ(spool.owner_of("digest-2-7", "camera-1"),
+  EXPECT_EQ(spool.find_owner("digest-2-7", "camera-1"),
             (ImageOwner{"camera-2", numbered_run(2).run}));
-  EXPECT_EQ(spool.owner_of("digest-2-7", "camera-2"), ImageOwner{});
+  EXPECT_EQ(spool.find_owner("digest-2-7", "camera-2"), ImageOwner{});
   EXPECT_THAT(spool.state(), HasSubstr("; 1 images were not looked up in the records"));
 
   fs::create_directory(folder / "away");
@@ -134,8 +137,8 @@ TEST(Spool, KeepsRunsUntilRecordsAreOnline) {
   EXPECT_EQ(later.state(), "");
   EXPECT_THAT(later.waiting(), IsEmpty());
   EXPECT_THAT(whole_runs(where), SizeIs(3));
-  EXPECT_EQ(Records(where).find(numbered_run(1).run)->figures[0].value, 0.1 + 0.2);
-  EXPECT_EQ(later.owner_of("digest-2-7", "camera-1"),
+  EXPECT_EQ(Records(where).find(numbered_run(1).run)->metrics[0].value, 0.1 + 0.2);
+  EXPECT_EQ(later.find_owner("digest-2-7", "camera-1"),
             (ImageOwner{"camera-2", numbered_run(2).run}));
 }
 
@@ -149,9 +152,9 @@ TEST(Spool, FindsGoldenRunOfImage) {
   invalid.verdict = "INVALID";
   for (const RunRecord& run : {numbered_run(0), golden, invalid}) spool.keep(run);
   for (const std::string state : {"here", "in the records"}) {
-    EXPECT_EQ(spool.golden_run_of("digest-1-7"), golden.run) << state;
-    EXPECT_EQ(spool.golden_run_of("digest-0-7"), "") << "of a unit, " << state;
-    EXPECT_EQ(spool.golden_run_of("digest-2-7"), "") << "not judged, " << state;
+    EXPECT_EQ(spool.find_golden_run("digest-1-7"), golden.run) << state;
+    EXPECT_EQ(spool.find_golden_run("digest-0-7"), "") << "of a unit, " << state;
+    EXPECT_EQ(spool.find_golden_run("digest-2-7"), "") << "not judged, " << state;
     spool.deliver();
   }
   EXPECT_TRUE(fs::is_empty(folder / "spool"));
@@ -170,33 +173,33 @@ TEST(Spool, FindsRunThatUsedAllImages) {
   for (const std::string state : {"here", "in the records"}) {
     spool.keep(earlier);
     if (state != "here") spool.deliver();
-    EXPECT_EQ(spool.repeated_run_of(again), earlier.run) << state;
-    EXPECT_EQ(spool.repeated_run_of(earlier), "") << "itself, " << state;
+    EXPECT_EQ(spool.find_repeated_run(again), earlier.run) << state;
+    EXPECT_EQ(spool.find_repeated_run(earlier), "") << "itself, " << state;
     RunRecord fewer = again, other = again, camera = again, none = again;
     fewer.images.resize(kImagesOfARun / 2);
-    EXPECT_EQ(spool.repeated_run_of(fewer), earlier.run) << state;
+    EXPECT_EQ(spool.find_repeated_run(fewer), earlier.run) << state;
     other.images.back().sha256 = "another";
-    EXPECT_EQ(spool.repeated_run_of(other), "") << "one is new, " << state;
+    EXPECT_EQ(spool.find_repeated_run(other), "") << "one is new, " << state;
     other.images.back().refused = "blurred";
-    EXPECT_EQ(spool.repeated_run_of(other), earlier.run) << "and not used, " << state;
+    EXPECT_EQ(spool.find_repeated_run(other), earlier.run) << "and not used, " << state;
     camera.camera = "another";
-    EXPECT_EQ(spool.repeated_run_of(camera), "") << state;
+    EXPECT_EQ(spool.find_repeated_run(camera), "") << state;
     none.images.clear();
-    EXPECT_EQ(spool.repeated_run_of(none), "") << state;
+    EXPECT_EQ(spool.find_repeated_run(none), "") << state;
   }
   // Images of a run that did not count can be used again.
   RunRecord voided_run = earlier;
-  voided_run.events = {new_event(kVoided, "wrong lamps", "Ann")};
+  voided_run.events = {make_event(kVoided, "wrong lamps", "Ann")};
   spool.keep(voided_run);
-  EXPECT_EQ(spool.repeated_run_of(again), "");
+  EXPECT_EQ(spool.find_repeated_run(again), "");
   RunRecord invalid = numbered_run(3), invalid_again = numbered_run(3);
-  invalid.judge({{"no captures.csv"}});
+  invalid.set_verdict({{"no captures.csv"}});
   invalid_again.run = numbered_run(4).run;
   spool.keep(invalid);
-  EXPECT_EQ(spool.repeated_run_of(invalid_again), "");
+  EXPECT_EQ(spool.find_repeated_run(invalid_again), "");
   spool.deliver();
-  EXPECT_EQ(spool.repeated_run_of(again), "");
-  EXPECT_EQ(spool.repeated_run_of(invalid_again), "");
+  EXPECT_EQ(spool.find_repeated_run(again), "");
+  EXPECT_EQ(spool.find_repeated_run(invalid_again), "");
 }
 
 /// A waiting run with later events is one run.
@@ -205,16 +208,16 @@ TEST(Spool, KeepsEventsOfRun) {
   const std::string where = (folder / "away/records.db").string();
   Spool spool(folder / "spool", where);
   RunRecord run = numbered_run(1);
-  run.events = {new_event(kHookWanted, "label")};
+  run.events = {make_event(kHookRequested, "label")};
   spool.keep(run);
-  EXPECT_THAT(spool.with_open_hook("station-1"), testing::ElementsAre(run.run));
-  EXPECT_THAT(spool.with_open_hook("another"), IsEmpty());
+  EXPECT_THAT(spool.find_open_hooks("station-1"), testing::ElementsAre(run.run));
+  EXPECT_THAT(spool.find_open_hooks("another"), IsEmpty());
   const RunRecord before = run;
-  run.events.push_back(new_event(kHookFailed, "\"exit\" code 3"));
+  run.events.push_back(make_event(kHookFailed, "\"exit\" code 3"));
   spool.keep(run);
-  run.events = {before.events[0], new_event(kHookDone, "")};
+  run.events = {before.events[0], make_event(kHookDone, "")};
   spool.keep(run);
-  EXPECT_THAT(spool.with_open_hook("station-1"), IsEmpty());
+  EXPECT_THAT(spool.find_open_hooks("station-1"), IsEmpty());
   spool.deliver();
   EXPECT_THAT(spool.state(), StartsWith("kept here, 1 waiting"));
   ASSERT_THAT(spool.waiting(), SizeIs(1));
@@ -230,7 +233,7 @@ TEST(Spool, KeepsEventsOfRun) {
   const auto kept = later.find(run.run);
   ASSERT_THAT(kept->events, SizeIs(3));
   EXPECT_EQ(kept->events[1].text, "\"exit\" code 3");
-  EXPECT_THAT(later.with_open_hook("station-1"), IsEmpty());
+  EXPECT_THAT(later.find_open_hooks("station-1"), IsEmpty());
 }
 
 TEST(Spool, DeliversDespiteInvalidFiles) {
@@ -256,14 +259,14 @@ TEST(Spool, RetriesUnreadableFile) {
   const TemporaryFolder folder;
   const std::string where = (folder / "away/records.db").string();
   Spool spool(folder / "spool", where);
-  const std::string text = text_of_run({numbered_run(1), identity_of_database(where)});
+  const std::string text = format_run({numbered_run(1), make_database_identity(where)});
   fs::create_directory(folder / "spool");
   folder.file("spool/1.json", text.substr(0, text.size() / 2));
   EXPECT_THAT(spool.waiting(), IsEmpty());
   EXPECT_THAT(spool.state(), AllOf(HasSubstr("1.json"), Not(HasSubstr("waiting"))));
   folder.file("spool/1.json", text);
   EXPECT_THAT(spool.waiting(), SizeIs(1));
-  EXPECT_EQ(spool.owner_of("digest-1-7", "b"), (ImageOwner{"camera-1", numbered_run(1).run}));
+  EXPECT_EQ(spool.find_owner("digest-1-7", "b"), (ImageOwner{"camera-1", numbered_run(1).run}));
   EXPECT_THAT(spool.state(), AllOf(StartsWith("kept here, 1 waiting"), Not(HasSubstr("1.json"))));
 }
 
@@ -271,13 +274,13 @@ TEST(Spool, StoresRunsInRecordsIfFolderCannotBeWritten) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   Spool spool(folder.file("spool", ""), where);
-  EXPECT_THAT(refusal_of([&] { spool.prepare(); }), HasSubstr("spool: cannot be made"));
+  EXPECT_THAT(rejection_message([&] { spool.prepare(); }), HasSubstr("spool: cannot be made"));
   { const Records made(where); }
   spool.keep(numbered_run(1));
   EXPECT_THAT(whole_runs(where), SizeIs(1));
   Spool neither(folder / "spool", (folder / "away/records.db").string());
   EXPECT_THAT(
-      refusal_of([&] { neither.keep(numbered_run(2)); }),
+      rejection_message([&] { neither.keep(numbered_run(2)); }),
       AllOf(HasSubstr("spool: neither here can a run be kept"), HasSubstr("away/records.db")));
 }
 
@@ -292,7 +295,7 @@ TEST(Spool, DeliversRunsToTheirRecords) {
   EXPECT_THAT(of_b.state(), AllOf(StartsWith("1 here for other records"), HasSubstr("a.db")));
   EXPECT_THAT(of_b.waiting(), IsEmpty());
   EXPECT_TRUE(of_b.find(numbered_run(1).run)) << "a run is not judged twice for that";
-  EXPECT_EQ(of_b.owner_of("digest-1-7", "b"), (ImageOwner{"camera-1", numbered_run(1).run}));
+  EXPECT_EQ(of_b.find_owner("digest-1-7", "b"), (ImageOwner{"camera-1", numbered_run(1).run}));
   of_b.keep(numbered_run(2));
   of_b.deliver();
   EXPECT_THAT(whole_runs(b), SizeIs(1));
@@ -313,7 +316,7 @@ bool on_another_machine(const Action& action) {
     if (::sethostname(name.data(), name.size()) != 0) ::_exit(not_permitted);
     action();
   });
-  const int status = status_of(child);
+  const int status = wait_for_child(child);
   const bool permitted = WEXITSTATUS(status) != not_permitted;
   EXPECT_TRUE(!permitted || status == 0);
   return permitted;
@@ -373,7 +376,7 @@ TEST(Spool, CreatesDatabaseOnlyInPrepare) {
 }
 
 TEST(Spool, ThrowsForInvalidConnectionString) {
-  EXPECT_THAT(refusal_of([&] { Spool("spool", "postgresql://vlp:a@b@/c"); }),
+  EXPECT_THAT(rejection_message([&] { Spool("spool", "postgresql://vlp:a@b@/c"); }),
               HasSubstr("is not of the form"));
 }
 
@@ -386,10 +389,10 @@ TEST(Spool, KeepsRunsOfConcurrentPrograms) {
   std::vector<pid_t> children;
   for (int program = 1; program <= 3; ++program) {
     children.push_back(start_child([&, program] {
-      Spool own(folder / "spool", where);
+      Spool own_spool(folder / "spool", where);
       for (int i = 0; i < 5; ++i) {
-        own.keep(numbered_run(100 * program + i));
-        own.deliver();
+        own_spool.keep(numbered_run(100 * program + i));
+        own_spool.deliver();
       }
     }));
   }

@@ -21,15 +21,17 @@ using testing::IsEmpty;
 using testing::SizeIs;
 using testing::StartsWith;
 
-const std::string kRun1 = run_of(1), kRun2 = run_of(2), kRun3 = run_of(3);
+const std::string kRun1 = numbered_run_id(1), kRun2 = numbered_run_id(2),
+                  kRun3 = numbered_run_id(3);
 const std::string kLabel = "20261121T134505.000000Z-00000001",
                   kDeleted = "20261121T134506.000000Z-00000002";
 
 /// Stores entries 1 to 5: runs 1 and 2, the hook of 2, run 3, and the deletion of its images.
 void keep_three(const std::string& where) {
   Records records(where);
-  RunRecord first = sample(kRun1, "a", 0.1), second = sample(kRun2, "b", 1.0 / 3),
-            third = sample(kRun3, "c", 1.5);
+  RunRecord first = make_sample_record(kRun1, "a", 0.1),
+            second = make_sample_record(kRun2, "b", 1.0 / 3),
+            third = make_sample_record(kRun3, "c", 1.5);
   second.events = {{kLabel, kHookDone, "label 7", "Ann (vlp@station-1)"}};
   third.events = {{kDeleted, kImagesDeleted, "kept 90 days", "vlp@station-1"}};
   for (const RunRecord& run : {first, second, third, second}) records.keep(run);
@@ -97,7 +99,7 @@ void check_forgeries(const std::function<std::string()>& new_database) {
     EXPECT_THAT(kept.problems, IsEmpty());
     EXPECT_EQ(kept.runs, 3U);
     EXPECT_EQ(kept.entries, 5U);
-    answer_of(where, forgery.sql);
+    run_database_client(where, forgery.sql);
     EXPECT_EQ(records.check("").problems, forgery.problems) << forgery.sql;
     if (!forgery.problems.empty()) continue;
     EXPECT_THAT(
@@ -117,7 +119,7 @@ TEST(CheckTrail, DetectsChangesInPostgres) {
   const PostgresServer server;
   ASSERT_NE(server.uri(), "");
   check_forgeries([&] {
-    answer_of(server.uri(), kDropAll);
+    run_database_client(server.uri(), kDropAll);
     return server.uri();
   });
 }
@@ -128,13 +130,13 @@ TEST(CheckTrail, AcceptsEarlierDigestAfterNewRuns) {
   const std::string where = (folder / "records.db").string();
   keep_three(where);
   Records records(where);
-  const std::string noted = records.check("").last_digest;
-  EXPECT_THAT(noted, SizeIs(64));
-  records.keep(sample(run_of(4), "d", 0.5));
-  const TrailCheck later = records.check(noted);
+  const std::string expected_digest = records.check("").last_digest;
+  EXPECT_THAT(expected_digest, SizeIs(64));
+  records.keep(make_sample_record(numbered_run_id(4), "d", 0.5));
+  const TrailCheck later = records.check(expected_digest);
   EXPECT_THAT(later.problems, IsEmpty());
   EXPECT_EQ(later.entries, 6U);
-  EXPECT_NE(later.last_digest, noted);
+  EXPECT_NE(later.last_digest, expected_digest);
 }
 
 /// Equal runs have equal digests in every database.
@@ -194,12 +196,12 @@ void check_sealing(const std::string& where) {
   ASSERT_THAT(run.events, SizeIs(2));
   EXPECT_EQ(run.events[1].text, "exit code 3");
   EXPECT_EQ(run.events[1].who, "");
-  run.events.push_back(new_event(kHookDone, "", "Bob"));
+  run.events.push_back(make_event(kHookDone, "", "Bob"));
   records.keep(run);
   EXPECT_THAT(records.find(run.run)->events[2].who, StartsWith("Bob ("));
   EXPECT_EQ(records.check(sealed.last_digest).entries, 4U);
   EXPECT_THAT(records.check(sealed.last_digest).problems, IsEmpty());
-  answer_of(where, "UPDATE events SET text = 'label 7' WHERE what = 'hook failed';\n");
+  run_database_client(where, "UPDATE events SET text = 'label 7' WHERE what = 'hook failed';\n");
   EXPECT_THAT(records.check("").problems,
               ElementsAre("event 20261121T135511.000000Z-00000002 of run 20261121T134509Z-0009 was "
                           "changed"));
@@ -208,12 +210,12 @@ void check_sealing(const std::string& where) {
 TEST(CheckTrail, IncludesRunsOfVersion5) {
   const TemporaryFolder folder;
   const std::string file = (folder / "records.db").string();
-  answer_of(file, kVersion5);
+  run_database_client(file, kVersion5);
   check_sealing(file);
   if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
   const PostgresServer server;
   ASSERT_NE(server.uri(), "");
-  answer_of(server.uri(), kVersion5);
+  run_database_client(server.uri(), kVersion5);
   check_sealing(server.uri());
 }
 

@@ -50,7 +50,7 @@ std::vector<ReferenceValue> linearity_example() {
 /// The regression of the manual and of SPC for Excel's worked example of it ("Linearity and Bias
 /// Study", its biases with the sample's standard deviation), to their printed digits.
 TEST(BiasStudy, MatchesLinearityOfAiagManual) {
-  const BiasStudy study = bias_study(linearity_example());
+  const BiasStudy study = analyze_bias(linearity_example());
   ASSERT_TRUE(study.linearity);
   const Linearity& line = *study.linearity;
   EXPECT_NEAR(line.slope.value, -0.131667, 5e-7);
@@ -64,7 +64,7 @@ TEST(BiasStudy, MatchesLinearityOfAiagManual) {
   EXPECT_NEAR(line.intercept.low, 0.591, 5e-4);
   EXPECT_NEAR(line.intercept.high, 0.882, 5e-4);
   EXPECT_LT(line.slope.p, 5e-4);
-  EXPECT_TRUE(line.slope.shows());
+  EXPECT_TRUE(line.slope.is_significant());
   EXPECT_NEAR(line.residual_sd, 0.240, 5e-4);
   EXPECT_NEAR(100 * line.r_squared, 71.43, 0.005);
   EXPECT_EQ(line.slope.dof, 58);
@@ -79,13 +79,13 @@ TEST(BiasStudy, MatchesLinearityOfAiagManual) {
                                      {-0.617, 0.0423, -14.56, 0.000}};
   ASSERT_THAT(study.units, SizeIs(printed.size()));
   for (std::size_t i = 0; i < printed.size(); ++i) {
-    const TestedEstimate& bias = study.units[i].bias;
+    const EstimateTest& bias = study.units[i].bias;
     EXPECT_NEAR(bias.value, printed[i].bias, 5e-4);
     EXPECT_NEAR(bias.standard_error, printed[i].standard_error,
                 printed[i].standard_error > 0.1 ? 5e-4 : 5e-5);
     EXPECT_NEAR(bias.t, printed[i].t, std::abs(printed[i].t) < 1 ? 5e-4 : 0.005);
     EXPECT_NEAR(bias.p, printed[i].p, 5e-4);
-    EXPECT_EQ(bias.shows(), printed[i].p < 0.05);
+    EXPECT_EQ(bias.is_significant(), printed[i].p < 0.05);
     EXPECT_EQ(study.units[i].reference, 2 * (static_cast<double>(i) + 1));
     EXPECT_EQ(study.units[i].count, 12U);
   }
@@ -96,7 +96,7 @@ TEST(BiasStudy, MatchesLinearityOfAiagManual) {
   EXPECT_NEAR(study.all.p, 0.089, 5e-4);
   EXPECT_NEAR(study.all.low, -0.1152, 1e-4);
   EXPECT_NEAR(study.all.high, 0.0085, 1e-4);
-  EXPECT_FALSE(study.all.shows());
+  EXPECT_FALSE(study.all.is_significant());
   // Narrowest at the mean. At both ends 0 is outside the band, as in the manual's figure.
   EXPECT_LT(line.band_at(6), line.band_at(2));
   EXPECT_NEAR(line.band_at(2), line.band_at(10), 1e-12);
@@ -107,7 +107,7 @@ TEST(BiasStudy, MatchesLinearityOfAiagManual) {
 /// AIAG, Measurement Systems Analysis, 4th ed., the independent sample method: 15 readings of a
 /// part of 6.00.
 TEST(BiasStudy, MatchesBiasOfAiagManual) {
-  const BiasStudy study = bias_study(values_of_unit(
+  const BiasStudy study = analyze_bias(values_of_unit(
       "part", 6, {5.8, 5.7, 5.9, 5.9, 6.0, 6.1, 6.0, 6.1, 6.4, 6.3, 6.0, 6.1, 6.2, 5.6, 6.0}));
   ASSERT_THAT(study.units, SizeIs(1));
   const UnitBias& part = study.units[0];
@@ -119,7 +119,7 @@ TEST(BiasStudy, MatchesBiasOfAiagManual) {
   EXPECT_NEAR(part.bias.t, 0.1218, 5e-5);
   EXPECT_NEAR(part.bias.low, -0.1107, 1e-4);
   EXPECT_NEAR(part.bias.high, 0.1241, 5e-5);
-  EXPECT_FALSE(part.bias.shows());
+  EXPECT_FALSE(part.bias.is_significant());
   EXPECT_FALSE(study.linearity) << "of one reference";
 }
 
@@ -139,11 +139,11 @@ TEST(BiasStudy, MatchesCertifiedLineOfNist) {
   for (std::size_t i = 0; i < reference.size(); ++i) {
     values.push_back({"unit", reference[i], measured[i]});
   }
-  EXPECT_THAT(refusal_of<std::invalid_argument>([&] { bias_study(values); }),
+  EXPECT_THAT(rejection_message<std::invalid_argument>([&] { analyze_bias(values); }),
               HasSubstr("unit unit has one run"));
   auto twice = values;
   twice.insert(twice.end(), values.begin(), values.end());
-  const BiasStudy study = bias_study(twice);
+  const BiasStudy study = analyze_bias(twice);
   // The same line for twice the values: errors are smaller by sqrt(2 (n - 2) / (2 n - 2)).
   const Linearity& line = study.linearity.value();
   constexpr double n = 36;
@@ -161,7 +161,7 @@ TEST(BiasStudy, MatchesCertifiedLineOfNist) {
 TEST(BiasStudy, IntervalsAndTestsHaveNominalRates) {
   Random random(5);
   constexpr int studies = 2000;
-  int shown = 0, sloped = 0, held = 0, in_band = 0;
+  int num_significant = 0, sloped = 0, held = 0, in_band = 0;
   for (int i = 0; i < studies; ++i) {
     std::vector<ReferenceValue> without, with;
     for (const double reference : {1.0, 2.0, 4.0}) {
@@ -172,37 +172,38 @@ TEST(BiasStudy, IntervalsAndTestsHaveNominalRates) {
                         reference + 0.3 - 0.2 * reference + 0.1 * random.normal()});
       }
     }
-    const BiasStudy none = bias_study(without), some = bias_study(with);
-    shown += none.all.shows() ? 1 : 0;
-    sloped += none.linearity->slope.shows() ? 1 : 0;
-    held += some.linearity->slope.low < -0.2 && some.linearity->slope.high > -0.2 ? 1 : 0;
-    in_band += std::abs(some.linearity->bias_at(3) + 0.3) < some.linearity->band_at(3) ? 1 : 0;
+    const BiasStudy none = analyze_bias(without), with_bias = analyze_bias(with);
+    num_significant += none.all.is_significant() ? 1 : 0;
+    sloped += none.linearity->slope.is_significant() ? 1 : 0;
+    held += with_bias.linearity->slope.low < -0.2 && with_bias.linearity->slope.high > -0.2 ? 1 : 0;
+    in_band +=
+        std::abs(with_bias.linearity->bias_at(3) + 0.3) < with_bias.linearity->band_at(3) ? 1 : 0;
   }
   // Standard error of each fraction: 0.5 %.
-  EXPECT_NEAR(double(shown) / studies, 0.05, 0.02);
+  EXPECT_NEAR(double(num_significant) / studies, 0.05, 0.02);
   EXPECT_NEAR(double(sloped) / studies, 0.05, 0.02);
   EXPECT_NEAR(double(held) / studies, 0.95, 0.02);
   EXPECT_NEAR(double(in_band) / studies, 0.95, 0.02);
 }
 
 TEST(BiasStudy, ReturnsZeroPForValuesWithoutScatter) {
-  const BiasStudy study = bias_study(values_of_unit("a", 1, {1.5, 1.5, 1.5}));
+  const BiasStudy study = analyze_bias(values_of_unit("a", 1, {1.5, 1.5, 1.5}));
   EXPECT_EQ(study.all.p, 0);
   EXPECT_EQ(study.all.t, std::numeric_limits<double>::infinity());
   EXPECT_EQ(study.all.low, 0.5);
-  EXPECT_TRUE(study.all.shows());
+  EXPECT_TRUE(study.all.is_significant());
   // Ten times 0.9 does not add up to 9.
-  const BiasStudy none = bias_study(values_of_unit("a", 0.9, std::vector<double>(10, 0.9)));
+  const BiasStudy none = analyze_bias(values_of_unit("a", 0.9, std::vector<double>(10, 0.9)));
   EXPECT_EQ(none.units[0].bias.value, 0);
   EXPECT_EQ(none.units[0].bias.p, 1);
   EXPECT_EQ(none.all.p, 1);
 }
 
 TEST(BiasStudy, ThrowsForMissingValues) {
-  EXPECT_THAT(refusal_of<std::invalid_argument>([] { bias_study({}); }),
+  EXPECT_THAT(rejection_message<std::invalid_argument>([] { analyze_bias({}); }),
               HasSubstr("needs runs of reference units"));
-  EXPECT_THAT(refusal_of<std::invalid_argument>([] {
-                bias_study({{"a", 1, 1}, {"a", 1, 2}, {"b", 2, 2}});
+  EXPECT_THAT(rejection_message<std::invalid_argument>([] {
+                analyze_bias({{"a", 1, 1}, {"a", 1, 2}, {"b", 2, 2}});
               }),
               HasSubstr("unit b has one run: a bias study needs two or more of each"));
 }
@@ -210,13 +211,13 @@ TEST(BiasStudy, ThrowsForMissingValues) {
 TEST(DrawBias, WritesPlot) {
   const TemporaryFolder folder;
   const auto values = linearity_example();
-  draw_bias(folder / "bias.svg", "tilt_deg", values, bias_study(values));
-  EXPECT_THAT(TemporaryFolder::content_of(folder / "bias.svg"),
+  draw_bias(folder / "bias.svg", "tilt_deg", values, analyze_bias(values));
+  EXPECT_THAT(TemporaryFolder::read_content(folder / "bias.svg"),
               AllOf(HasSubstr("<svg"), HasSubstr("95 % band"), HasSubstr("no bias"),
                     HasSubstr("tilt_deg, measured - reference")));
   const auto one = values_of_unit("a", 1, {1.5, 1.4});
-  draw_bias(folder / "one.svg", "tilt_deg", one, bias_study(one));
-  EXPECT_THAT(TemporaryFolder::content_of(folder / "one.svg"), testing::Not(HasSubstr("band")));
+  draw_bias(folder / "one.svg", "tilt_deg", one, analyze_bias(one));
+  EXPECT_THAT(TemporaryFolder::read_content(folder / "one.svg"), testing::Not(HasSubstr("band")));
 }
 
 }  // namespace

@@ -20,15 +20,15 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-std::vector<std::size_t> places_of(const std::vector<ChartAlarm>& alarms) {
+std::vector<std::size_t> find_indices(const std::vector<ChartAlarm>& alarms) {
   std::vector<std::size_t> places;
   for (const ChartAlarm& alarm : alarms) places.push_back(alarm.index);
   return places;
 }
 
-bool holds(const std::string& name, const std::vector<double>& sigmas) {
+bool matches(const std::string& name, const std::vector<double>& sigmas) {
   for (const ChartRule& rule : chart_rules()) {
-    if (rule.name == name) return rule.holds(sigmas);
+    if (rule.name == name) return rule.matches(sigmas);
   }
   ADD_FAILURE() << "no rule " << name;
   return false;
@@ -49,7 +49,7 @@ std::vector<double> with(std::vector<double> values, std::size_t place, double v
 }
 
 TEST(ControlChart, ComputesLimitsFromMovingRange) {
-  const ControlChart chart = control_chart(std::vector<double>{1, 3, 2, 5});
+  const ControlChart chart = compute_control_chart(std::vector<double>{1, 3, 2, 5});
   const double sigma = (2 + 1 + 3) / 3.0 / 1.128, mean = 11 / 4.0;
   EXPECT_DOUBLE_EQ(chart.mean, mean);
   EXPECT_DOUBLE_EQ(chart.sigma, sigma);
@@ -60,20 +60,20 @@ TEST(ControlChart, ComputesLimitsFromMovingRange) {
 /// NIST/SEMATECH e-Handbook of Statistical Methods, 6.3.2.2: flow rates of ten batches.
 TEST(ControlChart, MatchesPublishedIndividualsChart) {
   const std::vector<double> flow{49.6, 47.6, 49.9, 51.3, 47.8, 51.2, 52.6, 52.4, 53.6, 52.1};
-  const ControlChart chart = control_chart(flow);
+  const ControlChart chart = compute_control_chart(flow);
   constexpr double printed = 5e-5;
   EXPECT_NEAR(chart.mean, 50.81, printed);
   EXPECT_NEAR(chart.sigma * 1.128, 1.8778, printed);
   EXPECT_NEAR(chart.upper, 55.8041, printed);
   EXPECT_NEAR(chart.lower, 45.8159, printed);
-  EXPECT_THAT(chart_alarms(flow, {"western-electric-1"}), IsEmpty());
+  EXPECT_THAT(find_alarms(flow, {"western-electric-1"}), IsEmpty());
 }
 
 /// NIST/SEMATECH e-Handbook of Statistical Methods, 6.3.2.4.
 TEST(Ewma, MatchesPublishedMovingAverage) {
   const std::vector<double> values{52.0, 47.0, 53.0, 49.3, 50.1, 47.0, 51.0, 50.1, 51.2, 50.5,
                                    49.6, 47.6, 49.9, 51.3, 47.8, 51.2, 52.6, 52.4, 53.6, 52.1};
-  const Ewma average = ewma(values, 50, 2.0539, 0.3);
+  const Ewma average = compute_ewma(values, 50, 2.0539, 0.3);
   EXPECT_NEAR(average.upper, 52.5884, 5e-5);
   EXPECT_NEAR(average.lower, 47.4115, 1e-4);  // printed as 47.4115, cut off
   const std::vector<double> printed{50.60, 49.52, 50.56, 50.18, 50.16, 49.21, 49.75,
@@ -87,7 +87,7 @@ TEST(Ewma, MatchesPublishedMovingAverage) {
 
 struct RuleCase {
   const char* rule;
-  std::vector<double> holds, fails;
+  std::vector<double> matches, fails;
 };
 
 TEST(ChartRules, DetectPatternsUpToLastValue) {
@@ -116,8 +116,9 @@ TEST(ChartRules, DetectPatternsUpToLastValue) {
       {"nelson-8", times(8, 1.01), with(in_turns(8, 1.01), 4, 1)},
   };
   for (const RuleCase& each : cases) {
-    EXPECT_TRUE(holds(each.rule, each.holds)) << each.rule << testing::PrintToString(each.holds);
-    EXPECT_FALSE(holds(each.rule, each.fails)) << each.rule << testing::PrintToString(each.fails);
+    EXPECT_TRUE(matches(each.rule, each.matches))
+        << each.rule << testing::PrintToString(each.matches);
+    EXPECT_FALSE(matches(each.rule, each.fails)) << each.rule << testing::PrintToString(each.fails);
   }
 }
 
@@ -139,7 +140,7 @@ TEST(ChartRules, MatchPublishedRunLengths) {
       do {
         sigmas.push_back(random.normal());
       } while (std::none_of(rules.begin(), rules.end(),
-                            [&](const ChartRule& rule) { return rule.holds(sigmas); }));
+                            [&](const ChartRule& rule) { return rule.matches(sigmas); }));
       total += static_cast<double>(sigmas.size());
     }
     // For an approximately geometric run length the standard error is 1.8 %.
@@ -151,18 +152,18 @@ TEST(ChartAlarms, ReportsValueOutsideLimits) {
   std::vector<double> values;
   for (int i = 0; i < 20; ++i) values.push_back(i % 2 == 0 ? 1.0 : 1.1);
   values[13] = 3;
-  EXPECT_THAT(places_of(chart_alarms(values, {"western-electric-1"})), ElementsAre(13));
-  EXPECT_THAT(places_of(chart_alarms(values, {"nelson-1"})), ElementsAre(13));
+  EXPECT_THAT(find_indices(find_alarms(values, {"western-electric-1"})), ElementsAre(13));
+  EXPECT_THAT(find_indices(find_alarms(values, {"nelson-1"})), ElementsAre(13));
 }
 
 TEST(ChartAlarms, ReportsDriftInsideLimits) {
   std::vector<double> values;
   for (int i = 0; i < 24; ++i) values.push_back((i % 2 == 0 ? 1.0 : 1.1) + (i < 12 ? 0 : 0.3));
-  EXPECT_THAT(chart_alarms(values, {"western-electric-1"}), IsEmpty());
+  EXPECT_THAT(find_alarms(values, {"western-electric-1"}), IsEmpty());
   // From the eighth on, the first twelve values are also eight in a row below the mean.
-  EXPECT_THAT(places_of(chart_alarms(values, {"western-electric-4"})),
+  EXPECT_THAT(find_indices(find_alarms(values, {"western-electric-4"})),
               ElementsAre(7, 8, 9, 10, 11, 19, 20, 21, 22, 23));
-  const auto by_average = chart_alarms(values, {"ewma"});
+  const auto by_average = find_alarms(values, {"ewma"});
   ASSERT_FALSE(by_average.empty());
   EXPECT_EQ(by_average.back().index, 23u);
 }
@@ -170,19 +171,19 @@ TEST(ChartAlarms, ReportsDriftInsideLimits) {
 TEST(ChartAlarms, AppliesAllRulesOfSet) {
   const std::vector<double> values{0, 0.1, 0, 0.1, 0, 0.1, 0, 0.1, 5};
   std::vector<std::string> names;
-  for (const ChartAlarm& alarm : chart_alarms(values, {"western-electric", "nelson-1", "ewma"})) {
+  for (const ChartAlarm& alarm : find_alarms(values, {"western-electric", "nelson-1", "ewma"})) {
     if (alarm.index == 8) names.push_back(alarm.rule);
   }
   EXPECT_THAT(names, ElementsAre("western-electric-1", "nelson-1", "ewma"));
-  EXPECT_THAT(refusal_of<std::invalid_argument>([&] { chart_alarms(values, {"western"}); }),
+  EXPECT_THAT(rejection_message<std::invalid_argument>([&] { find_alarms(values, {"western"}); }),
               HasSubstr("there is no rule western; there are western-electric-1 to -4"));
 }
 
 TEST(ChartAlarms, ReturnsNoneForEqualValues) {
   for (const double value : {1.0, 0.1, 0.3, 1e-7}) {
     const std::vector<double> values(20, value);  // more than any rule uses
-    EXPECT_EQ(control_chart(values).mean, value);
-    EXPECT_THAT(chart_alarms(values, {"western-electric", "nelson", "ewma"}), IsEmpty());
+    EXPECT_EQ(compute_control_chart(values).mean, value);
+    EXPECT_THAT(find_alarms(values, {"western-electric", "nelson", "ewma"}), IsEmpty());
   }
 }
 
@@ -191,8 +192,8 @@ TEST(ChartAlarms, CountsValueAtMeanOnNeitherSide) {
   std::vector<double> values(7, 0.5);
   values.push_back(1);
   values.insert(values.end(), 7, 1.5);
-  EXPECT_EQ(control_chart(values).mean, 1);
-  EXPECT_THAT(chart_alarms(values, {"western-electric-4"}), IsEmpty());
+  EXPECT_EQ(compute_control_chart(values).mean, 1);
+  EXPECT_THAT(find_alarms(values, {"western-electric-4"}), IsEmpty());
 }
 
 TEST(DrawTrend, WritesPlot) {
@@ -205,10 +206,10 @@ TEST(DrawTrend, WritesPlot) {
   }
   const std::vector<ChartAlarm> alarms{{"nelson-1", "far", 5}};
   draw_trend(folder / "trend.svg", "rms_px", points, alarms, 4.0);
-  const std::string svg = TemporaryFolder::content_of(folder / "trend.svg");
+  const std::string svg = TemporaryFolder::read_content(folder / "trend.svg");
   EXPECT_THAT(svg, testing::AllOf(HasSubstr("alarms"), HasSubstr("gate"), HasSubstr("rms_px")));
   draw_trend(folder / "plain.svg", "rms_px", points, {}, std::nullopt);
-  EXPECT_THAT(TemporaryFolder::content_of(folder / "plain.svg"),
+  EXPECT_THAT(TemporaryFolder::read_content(folder / "plain.svg"),
               testing::Not(testing::AnyOf(HasSubstr("alarms"), HasSubstr("gate"))));
 }
 

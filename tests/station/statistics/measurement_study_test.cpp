@@ -31,7 +31,7 @@ std::vector<StudyValue> crossed(std::size_t stations, std::size_t repeats,
 /// AIAG, Measurement Systems Analysis, 4th ed., tables III-B 6 (values), A 3 (analysis of variance)
 /// and A 4 (parts of the variation): 10 parts, 3 appraisers, 3 trials.
 TEST(MeasurementStudy, MatchesAiagManual) {
-  const MeasurementStudy study = measurement_study(
+  const MeasurementStudy study = analyze_measurements(
       crossed(3, 3, {0.29,  0.41,  0.64,  0.08,  0.25,  0.07,  0.04,  -0.11, -0.15,     // 1
                      -0.56, -0.68, -0.58, -0.47, -1.22, -0.68, -1.38, -1.13, -0.96,     // 2
                      1.34,  1.17,  1.27,  1.19,  0.94,  1.34,  0.88,  1.09,  0.67,      // 3
@@ -45,24 +45,24 @@ TEST(MeasurementStudy, MatchesAiagManual) {
   constexpr double printed = 5e-5;
   EXPECT_NEAR(study.station.sum_of_squares, 3.1673, printed);
   EXPECT_NEAR(study.unit.sum_of_squares, 88.3619, printed);
-  EXPECT_NEAR(study.both.sum_of_squares, 0.3590, printed);
+  EXPECT_NEAR(study.interaction.sum_of_squares, 0.3590, printed);
   EXPECT_NEAR(study.error.sum_of_squares, 2.7589, printed);
   EXPECT_EQ(study.station.dof, 2);
   EXPECT_EQ(study.unit.dof, 9);
-  EXPECT_EQ(study.both.dof, 18);
+  EXPECT_EQ(study.interaction.dof, 18);
   EXPECT_EQ(study.error.dof, 60);
   EXPECT_NEAR(study.station.mean_square() / study.error.mean_square(), 34.44, 0.005);
   EXPECT_NEAR(study.unit.mean_square() / study.error.mean_square(), 213.52, 0.005);
-  EXPECT_NEAR(study.both.mean_square() / study.error.mean_square(), 0.434, 5e-4);
+  EXPECT_NEAR(study.interaction.mean_square() / study.error.mean_square(), 0.434, 5e-4);
   EXPECT_TRUE(study.pooled);
   constexpr double last_digit = 1.5e-6;  // the manual's own rounding on the way
   EXPECT_NEAR(study.repeatability, 0.199933, last_digit);
   EXPECT_NEAR(study.of_station, 0.226838, last_digit);
-  EXPECT_EQ(study.of_both, 0);
-  EXPECT_NEAR(study.measuring, 0.302373, 2 * last_digit);
+  EXPECT_EQ(study.of_interaction, 0);
+  EXPECT_NEAR(study.grr, 0.302373, 2 * last_digit);
   EXPECT_NEAR(study.of_unit, 1.042327, last_digit);
   EXPECT_NEAR(study.total, 1.085, 5e-4);
-  EXPECT_NEAR(100 * study.measuring / study.total, 27.9, 0.05);
+  EXPECT_NEAR(100 * study.grr / study.total, 27.9, 0.05);
   EXPECT_NEAR(100 * study.repeatability / study.total, 18.4, 0.05);
   EXPECT_NEAR(100 * study.of_station / study.total, 20.9, 0.05);
   EXPECT_NEAR(100 * study.of_unit / study.total, 96.0, 0.05);
@@ -72,7 +72,7 @@ TEST(MeasurementStudy, MatchesAiagManual) {
 /// Montgomery, Design and Analysis of Experiments, gauge study of 20 parts, 3 operators, 2
 /// measurements: the analysis of variance, and the parts of the reduced model.
 TEST(MeasurementStudy, MatchesTextbook) {
-  const MeasurementStudy study = measurement_study(crossed(
+  const MeasurementStudy study = analyze_measurements(crossed(
       3, 2, {21, 20, 20, 20, 19, 21, 24, 23, 24, 24, 23, 24, 20, 21, 19, 21, 20, 22, 27, 27,
              28, 26, 27, 28, 19, 18, 19, 18, 18, 21, 23, 21, 24, 21, 23, 22, 22, 21, 22, 24,
              22, 20, 19, 17, 18, 20, 19, 18, 24, 23, 25, 23, 24, 24, 25, 23, 26, 25, 24, 25,
@@ -81,36 +81,36 @@ TEST(MeasurementStudy, MatchesTextbook) {
              20, 20, 19, 21, 19, 19, 21, 23, 25, 26, 25, 24, 25, 25, 19, 19, 18, 17, 19, 17}));
   EXPECT_NEAR(study.unit.sum_of_squares, 1185.43, 0.0051);
   EXPECT_NEAR(study.station.sum_of_squares, 2.62, 0.005);
-  EXPECT_NEAR(study.both.sum_of_squares, 27.05, 0.005);
+  EXPECT_NEAR(study.interaction.sum_of_squares, 27.05, 0.005);
   EXPECT_NEAR(study.error.sum_of_squares, 59.50, 0.005);
   EXPECT_NEAR(study.unit.mean_square(), 62.39, 0.005);
   EXPECT_NEAR(study.station.mean_square(), 1.31, 0.005);
-  EXPECT_NEAR(study.both.mean_square(), 0.71, 0.005);
+  EXPECT_NEAR(study.interaction.mean_square(), 0.71, 0.005);
   EXPECT_NEAR(study.error.mean_square(), 0.99, 0.005);
   ASSERT_TRUE(study.interaction_p);
   EXPECT_NEAR(*study.interaction_p, 0.861, 5e-4);
   EXPECT_NEAR(std::pow(study.repeatability, 2), 0.88, 0.005);
   EXPECT_NEAR(std::pow(study.of_station, 2), 0.0106, 5e-5);
   EXPECT_NEAR(std::pow(study.of_unit, 2), 10.25, 0.005);
-  EXPECT_NEAR(std::pow(study.measuring, 2), 0.89, 0.005);
+  EXPECT_NEAR(std::pow(study.grr, 2), 0.89, 0.005);
 }
 
 /// Values of the same equations in NumPy and SciPy, because none are published.
 TEST(MeasurementStudy, KeepsSignificantInteraction) {
-  const MeasurementStudy study = measurement_study(
+  const MeasurementStudy study = analyze_measurements(
       crossed(2, 2, {10, 10.2, 12, 12.2, 11, 11.4, 10, 10.4, 15, 15.2, 14, 14.6}));
   EXPECT_FALSE(study.pooled);
   EXPECT_NEAR(*study.interaction_p, 0.0002923805372109052, 1e-12);
   EXPECT_NEAR(std::pow(study.repeatability, 2), 0.06666666666666661, 1e-12);
-  EXPECT_NEAR(std::pow(study.of_both, 2), 1.3733333333333282, 1e-12);
+  EXPECT_NEAR(std::pow(study.of_interaction, 2), 1.3733333333333282, 1e-12);
   EXPECT_EQ(study.of_station, 0) << "-0.467 is none";
   EXPECT_NEAR(std::pow(study.of_unit, 2), 4.150000000000005, 1e-12);
-  EXPECT_NEAR(std::pow(study.measuring, 2), 0.06666666666666661 + 1.3733333333333282, 1e-12);
+  EXPECT_NEAR(std::pow(study.grr, 2), 0.06666666666666661 + 1.3733333333333282, 1e-12);
 }
 
 /// By hand: two units at 0 and 10, each measured twice, 1 apart: MS_e = 0.5, MS_unit = 100.
 TEST(MeasurementStudy, ComputesRepeatabilityForOneStation) {
-  const MeasurementStudy study = measurement_study(crossed(1, 2, {-0.5, 0.5, 9.5, 10.5}));
+  const MeasurementStudy study = analyze_measurements(crossed(1, 2, {-0.5, 0.5, 9.5, 10.5}));
   EXPECT_EQ(study.stations, 1u);
   EXPECT_FALSE(study.interaction_p);
   EXPECT_DOUBLE_EQ(study.repeatability, std::sqrt(0.5));
@@ -143,7 +143,7 @@ TEST(MeasurementStudy, RecoversSimulatedVarianceComponents) {
         for (std::size_t r = 0; r < repeats; ++r) values.push_back(of_unit + of + random.normal());
       }
     }
-    const MeasurementStudy study = measurement_study(crossed(stations, repeats, values));
+    const MeasurementStudy study = analyze_measurements(crossed(stations, repeats, values));
     error += std::pow(study.repeatability, 2) / studies;
     unit += std::pow(study.of_unit, 2) / studies;
     station += std::pow(study.of_station, 2) / studies;
@@ -155,19 +155,19 @@ TEST(MeasurementStudy, RecoversSimulatedVarianceComponents) {
 }
 
 TEST(MeasurementStudy, ThrowsForMissingValues) {
-  EXPECT_THAT(refusal_of<std::invalid_argument>([] { measurement_study({}); }),
+  EXPECT_THAT(rejection_message<std::invalid_argument>([] { analyze_measurements({}); }),
               HasSubstr("two units"));
-  EXPECT_THAT(refusal_of<std::invalid_argument>([] {
-                measurement_study(crossed(1, 1, {1, 2}));
+  EXPECT_THAT(rejection_message<std::invalid_argument>([] {
+                analyze_measurements(crossed(1, 1, {1, 2}));
               }),
               HasSubstr("two or more"));
   auto values = crossed(2, 2, {1, 2, 3, 4, 5, 6, 7, 8});
   values.pop_back();
-  EXPECT_THAT(refusal_of<std::invalid_argument>([&] { measurement_study(values); }),
+  EXPECT_THAT(rejection_message<std::invalid_argument>([&] { analyze_measurements(values); }),
               HasSubstr("unit 101 has 1 runs on 1, 100 has 2 on 0"));
   values = crossed(2, 2, {1, 2, 3, 4, 5, 6, 7, 8});
   values.erase(values.begin(), values.begin() + 2);
-  EXPECT_THAT(refusal_of<std::invalid_argument>([&] { measurement_study(values); }),
+  EXPECT_THAT(rejection_message<std::invalid_argument>([&] { analyze_measurements(values); }),
               HasSubstr("unit 100 has 0 runs on 0, 100 has 2 on 1"));
 }
 

@@ -20,7 +20,7 @@ using testing::IsEmpty;
 struct LampFaults : ExampleRig {};
 
 TEST_F(LampFaults, ReturnsNoneForCorrectMap) {
-  EXPECT_THAT(lamp_faults(frames, map, calibration), IsEmpty());
+  EXPECT_THAT(describe_lamp_faults(frames, map, calibration), IsEmpty());
 }
 
 TEST_F(LampFaults, ReportsSwappedLamps) {
@@ -28,7 +28,7 @@ TEST_F(LampFaults, ReportsSwappedLamps) {
     for (std::size_t b = a + 1; b < map.lamps.size(); ++b) {
       LampMap swapped = map;
       std::swap(swapped.lamps[a].position_m, swapped.lamps[b].position_m);
-      const auto faults = lamp_faults(frames, swapped, calibration);
+      const auto faults = describe_lamp_faults(frames, swapped, calibration);
       ASSERT_EQ(faults.size(), 1u) << a << " " << b;
       EXPECT_THAT(faults[0], HasSubstr(std::to_string(map.lamps[a].id) + " and " +
                                        std::to_string(map.lamps[b].id) + " look swapped"));
@@ -40,7 +40,7 @@ TEST_F(LampFaults, ReportsDisplacedLamp) {
   for (std::size_t i = 0; i < map.lamps.size(); ++i) {
     LampMap moved = map;
     moved.lamps[i].position_m += Eigen::Vector3d(0.02, -0.01, 0);
-    EXPECT_THAT(lamp_faults(frames, moved, calibration),
+    EXPECT_THAT(describe_lamp_faults(frames, moved, calibration),
                 ElementsAre("lamp " + std::to_string(map.lamps[i].id) +
                             " hangs 22 mm from where the map has it (x -20 mm, y +10 mm): moved, "
                             "or entered wrongly"));
@@ -52,20 +52,22 @@ TEST_F(LampFaults, ReportsUndetectedLamp) {
   for (Frame& frame : frames) {
     std::erase_if(frame.detections, [&](const Detection& lamp) { return lamp.lamp == id; });
   }
-  EXPECT_THAT(unseen_lamps(frames, map),
+  EXPECT_THAT(describe_missing_lamps(frames, map),
               ElementsAre(HasSubstr("lamp " + std::to_string(id) + " is never seen")));
-  EXPECT_THAT(lamp_faults(frames, map, calibration), IsEmpty()) << "it does not contradict the map";
-  EXPECT_THAT(unseen_lamps(std::span(frames).first(2), map), IsEmpty()) << "too few to tell";
+  EXPECT_THAT(describe_lamp_faults(frames, map, calibration), IsEmpty())
+      << "it does not contradict the map";
+  EXPECT_THAT(describe_missing_lamps(std::span(frames).first(2), map), IsEmpty())
+      << "too few to tell";
 }
 
 /// For a known camera.
 TEST_F(LampFaults, ReportsSmallDisplacementWithSmallMinOffset) {
   constexpr double fits_px = 0.25;
-  EXPECT_THAT(lamp_faults(frames, map, calibration, fits_px), IsEmpty());
+  EXPECT_THAT(describe_lamp_faults(frames, map, calibration, fits_px), IsEmpty());
   for (std::size_t i = 0; i < map.lamps.size(); ++i) {
     LampMap moved = map;
     moved.lamps[i].position_m += Eigen::Vector3d(0.004, 0, 0);
-    EXPECT_THAT(lamp_faults(frames, moved, calibration, fits_px),
+    EXPECT_THAT(describe_lamp_faults(frames, moved, calibration, fits_px),
                 ElementsAre(HasSubstr("lamp " + std::to_string(map.lamps[i].id) + " hangs ")));
   }
 }
@@ -84,7 +86,7 @@ TEST_F(LampFaults, IgnoresSingleReflection) {
   ASSERT_GT(seen.size(), 20u);
   const std::size_t tenth = seen.size() / 10;
   for (std::size_t i = 0; i < seen.size(); ++i) {
-    const auto faults = lamp_faults(frames, map, calibration, fits_px);
+    const auto faults = describe_lamp_faults(frames, map, calibration, fits_px);
     if (i > tenth) {
       EXPECT_THAT(faults, ElementsAre(HasSubstr("lamp " + std::to_string(id) + " contradicts")))
           << i;
@@ -112,11 +114,11 @@ struct PlaceFault : LampFaults {
 };
 
 TEST_F(PlaceFault, ReportsSingleWrongPosition) {
-  EXPECT_EQ(place_fault(frames, map, calibration, places), "");
+  EXPECT_EQ(describe_place_fault(frames, map, calibration, places), "");
   for (const std::size_t which : {std::size_t{0}, std::size_t{17}, frames.size() - 1}) {
     CapturesTable wrong = places;
     wrong.at(frames[which].image).y_m.value() += 0.02;
-    EXPECT_THAT(place_fault(frames, map, calibration, wrong),
+    EXPECT_THAT(describe_place_fault(frames, map, calibration, wrong),
                 testing::AllOf(testing::StartsWith(frames[which].image + " was not taken"),
                                HasSubstr("20.0 mm off, others 0.3 mm")));
   }
@@ -127,7 +129,7 @@ TEST_F(PlaceFault, ReportsSeveralWrongPositions) {
   CapturesTable wrong = places;
   for (std::size_t i = 0; i < 5; ++i) wrong.at(frames[i].image).y_m.value() += 0.052;
   wrong.at(frames[9].image).x_m.value() += 0.03;
-  EXPECT_THAT(place_fault(frames, map, calibration, wrong),
+  EXPECT_THAT(describe_place_fault(frames, map, calibration, wrong),
               testing::Eq("captures " + frames[0].image + " to " + frames[4].image + ", " +
                           frames[9].image +
                           " are off by up to 52.0 mm, the others by 0.3 mm: taken elsewhere than "
@@ -140,7 +142,7 @@ TEST_F(PlaceFault, ReturnsEmptyIfMostPositionsAreWrong) {
   for (std::size_t i = 0; i < frames.size(); ++i) {
     if (i % 4 != 0) wrong.at(frames[i].image).y_m.value() += 0.02;
   }
-  EXPECT_EQ(place_fault(frames, map, calibration, wrong), "");
+  EXPECT_EQ(describe_place_fault(frames, map, calibration, wrong), "");
 }
 
 /// The zenith of another camera displaces all fixes by one offset in the frame of the camera.
@@ -157,15 +159,15 @@ TEST_F(PlaceFault, FindCommonOffsetReturnsFrame) {
     constant.at(frames[i].image).x_m.value() += 0.03;
     scattered.at(frames[i].image).x_m.value() += i % 2 == 0 ? 0.03 : -0.03;
   }
-  const auto of_camera = find_common_offset(frames, map, calibration, rotating);
-  ASSERT_TRUE(of_camera);
-  EXPECT_TRUE(of_camera->in_camera);
-  EXPECT_THAT(describe(*of_camera),
+  const auto camera_offset = find_common_offset(frames, map, calibration, rotating);
+  ASSERT_TRUE(camera_offset);
+  EXPECT_TRUE(camera_offset->in_camera);
+  EXPECT_THAT(describe(*camera_offset),
               HasSubstr("are off by 30.0 mm in one direction of the camera (x -30.0 mm, y "));
-  const auto of_room = find_common_offset(frames, map, calibration, constant);
-  ASSERT_TRUE(of_room);
-  EXPECT_FALSE(of_room->in_camera);
-  EXPECT_THAT(describe(*of_room),
+  const auto world_offset = find_common_offset(frames, map, calibration, constant);
+  ASSERT_TRUE(world_offset);
+  EXPECT_FALSE(world_offset->in_camera);
+  EXPECT_THAT(describe(*world_offset),
               HasSubstr("in one direction of the room (x -30.3 mm, y +0.0 mm): the known points"));
   EXPECT_FALSE(find_common_offset(frames, map, calibration, scattered));
 }

@@ -22,11 +22,11 @@ using testing::StartsWith;
 struct LensFault : ExampleRig {};
 
 TEST_F(LensFault, ReturnsEmptyForCorrectLens) {
-  EXPECT_EQ(lens_fault(frames, map, calibration), "");
+  EXPECT_EQ(describe_lens_fault(frames, map, calibration), "");
   // A slightly different lens is not another lens.
   calibration.camera.intrinsics[0] *= 1.0005;
   calibration.camera.intrinsics[2] += 0.3;
-  EXPECT_EQ(lens_fault(frames, map, calibration), "");
+  EXPECT_EQ(describe_lens_fault(frames, map, calibration), "");
 }
 
 /// As if the boards were of another unit.
@@ -40,7 +40,7 @@ TEST_F(LensFault, ReportsLensEstimatedFromLamps) {
       lens[1] *= focal;
       lens[2] += off_px;
       lens[3] -= off_px;
-      const std::string fault = lens_fault(frames, map, calibration);
+      const std::string fault = describe_lens_fault(frames, map, calibration);
       EXPECT_THAT(fault,
                   AllOf(StartsWith("the lamps are seen through another lens than the boards"),
                         HasSubstr(fmt::format("the boards a focal length of {:.1f} px",
@@ -60,15 +60,15 @@ TEST_F(LensFault, ReturnsEmptyForDisplacedLamp) {
   for (Lamp& lamp : map.lamps) {
     const Eigen::Vector3d kept_m = lamp.position_m;
     lamp.position_m += Eigen::Vector3d(0.02, -0.01, 0);
-    EXPECT_EQ(lens_fault(frames, map, calibration), "") << lamp.id;
+    EXPECT_EQ(describe_lens_fault(frames, map, calibration), "") << lamp.id;
     lamp.position_m = kept_m;
   }
 }
 
 TEST_F(LensFault, ReturnsEmptyForTooFewCaptures) {
   calibration.camera.intrinsics[0] *= 1.02;
-  EXPECT_EQ(lens_fault({}, map, calibration), "");
-  EXPECT_EQ(lens_fault(std::span(frames).first(1), map, calibration), "");
+  EXPECT_EQ(describe_lens_fault({}, map, calibration), "");
+  EXPECT_EQ(describe_lens_fault(std::span(frames).first(1), map, calibration), "");
 }
 
 /// Captures at known heights, equal to the fixes of the true camera.
@@ -78,13 +78,13 @@ struct OtherCamera : LensFault {
     for (std::size_t i = 0; i < frames.size(); ++i) {
       const Fix fix = positioner.locate(frames[i].detections);
       if (!fix.ok()) continue;
-      PlacedCaptures& captures = i % 2 == 0 ? own : check;
+      PlacedCaptures& captures = i % 2 == 0 ? reference : check;
       captures.places[frames[i].image].z_m = fix.estimate.pose.position_m.z();
       captures.frames.push_back(frames[i]);
     }
   }
   /// Replaces the detections of the check by those of a camera with another lens or tilt.
-  void look_through(const Lens& other, const Eigen::Matrix3d& other_from_camera) {
+  void set_camera(const Lens& other, const Eigen::Matrix3d& other_from_camera) {
     const Lens lens(calibration.camera.lens_model, calibration.camera.intrinsics);
     for (Frame& frame : check.frames) {
       for (Detection& lamp : frame.detections) {
@@ -96,34 +96,35 @@ struct OtherCamera : LensFault {
       }
     }
   }
-  PlacedCaptures own, check;
+  PlacedCaptures reference, check;
 };
 
 TEST_F(OtherCamera, IsNotReportedForTiltedUnit) {
   ASSERT_GT(check.frames.size(), 10U);
-  look_through(Lens(calibration.camera.lens_model, calibration.camera.intrinsics),
-               Eigen::AngleAxisd(0.005, Eigen::Vector3d(1, 2, 0).normalized()).toRotationMatrix());
-  EXPECT_EQ(find_other_focal_length(check, own, map, calibration), "");
-  EXPECT_EQ(find_other_lens(check.frames, own.frames, map, calibration), "");
+  set_camera(Lens(calibration.camera.lens_model, calibration.camera.intrinsics),
+             Eigen::AngleAxisd(0.005, Eigen::Vector3d(1, 2, 0).normalized()).toRotationMatrix());
+  EXPECT_EQ(find_other_focal_length(check, reference, map, calibration), "");
+  EXPECT_EQ(find_other_lens(check.frames, reference.frames, map, calibration), "");
 }
 
 TEST_F(OtherCamera, IsReportedForDifferentFocalLength) {
   auto intrinsics = calibration.camera.intrinsics;
   intrinsics[0] *= 0.99;
   intrinsics[1] *= 0.99;
-  look_through(Lens(calibration.camera.lens_model, intrinsics), Eigen::Matrix3d::Identity());
-  EXPECT_THAT(find_other_focal_length(check, own, map, calibration),
+  set_camera(Lens(calibration.camera.lens_model, intrinsics), Eigen::Matrix3d::Identity());
+  EXPECT_THAT(find_other_focal_length(check, reference, map, calibration),
               HasSubstr("its focal length differs, by heights that are off by "));
-  own.places.clear();
-  EXPECT_EQ(find_other_focal_length(check, own, map, calibration), "") << "no heights to compare";
+  reference.places.clear();
+  EXPECT_EQ(find_other_focal_length(check, reference, map, calibration), "")
+      << "no heights to compare";
 }
 
 TEST_F(OtherCamera, IsReportedForDifferentCenter) {
   auto intrinsics = calibration.camera.intrinsics;
   intrinsics[2] += 12;
   intrinsics[3] -= 8;
-  look_through(Lens(calibration.camera.lens_model, intrinsics), Eigen::Matrix3d::Identity());
-  EXPECT_THAT(find_other_lens(check.frames, own.frames, map, calibration),
+  set_camera(Lens(calibration.camera.lens_model, intrinsics), Eigen::Matrix3d::Identity());
+  EXPECT_THAT(find_other_lens(check.frames, reference.frames, map, calibration),
               HasSubstr("its lens differs, by residuals of the lamps of "));
   EXPECT_EQ(find_other_lens(check.frames, {}, map, calibration), "") << "nothing to compare";
 }

@@ -14,8 +14,8 @@ using testing::HasSubstr;
 struct StationSteps : testing::Test {
   StationSteps() {
     config.lamps = read_lamp_map(kExample + "lamps.yaml");
-    config.enough.check_captures = 36;
-    config.enough.dispersion_captures = 36;
+    config.sufficient.check_captures = 36;
+    config.sufficient.dispersion_captures = 36;
   }
   StationConfig config{};
   Calibration calibration = read_calibration(kExample + "calibration.yaml");
@@ -36,7 +36,7 @@ TEST_F(StationSteps, FailForTooFewKnownPositions) {
               HasSubstr("1 of the 36 captures"));
   EXPECT_THAT(solve_dispersion(config, calibration, frames, places).why,
               HasSubstr("1 of the 36 captures"));
-  config.enough.check_captures = 35;
+  config.sufficient.check_captures = 35;
   EXPECT_TRUE(check_fixes(config, calibration, frames, places).ok());
   EXPECT_THAT(check_fixes(config, calibration, {}, places).why, HasSubstr("nothing tells"));
 }

@@ -19,8 +19,8 @@ using testing::SizeIs;
 struct TurnMapTest : testing::Test {
   TurnMapTest() {
     config.lamps = read_lamp_map(kExample + "lamps.yaml");
-    config.enough.turn_captures = 12;
-    config.enough.turn_heights = 2;
+    config.sufficient.turn_captures = 12;
+    config.sufficient.turn_heights = 2;
   }
   StationConfig config{};
   Calibration calibration = read_calibration(kExample + "calibration.yaml");
@@ -28,31 +28,31 @@ struct TurnMapTest : testing::Test {
 };
 
 TEST_F(TurnMapTest, IsCompleteForAllCaptures) {
-  const TurnMap map = turn_map(frames, config, calibration);
+  const TurnMap map = compute_turn_map(frames, config, calibration);
   ASSERT_THAT(map.heights, SizeIs(2));
   for (const auto& height : map.heights) {
     EXPECT_EQ(height.captures, 12);
     EXPECT_THAT(height.parts, Each(true));
     EXPECT_GT(height.arc_rad, 1.6 * std::numbers::pi);
   }
-  EXPECT_TRUE(map.enough);
+  EXPECT_TRUE(map.sufficient);
 }
 
 TEST_F(TurnMapTest, ReportsMissingAngles) {
   frames.erase(frames.begin() + 4, frames.begin() + 7);
-  const TurnMap map = turn_map(frames, config, calibration);
+  const TurnMap map = compute_turn_map(frames, config, calibration);
   ASSERT_THAT(map.heights, SizeIs(2));
   const auto& parts = map.heights[0].captures == 9 ? map.heights[0].parts : map.heights[1].parts;
   EXPECT_EQ(std::count(parts.begin(), parts.end(), false), 3);
-  EXPECT_FALSE(map.enough);
+  EXPECT_FALSE(map.sufficient);
 }
 
 // Not from the lowest capture, which depends on the last micrometers of the fixes.
 TEST_F(TurnMapTest, StartsAtYawOfFirstCapture) {
   frames.resize(3);
-  const auto forwards = turn_map(frames, config, calibration).heights.at(0).parts;
+  const auto forwards = compute_turn_map(frames, config, calibration).heights.at(0).parts;
   std::reverse(frames.begin(), frames.end());
-  const auto backwards = turn_map(frames, config, calibration).heights.at(0).parts;
+  const auto backwards = compute_turn_map(frames, config, calibration).heights.at(0).parts;
   EXPECT_EQ(std::count(forwards.begin(), forwards.end(), true), 3);
   EXPECT_TRUE(forwards[0] && backwards[0]);
   EXPECT_NE(forwards[1], backwards[1]);
@@ -61,11 +61,11 @@ TEST_F(TurnMapTest, StartsAtYawOfFirstCapture) {
 
 TEST_F(TurnMapTest, ReturnsAllHeights) {
   frames.erase(frames.begin() + 12, frames.end());
-  EXPECT_THAT(turn_map(frames, config, calibration).heights, SizeIs(1));
-  EXPECT_FALSE(turn_map(frames, config, calibration).enough);
-  config.enough.turn_heights = 1;
-  EXPECT_TRUE(turn_map(frames, config, calibration).enough);
-  EXPECT_THAT(turn_map({}, config, calibration).heights, SizeIs(0));
+  EXPECT_THAT(compute_turn_map(frames, config, calibration).heights, SizeIs(1));
+  EXPECT_FALSE(compute_turn_map(frames, config, calibration).sufficient);
+  config.sufficient.turn_heights = 1;
+  EXPECT_TRUE(compute_turn_map(frames, config, calibration).sufficient);
+  EXPECT_THAT(compute_turn_map({}, config, calibration).heights, SizeIs(0));
 }
 
 }  // namespace

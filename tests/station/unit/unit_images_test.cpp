@@ -18,13 +18,13 @@ using testing::HasSubstr;
 /// One view completes the boards but does not determine a lens.
 struct UnitImages : testing::Test {
   UnitImages() {
-    config.enough.board_views = 1;
-    config.enough.board_coverage = 0;
+    config.sufficient.board_views = 1;
+    config.sufficient.board_coverage = 0;
   }
   /// Adds the only view, or an invalid file, under this name.
-  void come(const std::string& name, bool good) {
+  void add_image(const std::string& name, bool is_valid) {
     const auto file = folder / name;
-    if (good) {
+    if (is_valid) {
       fs::copy_file(VLP_SOURCE_DIR "/datasets/paper-rig/rendered/sample-boards/0000.png", file,
                     fs::copy_options::overwrite_existing);
     } else {
@@ -41,37 +41,37 @@ struct UnitImages : testing::Test {
 };
 
 TEST_F(UnitImages, DuplicateIsUsedWhenFirstIsRemoved) {
-  come("a.png", true);
-  come("b.png", true);
+  add_image("a.png", true);
+  add_image("b.png", true);
   EXPECT_EQ(refusal("a.png"), "");
   EXPECT_EQ(refusal("b.png"), "is the same image as a.png");
   unit.remove(StationStep::boards, "a.png");
   EXPECT_EQ(refusal("b.png"), "");
-  come("a.png", true);
+  add_image("a.png", true);
   EXPECT_EQ(refusal("a.png"), "is the same image as b.png");
 }
 
 TEST_F(UnitImages, OverwrittenImageIsReplaced) {
-  come("a.png", true);
+  add_image("a.png", true);
   unit.advance(false);
   ASSERT_TRUE(boards().result);  // a problem: one view makes no lens
-  come("b.png", true);
+  add_image("b.png", true);
   EXPECT_TRUE(boards().result) << "an image that is not used changes nothing";
-  come("a.png", false);
+  add_image("a.png", false);
   EXPECT_FALSE(boards().result);
   EXPECT_THAT(refusal("a.png"), HasSubstr("cannot be read"));
   EXPECT_EQ(refusal("b.png"), "");
 }
 
 TEST_F(UnitImages, DiscardedImageStaysRejected) {
-  come("a.png", true);
+  add_image("a.png", true);
   for (const char* name : {"b.png", "c.png"}) {
-    come(name, false);
+    add_image(name, false);
     fs::remove(folder / name);
     unit.discard(StationStep::boards, name);
   }
-  EXPECT_EQ(boards().refused_in_a_row, 0);
-  come("d.png", true);
+  EXPECT_EQ(boards().num_consecutive_rejections, 0);
+  add_image("d.png", true);
   unit.discard(StationStep::boards, "d.png");  // same pose: no fault
   EXPECT_FALSE(boards().images.contains("d.png"));
   unit.remove(StationStep::boards, "a.png");

@@ -39,52 +39,52 @@ TEST_F(UnitTest, StartsWithBoards) {
   EXPECT_FALSE(unit.calibration());
   EXPECT_THAT(find_causes(unit),
               ElementsAre(Field(&Cause::text, HasSubstr("boards: not enough images"))));
-  EXPECT_EQ(verdict_of(find_causes(unit)), Verdict::invalid);
+  EXPECT_EQ(decide_verdict(find_causes(unit)), Verdict::invalid);
 }
 
 TEST_F(UnitTest, IsHopelessAfterMaxConsecutiveRejections) {
-  for (int i = 0; i < config.max_rejected_in_a_row; ++i) {
-    EXPECT_FALSE(unit.hopeless()) << i;
+  for (int i = 0; i < config.max_consecutive_rejections; ++i) {
+    EXPECT_FALSE(unit.is_hopeless()) << i;
     add_bad(i);
   }
-  EXPECT_TRUE(unit.hopeless());
+  EXPECT_TRUE(unit.is_hopeless());
   EXPECT_EQ(unit.step(StationStep::boards).used(), 0);
   unit.advance(true);
   EXPECT_THAT(
       find_causes(unit),
       ElementsAre(Field(&Cause::text, HasSubstr("12 of 12 images refused: 12 cannot be read"))));
-  EXPECT_EQ(verdict_of(find_causes(unit)), Verdict::invalid)
+  EXPECT_EQ(decide_verdict(find_causes(unit)), Verdict::invalid)
       << "images that cannot be read are no fault";
   unit.remove(StationStep::boards, "100.png");
-  EXPECT_FALSE(unit.hopeless());
+  EXPECT_FALSE(unit.is_hopeless());
 }
 
 /// As after a restart of a killed program: all images arrive at once, by name.
 TEST_F(UnitTest, IsNotHopelessIfOneImageOfBatchIsUsed) {
-  const auto good = folder / "000.png";
-  fs::copy_file(kView, good);
-  std::vector<fs::path> together{good};
-  for (int i = 0; i < config.max_rejected_in_a_row + 1; ++i) {
+  const auto valid_view = folder / "000.png";
+  fs::copy_file(kView, valid_view);
+  std::vector<fs::path> together{valid_view};
+  for (int i = 0; i < config.max_consecutive_rejections + 1; ++i) {
     together.push_back(folder.file(std::to_string(100 + i) + ".png", "no image"));
   }
   // In two batches, as at the station.
   unit.add(StationStep::boards, std::vector<fs::path>(together.begin(), together.end() - 1), true);
-  EXPECT_FALSE(unit.hopeless());
+  EXPECT_FALSE(unit.is_hopeless());
   unit.add(StationStep::boards, {together.back()});
-  EXPECT_FALSE(unit.hopeless());
-  EXPECT_EQ(unit.step(StationStep::boards).refused_in_a_row, 0);
+  EXPECT_FALSE(unit.is_hopeless());
+  EXPECT_EQ(unit.step(StationStep::boards).num_consecutive_rejections, 0);
   // Added one by one, their order is known.
-  for (int i = 0; i < config.max_rejected_in_a_row; ++i) add_bad(100 + i);
-  EXPECT_TRUE(unit.hopeless());
+  for (int i = 0; i < config.max_consecutive_rejections; ++i) add_bad(100 + i);
+  EXPECT_TRUE(unit.is_hopeless());
 }
 
 TEST_F(UnitTest, IsHopelessIfAllImagesOfBatchAreRejected) {
   std::vector<fs::path> together;
-  for (int i = 0; i < config.max_rejected_in_a_row; ++i) {
+  for (int i = 0; i < config.max_consecutive_rejections; ++i) {
     together.push_back(folder.file(std::to_string(100 + i) + ".png", "no image"));
   }
   unit.add(StationStep::boards, together);
-  EXPECT_TRUE(unit.hopeless());
+  EXPECT_TRUE(unit.is_hopeless());
 }
 
 TEST_F(UnitTest, IsInvalidIfEndedEarly) {
@@ -93,11 +93,11 @@ TEST_F(UnitTest, IsInvalidIfEndedEarly) {
       find_causes(unit),
       ElementsAre(Field(&Cause::text,
                         "boards: the operator ended the run before there was enough (0/36)")));
-  const RunRecord record = make_unit_record(unit, new_run(), {"test", "0"});
+  const RunRecord record = make_unit_record(unit, make_run_id(), {"test", "0"});
   EXPECT_EQ(record.verdict, "INVALID");
   EXPECT_TRUE(record.invalid());
   std::string screen;
-  for (const ScreenLine& line : verdict_screen(record)) screen += line.text + "\n";
+  for (const ScreenLine& line : make_verdict_screen(record)) screen += line.text + "\n";
   EXPECT_THAT(screen,
               AllOf(HasSubstr("INVALID   camera"),
                     HasSubstr("Gates    not measured: 27 gates, because boards did not finish\n"),
@@ -107,7 +107,7 @@ TEST_F(UnitTest, IsInvalidIfEndedEarly) {
 /// Missing gates are described by the unfinished step, or by their names.
 TEST(VerdictScreen, ReturnsReasonForUnmeasuredGates) {
   const auto gates_line = [](const RunRecord& record) {
-    for (const ScreenLine& line : verdict_screen(record)) {
+    for (const ScreenLine& line : make_verdict_screen(record)) {
       if (line.text.starts_with("Gates")) return line.text;
     }
     return std::string();
@@ -120,21 +120,21 @@ TEST(VerdictScreen, ReturnsReasonForUnmeasuredGates) {
                                 {"dispersion_mm", 1},
                                 {"check_mean_mm", 1}};
   const auto measure = [&](const std::vector<Metric>& metrics) {
-    record.figures = check_gates(gates, metrics);
+    record.metrics = check_gates(gates, metrics);
   };
-  record.judge({{"boards: no image can be used"}});
+  record.set_verdict({{"boards: no image can be used"}});
   measure({{"blur_px", 0.5}});
   EXPECT_EQ(gates_line(record), "Gates    not measured: 4 gates, because boards did not finish");
   // A metric of a failed step, and one available before a step is solved.
-  record.judge({{"boards (36/36): two halves"}});
+  record.set_verdict({{"boards (36/36): two halves"}});
   measure({{"blur_px", 0.5}, {"rms_px", 0.1}});
   EXPECT_EQ(gates_line(record), "Gates    not measured: 3 gates, because boards did not finish");
-  record.judge({{"the golden unit failed"}, {"rotation: no image can be used"}});
+  record.set_verdict({{"the golden unit failed"}, {"rotation: no image can be used"}});
   EXPECT_EQ(gates_line(record), "Gates    not measured: 3 gates, because rotation did not finish");
-  record.judge({{"check: no image can be used"}});
+  record.set_verdict({{"check: no image can be used"}});
   measure({{"blur_px", 0.5}, {"rms_px", 0.1}, {"rotation_px", 0.1}, {"dispersion_mm", 0.1}});
   EXPECT_EQ(gates_line(record), "Gates    not measured: 1 gate, because check did not finish");
-  record.judge({{"the station has moved"}});
+  record.set_verdict({{"the station has moved"}});
   measure({{"rms_px", 0.1}, {"rotation_px", 0.1}, {"dispersion_mm", 0.1}, {"check_mean_mm", 1}});
   EXPECT_EQ(gates_line(record), "Gates    not measured: blur_px");
   measure({{"blur_px", 0.5},
@@ -151,7 +151,7 @@ TEST(VerdictScreen, ReturnsReasonForUnmeasuredGates) {
 }
 
 TEST_F(UnitTest, RejectsImageOfAnotherUnit) {
-  unit.refuse_images_of_others([](const std::string&) { return ImageOwner{"0001", "R"}; });
+  unit.reject_images_of_others([](const std::string&) { return ImageOwner{"0001", "R"}; });
   fs::copy_file(kView, folder / "0.png");
   unit.add(StationStep::boards, {folder / "0.png"});
   EXPECT_EQ(
@@ -163,12 +163,12 @@ TEST_F(UnitTest, RejectsImageOfAnotherUnit) {
               ElementsAre(Field(&Cause::text,
                                 HasSubstr("1 already of camera 0001, run R: if its serial was "
                                           "wrong, 'vlp-station void R --station "))));
-  EXPECT_EQ(verdict_of(find_causes(unit)), Verdict::invalid);
+  EXPECT_EQ(decide_verdict(find_causes(unit)), Verdict::invalid);
 }
 
 TEST(RejectRepetition, ReportsEarlierRun) {
   RunRecord record;
-  record.judge({});
+  record.set_verdict({});
   ASSERT_TRUE(record.passed());
   reject_repetition(record, "R1", "station.yaml");
   EXPECT_TRUE(record.invalid());
@@ -179,9 +179,9 @@ TEST(RejectRepetition, ReportsEarlierRun) {
 }
 
 TEST(DecideVerdict, ReturnsVerdictOfFirstCause) {
-  EXPECT_EQ(verdict_of({}), Verdict::pass);
-  EXPECT_EQ(verdict_of({{"decentred", true}, {"the operator left"}}), Verdict::fail);
-  EXPECT_EQ(verdict_of({{"lamp 5 is loose"}, {"the fixes are off", true}}), Verdict::invalid);
+  EXPECT_EQ(decide_verdict({}), Verdict::pass);
+  EXPECT_EQ(decide_verdict({{"decentred", true}, {"the operator left"}}), Verdict::fail);
+  EXPECT_EQ(decide_verdict({{"lamp 5 is loose"}, {"the fixes are off", true}}), Verdict::invalid);
 }
 
 TEST_F(UnitTest, QueuesImagesUntilPreviousStepIsComplete) {
@@ -196,38 +196,41 @@ TEST_F(UnitTest, QueuesImagesUntilPreviousStepIsComplete) {
 TEST_F(UnitTest, ScreenFits80Columns) {
   add_bad(1);
   add_bad(2);
-  for (const ScreenLine& line : station_screen(unit)) EXPECT_LE(line.text.size(), 80u) << line.text;
-  const RunRecord record = make_unit_record(unit, new_run(), {"test", "0"});
+  for (const ScreenLine& line : make_station_screen(unit))
+    EXPECT_LE(line.text.size(), 80u) << line.text;
+  const RunRecord record = make_unit_record(unit, make_run_id(), {"test", "0"});
   EXPECT_FALSE(record.passed());
-  for (const ScreenLine& line : verdict_screen(record)) {
+  for (const ScreenLine& line : make_verdict_screen(record)) {
     EXPECT_LE(line.text.size(), 80u) << line.text;
   }
 }
 
 TEST_F(UnitTest, ReportContainsVerdict) {
-  RunRecord record = make_unit_record(unit, new_run(), {"test", "0"});
-  EXPECT_THAT(unit_report(record, "", {}),
+  RunRecord record = make_unit_record(unit, make_run_id(), {"test", "0"});
+  EXPECT_THAT(make_unit_report(record, "", {}),
               AllOf(HasSubstr("<strong>INVALID</strong><p>boards: not enough"),
                     HasSubstr("not\u00a0reached"), Not(HasSubstr("NOT\u00a0MET"))));
   record.images = {{"boards", "7.png", "", "too dark"}};
-  EXPECT_THAT(unit_report(record, "", {}), AllOf(HasSubstr("boards/7.png"), HasSubstr("too dark")));
-  record.figures =
+  EXPECT_THAT(make_unit_report(record, "", {}),
+              AllOf(HasSubstr("boards/7.png"), HasSubstr("too dark")));
+  record.metrics =
       check_gates({{"coverage", 0.7}, {"rms_px", 0.3}}, {{"coverage", 0.75}, {"rms_px", 0.1}});
   record.causes.clear();
   record.verdict = "PASS";
-  EXPECT_THAT(unit_report(record, "", {}),
+  EXPECT_THAT(make_unit_report(record, "", {}),
               AllOf(HasSubstr("<strong>PASS"), HasSubstr("at least\u00a00.7"), HasSubstr("0.75"),
                     Not(HasSubstr("is not met")), Not(HasSubstr("confidence interval"))));
   // Once, with its meaning, among the gates.
-  const std::string page = unit_report(record, "", {});
+  const std::string page = make_unit_report(record, "", {});
   EXPECT_EQ(page.find("coverage: share"), page.rfind("coverage: share"));
   // Edited in the database.
-  record.figures[1].value = 0.5;
-  EXPECT_THAT(why_no_verdict(record), HasSubstr("rms_px is 0.5 px, at most 0.3 px is asked for"));
-  EXPECT_THAT(unit_report(record, "", {}),
+  record.metrics[1].value = 0.5;
+  EXPECT_THAT(find_verdict_problem(record),
+              HasSubstr("rms_px is 0.5 px, at most 0.3 px is asked for"));
+  EXPECT_THAT(make_unit_report(record, "", {}),
               AllOf(HasSubstr("NO VERDICT</strong><p>the record says PASS, but rms_px"),
                     Not(HasSubstr("<strong>PASS"))));
-  for (const ScreenLine& line : verdict_screen(record)) {
+  for (const ScreenLine& line : make_verdict_screen(record)) {
     EXPECT_THAT(line.text, Not(testing::StartsWith("PASS")));
   }
 }

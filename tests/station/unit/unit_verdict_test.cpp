@@ -20,7 +20,7 @@ TEST(FindCauses, OrdersStationBeforeImagesBeforeMissingImages) {
   Unit unit(config, "camera", {"test", "0"}, 1);
   unit.add(StationStep::boards, {folder.file("0.png", "no image")});
   unit.end_early("the operator ended the run");
-  unit.distrust("the golden unit failed");
+  unit.invalidate("the golden unit failed");
   EXPECT_THAT(find_causes(unit),
               ElementsAre(Field(&Cause::text, "the golden unit failed"),
                           Field(&Cause::text, HasSubstr("1 of 1 images refused")),

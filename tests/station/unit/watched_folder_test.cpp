@@ -21,13 +21,13 @@ std::vector<std::string> names(const std::vector<std::filesystem::path>& files) 
 TEST(WatchedFolder, ReportsImageAfterWritingEnds) {
   const TemporaryFolder folder;
   WatchedFolder watched(folder / "");
-  EXPECT_THAT(watched.look().came, IsEmpty());
+  EXPECT_THAT(watched.poll_changes().added, IsEmpty());
   folder.file("a.png", "half");
-  EXPECT_THAT(watched.look().came, IsEmpty());
+  EXPECT_THAT(watched.poll_changes().added, IsEmpty());
   folder.file("a.png", "the whole");
-  EXPECT_THAT(watched.look().came, IsEmpty());
-  EXPECT_THAT(names(watched.look().came), ElementsAre("a.png"));
-  EXPECT_THAT(watched.look().came, IsEmpty());
+  EXPECT_THAT(watched.poll_changes().added, IsEmpty());
+  EXPECT_THAT(names(watched.poll_changes().added), ElementsAre("a.png"));
+  EXPECT_THAT(watched.poll_changes().added, IsEmpty());
 }
 
 TEST(WatchedFolder, ReportsOverwrittenAndRemovedImages) {
@@ -35,12 +35,12 @@ TEST(WatchedFolder, ReportsOverwrittenAndRemovedImages) {
   WatchedFolder watched(folder / "");
   folder.file("a.png", "one");
   folder.file("b.png", "two");
-  watched.look();
-  EXPECT_THAT(names(watched.look().came), ElementsAre("a.png", "b.png"));
+  watched.poll_changes();
+  EXPECT_THAT(names(watched.poll_changes().added), ElementsAre("a.png", "b.png"));
   folder.file("a.png", "another");
   std::filesystem::remove(folder / "b.png");
-  EXPECT_THAT(watched.look().gone, ElementsAre("b.png"));
-  EXPECT_THAT(names(watched.look().came), ElementsAre("a.png"));
+  EXPECT_THAT(watched.poll_changes().gone, ElementsAre("b.png"));
+  EXPECT_THAT(names(watched.poll_changes().added), ElementsAre("a.png"));
 }
 
 TEST(WatchedFolder, IgnoresOtherFiles) {
@@ -50,18 +50,18 @@ TEST(WatchedFolder, IgnoresOtherFiles) {
   folder.file("empty.png", "");
   std::filesystem::create_directory(folder / "folder.png");
   WatchedFolder watched(folder / "");
-  watched.look();
-  EXPECT_THAT(watched.look().came, IsEmpty());
+  watched.poll_changes();
+  EXPECT_THAT(watched.poll_changes().added, IsEmpty());
 }
 
 TEST(WatchedFolder, AcceptsMissingFolder) {
   const TemporaryFolder folder;
   WatchedFolder watched(folder / "later");
-  EXPECT_THAT(watched.look().came, IsEmpty());
+  EXPECT_THAT(watched.poll_changes().added, IsEmpty());
   std::filesystem::create_directory(folder / "later");
   folder.file("later/a.png", "image");
-  watched.look();
-  EXPECT_THAT(names(watched.look().came), ElementsAre("a.png"));
+  watched.poll_changes();
+  EXPECT_THAT(names(watched.poll_changes().added), ElementsAre("a.png"));
 }
 
 }  // namespace

@@ -47,7 +47,7 @@ TEST_F(WatchedRunTest, WritesNoFrameThroughALinkThatCameLater) {
   sources.feed(unit, run);
   ASSERT_TRUE(fs::exists(run.folder() / "boards/frame-000000.png"));
   replace_by_link("captures/0001/boards");
-  EXPECT_THAT(refusal_of([&] { sources.feed(unit, run); }),
+  EXPECT_THAT(rejection_message([&] { sources.feed(unit, run); }),
               HasSubstr("boards: was moved or replaced while it was in use"));
   EXPECT_TRUE(fs::is_empty(folder / "elsewhere"));
 }
@@ -65,7 +65,7 @@ TEST_F(WatchedRunTest, PutsAwayItsOwnFolderOnly) {
   {
     const WatchedRun run(unit, spool);
     replace_by_link("captures/0001");
-    EXPECT_THAT(refusal_of([&] { run.put_away(); }),
+    EXPECT_THAT(rejection_message([&] { run.put_away(); }),
                 HasSubstr("0001: was moved or replaced while it was in use"));
     EXPECT_TRUE(fs::is_symlink(run.folder()));
   }
