@@ -59,7 +59,7 @@ struct IntrinsicsReport {
 };
 
 /// Model that applies the rotation center (Chen and Guan, section 3.1; lib/THEORY.md, "Rotation
-/// centre"). `shift` subtracts it in the undistorted plane (eq. 9). `tilt` rotates every ray so
+/// center"). `shift` subtracts it in the undistorted plane (eq. 9). `tilt` rotates every ray so
 /// that the zenith becomes +Z, which is valid at other positions and heights, too.
 enum class RotationModel { shift, tilt };
 

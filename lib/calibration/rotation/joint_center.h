@@ -8,7 +8,7 @@
 namespace vlp {
 
 /// Fits one rotation center for all lamps in the undistorted image (lib/THEORY.md, "Rotation
-/// centre", method `joint`). The model is that of eq. 9 with one angle per capture that all lamps
+/// center", method `joint`). The model is that of eq. 9 with one angle per capture that all lamps
 /// share.
 ///
 /// Minimizes the squared distances of the lamps, in the image, from

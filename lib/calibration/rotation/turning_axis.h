@@ -12,7 +12,7 @@ namespace vlp {
 inline constexpr double kMaxLeverArmSdFraction = 0.005;
 
 /// Fits the direction in the camera about which all lamp rays rotate (lib/THEORY.md, "Rotation
-/// centre", method `axis`). The model is exact in lens and tilt.
+/// center", method `axis`). The model is exact in lens and tilt.
 ///
 /// @return  the rotation center with model RotationModel::tilt; `center_px` is the zenith in the
 ///     undistorted image. Not converged if the RMS residual exceeds 0.007 focal lengths and four
