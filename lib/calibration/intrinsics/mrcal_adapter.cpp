@@ -22,7 +22,7 @@ extern "C" {
 #include <system_error>
 #include <thread>
 
-#include "calibration/intrinsics/board_problem.h"
+#include "calibration/intrinsics/mrcal_library.h"
 
 namespace vlp {
 namespace {
@@ -121,9 +121,7 @@ void with_suppressed_output(const Work& work) {
   }
 }
 
-}  // namespace
-
-bool solve_by_mrcal(BoardProblem& problem, const SolveOptions& what) {
+bool solve_with_mrcal(BoardProblem& problem, const SolveOptions& what) {
   Arguments args(problem, what, problem.fixed_rays);
   if (args.measurements < args.states) return false;
   Eigen::VectorXd state(args.states), residuals(args.measurements);
@@ -146,7 +144,7 @@ bool solve_by_mrcal(BoardProblem& problem, const SolveOptions& what) {
   return stats.rms_reproj_error__pixels >= 0 && residuals.allFinite();
 }
 
-Linearization linearize_by_mrcal(const BoardProblem& problem, const SolveOptions& what) {
+Linearization linearize_with_mrcal(const BoardProblem& problem, const SolveOptions& what) {
   const Arguments args(problem, what);
   const int entries =
       _mrcal_num_j_nonzero(args.frames, 0, problem.cols, problem.rows, 1, 0, args.frames, 0, 0,
@@ -201,4 +199,12 @@ Linearization linearize_by_mrcal(const BoardProblem& problem, const SolveOptions
   return result;
 }
 
+}  // namespace
 }  // namespace vlp
+
+/// The function that mrcal_library.cpp calls.
+extern "C" __attribute__((visibility("default"))) const vlp::MrcalFunctions* vlp_mrcal_functions() {
+  static constexpr vlp::MrcalFunctions functions{&vlp::solve_with_mrcal,
+                                                 &vlp::linearize_with_mrcal};
+  return &functions;
+}

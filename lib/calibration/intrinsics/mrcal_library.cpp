@@ -1,0 +1,28 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/intrinsics/mrcal_library.h"
+
+#include "codecs/load_function.h"
+
+namespace vlp {
+namespace {
+
+const MrcalFunctions& mrcal_functions() {
+  using Get = const MrcalFunctions* (*)();
+  // POSIX allows the conversion of a symbol's address to a function pointer.
+  static const auto get = reinterpret_cast<Get>(  // NOLINT
+      load_function(VLP_MRCAL_LIBRARY, "vlp_mrcal_functions", "lenses cannot be solved"));
+  return *get();
+}
+
+}  // namespace
+
+bool solve_by_mrcal(BoardProblem& problem, const SolveOptions& what) {
+  return mrcal_functions().solve(problem, what);
+}
+
+Linearization linearize_by_mrcal(const BoardProblem& problem, const SolveOptions& what) {
+  return mrcal_functions().linearize(problem, what);
+}
+
+}  // namespace vlp
