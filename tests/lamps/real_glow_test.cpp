@@ -123,6 +123,7 @@ TEST(PositionerOnRealGlows, MatchesOpenCvPoseOfFiveLamps) {
   sensors.inclination_sigma_rad = 1.6;
   const Fix fix = Positioner(result.map, result.calibration).locate(detections, sensors);
   ASSERT_TRUE(fix.ok()) << describe(fix.status);
+  ASSERT_TRUE(fix.body);
   const auto places_m = opencv_places(result, detections, cv::SOLVEPNP_SQPNP);
   ASSERT_EQ(places_m.size(), 1U);
   const double off_m = (fix.estimate.pose.position_m - places_m[0]).norm();
@@ -148,6 +149,7 @@ TEST(PositionerOnRealGlows, MatchesOneOpenCvSolutionOfThreeLamps) {
   const Fix free = positioner.locate(detections, sensors);
   std::printf("%zu of OpenCV's, free: %s\n", places_m.size(), to_string(free.status).data());
   EXPECT_EQ(free.status == FixStatus::ambiguous, places_m.size() > 1);
+  int matched = 0;
   for (const Eigen::Vector3d& place_m : places_m) {
     sensors.height = KnownHeight{place_m.z(), 1e-3};
     const Fix fix = positioner.locate(detections, sensors);
@@ -155,7 +157,9 @@ TEST(PositionerOnRealGlows, MatchesOneOpenCvSolutionOfThreeLamps) {
                 to_string(fix.status).data());
     if (!fix.ok()) continue;
     EXPECT_LT((fix.estimate.pose.position_m - place_m).norm(), 0.01 * 2.35);
+    ++matched;
   }
+  EXPECT_GT(matched, 0);
 }
 
 TEST(LightDetectorOnRealGlows, IdentifiesLampsWithColumnReadout) {

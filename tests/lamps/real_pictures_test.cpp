@@ -47,6 +47,7 @@ TEST(LightDetectorOnRealImages, ReportsNoLampsOnBoardsForAnyRowTime) {
   if (folder.empty()) GTEST_SKIP() << "no real captures here";
   for (const char* camera : {"cam0", "cam1"}) {
     const auto images = list_images(folder / camera);
+    ASSERT_GT(images.size(), 1U) << camera;
     // Uses one image of four, to save time. One of the others has an object that matches a lamp
     // with column readout, at 8 and at 12 us: squares and gaps between tags, 2.54 periods in phase
     // along the scanlines.

@@ -94,6 +94,9 @@ TEST(GroupPixelRuns, OrdersBlobsAndRunsByRowAndColumn) {
                             rows(13, 20, 61, 130), rows(11, 12, 120, 125)});
   const auto blobs = group_pixel_runs(runs, 2);
   ASSERT_EQ(blobs.size(), 3U);
+  ASSERT_EQ(blobs[0].runs.size(), 3U);
+  ASSERT_EQ(blobs[1].runs.size(), 31U);
+  ASSERT_EQ(blobs[2].runs.size(), 13U);
   EXPECT_EQ(blobs[0].runs[0].begin, 90);
   EXPECT_EQ(blobs[1].runs[0].begin, 20);
   EXPECT_EQ(blobs[2].runs[0].begin, 60);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 #include <vector>
@@ -90,15 +91,16 @@ inline std::vector<EdgePoint> refined_in(const cv::Mat& image, const DrawnDisc& 
   return refined_outline_in(image, disc).points;
 }
 
-/// Returns the largest error of the points with at least this cosine between row and normal.
+/// Returns the largest error of the points with at least this cosine between row and normal;
+/// infinity if there are none.
 inline double worst_off(const DrawnDisc& disc, const std::vector<EdgePoint>& points,
                         double min_cosine) {
-  double worst = 0;
+  double worst = -1;
   for (const EdgePoint& point : points) {
     if (disc.cosine(point.pixel) < min_cosine) continue;
     worst = std::max(worst, std::abs(disc.off(point.pixel)));
   }
-  return worst;
+  return worst < 0 ? std::numeric_limits<double>::infinity() : worst;
 }
 
 inline double rms_off(const DrawnDisc& disc, const std::vector<EdgePoint>& points) {

@@ -19,7 +19,8 @@ using Eigen::Vector2d;
 /// Moving disc off the image center, with a lens that distorts scanlines.
 class LightShapeOfMovingDisc : public testing::Test {
  protected:
-  LightShapeOfMovingDisc() : shape(camera), center_px(*shape.plane_to_pixel(circle.center)) {}
+  LightShapeOfMovingDisc()
+      : shape(camera), center_px(shape.plane_to_pixel(circle.center).value()) {}
 
   /// Returns the rim with each point at its position when its scanline is read: at d + m (l - l_c).
   std::vector<EdgePoint> outline(const Vector2d& motion_per_line) const {
@@ -29,9 +30,9 @@ class LightShapeOfMovingDisc : public testing::Test {
       const double angle = 2 * std::numbers::pi * i / count;
       const Vector2d rim =
           circle.center + circle.radius * Vector2d(std::cos(angle), std::sin(angle));
-      Vector2d pixel = *shape.plane_to_pixel(rim);
+      Vector2d pixel = shape.plane_to_pixel(rim).value();
       for (int iteration = 0; iteration < 20; ++iteration) {
-        pixel = *shape.plane_to_pixel(rim + (pixel.y() - center_px.y()) * motion_per_line);
+        pixel = shape.plane_to_pixel(rim + (pixel.y() - center_px.y()) * motion_per_line).value();
       }
       points.push_back({pixel, 100, 1, pixel.x() < center_px.x()});
     }

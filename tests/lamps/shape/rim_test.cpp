@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <stdexcept>
 
 #include "frontend/mat_view.h"
 #include "lamps/drawn_lamp.h"
@@ -22,6 +23,7 @@ const cv::Size kSize(300, 280);
 
 Blob largest_blob(const ImageView& image, const Background& background) {
   const auto blobs = group_pixel_runs(find_pixel_runs(image, background.threshold), 24);
+  if (blobs.empty()) throw std::runtime_error("the image has no blob");
   return *std::max_element(blobs.begin(), blobs.end(), [](const Blob& a, const Blob& b) {
     return a.box().area() < b.box().area();
   });
@@ -170,7 +172,8 @@ TEST(FitRim, DetectsClearRimOfLargeDownlights) {
 }
 
 TEST(LightDetector, IdentifiesDownlights) {
-  for_each_downlight([](const DrawnLamp& lamp, int depth, double noise, std::uint64_t seed) {
+  int identified = 0;
+  for_each_downlight([&](const DrawnLamp& lamp, int depth, double noise, std::uint64_t seed) {
     const LampMap map{{drawn_lamp(7, lamp.stripes.period_lines), drawn_lamp(8, 14.5)}};
     const auto lights = LightDetector(map, drawn_camera(kSize))
                             .detect(image_view(render_lamps({lamp}, kSize, depth, noise, seed)));
@@ -180,11 +183,13 @@ TEST(LightDetector, IdentifiesDownlights) {
     } else {
       EXPECT_EQ(lights[0].kind, LightKind::lamp);
       EXPECT_EQ(lights[0].lamp, 7);
+      ++identified;
     }
     // The period is measured with an envelope that decreases to a tenth within two periods.
     EXPECT_NEAR(lights[0].stripes.period_lines / lamp.stripes.period_lines, 1, kLampDrift);
     EXPECT_LT((lights[0].pixel - lamp.center).norm(), 1);
   });
+  EXPECT_GT(identified, 0);
 }
 
 TEST(FitRim, ReportsNoClearRimForGlows) {

@@ -102,7 +102,7 @@ TEST(FitRobustCircle, UsesWeights) {
   const auto fit = fit_robust_circle(points, weights, kTolerance);
   ASSERT_TRUE(fit);
   EXPECT_THAT(fit->circle.center, IsNear(heavy.center, 1e-3));
-  EXPECT_GT((fit_circle_to(points)->circle.center - heavy.center).norm(), 0.02);
+  EXPECT_GT((fit_circle_to(points).value().circle.center - heavy.center).norm(), 0.02);
 }
 
 TEST(FitRobustCircle, IsDeterministic) {

@@ -40,9 +40,8 @@ class MovingCamera {
                                       motion_at(center));
     for (Vector2d& point : points) point += noise * Vector2d(random.normal(), random.normal());
     const std::vector<double> weights(points.size(), 1);
-    const auto circle = fit_robust_circle(points, weights, 1e-3);
-    EXPECT_TRUE(circle);
-    return {points, weights, circle->inliers, circle->circle, kLineSlope};
+    const RobustCircle circle = fit_robust_circle(points, weights, 1e-3).value();
+    return {points, weights, circle.inliers, circle.circle, kLineSlope};
   }
 
   Vector2d v{2.0e-5, -1.5e-5};

@@ -59,6 +59,7 @@ TEST(LampClassifier, SeparatesLampsOfEqualPeriodByDuty) {
 
 TEST(LampClassifier, ReportsUnknownForUntrainedLamps) {
   const LampClassifier classifier = train_classifier(make_lights(kLamps, 30, 1));
+  ASSERT_EQ(classifier.lamps.size(), 3);
   const Confusion confusion =
       compute_confusion(classifier, make_lights({{5, 11.9, 0.5}, {6, 6, 0.5}}, 50, 2));
   EXPECT_EQ(confusion.unknown(), 100);
@@ -104,6 +105,8 @@ TEST(TrainClassifier, IsIndependentOfOrderOfLights) {
   const LampClassifier a = train_classifier(lights);
   std::reverse(lights.begin(), lights.end());
   const LampClassifier b = train_classifier(lights);
+  ASSERT_EQ(a.lamps.size(), 3);
+  ASSERT_EQ(b.lamps.size(), 3);
   EXPECT_TRUE(a.covariance.isApprox(b.covariance, 1e-9));
   for (std::size_t i = 0; i < 3; ++i) {
     EXPECT_EQ(a.lamps[i].examples, b.lamps[i].examples);

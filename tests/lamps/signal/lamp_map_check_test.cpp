@@ -125,14 +125,16 @@ TEST(ExplainMissingRoom, ListsTenRoomsAtMost) {
 TEST(FindAmbiguousLamps, MatchesIdentificationByFrequency) {
   StripeConditions conditions = kConditions;
   conditions.exposure_s.reset();
-  const auto needed = find_ambiguous_lamps({{lamp(1, 2500), lamp(2, 2501)}}, conditions)[0].needed;
+  const auto pairs = find_ambiguous_lamps({{lamp(1, 2500), lamp(2, 2501)}}, conditions);
+  ASSERT_EQ(pairs.size(), 1);
+  const auto needed = pairs[0].needed;
   const LampMap map{{lamp(1, 2500), lamp(2, 2500 * (1 + needed))}};
   Random random(6);
   int right = 0, wrong = 0;
   for (int draw = 0; draw < 400; ++draw) {
     const double period = 1 / (2500 * conditions.row_time_s);
     const auto lines =
-        static_cast<int>(kUsedHeight * *compute_lines_on_lamp(map.lamps[0], conditions));
+        static_cast<int>(kUsedHeight * compute_lines_on_lamp(map.lamps[0], conditions).value());
     const auto id = identify_lamp_by_frequency(
         map, conditions.row_time_s,
         measure_stripes(noisy_square_wave(lines, period, 0.5, 0.02, 0.02, random)));

@@ -29,19 +29,16 @@ TEST(ComputeLineSignal, IgnoresScanlinesOutsideImage) {
       compute_line_signal(image, find_chords_in_ellipse({40, -20}, {80, 20}, image.size()), 10)
           .size(),
       19U);
-  EXPECT_EQ(
-      compute_line_signal(image, find_chords_in_ellipse({-10, 80}, {30, 120}, image.size()), 10)
-          .size(),
-      18U);
   EXPECT_TRUE(
       compute_line_signal(image, find_chords_in_ellipse({40, 200}, {80, 240}, image.size()), 10)
           .empty());
   EXPECT_TRUE(
       compute_line_signal(image, find_chords_in_ellipse({200, 20}, {240, 60}, image.size()), 10)
           .empty());
-  for (const double value :
-       compute_line_signal(image, find_chords_in_ellipse({-10, 80}, {30, 120}, image.size()), 10))
-    EXPECT_EQ(value, 40);
+  const auto values =
+      compute_line_signal(image, find_chords_in_ellipse({-10, 80}, {30, 120}, image.size()), 10);
+  ASSERT_EQ(values.size(), 18U);
+  for (const double value : values) EXPECT_EQ(value, 40);
 }
 
 }  // namespace

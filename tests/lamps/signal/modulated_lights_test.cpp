@@ -56,11 +56,11 @@ TEST(FindModulatedLights, FindsPeriodWithoutLampPeriods) {
 
 TEST(FindModulatedLights, ReportsNoLampForUnknownPeriod) {
   for (const double period : {10.0, 12.6, 16.0, 21.0}) {
-    for (const ModulatedLight& light :
-         find_lights(render_lamps({make_glow({203.3, 131.6}, period)}, kSearchSize, CV_8U, 1),
-                     kLampPeriods_lines)) {
-      EXPECT_FALSE(light.lamp) << period;
-    }
+    const auto lights =
+        find_lights(render_lamps({make_glow({203.3, 131.6}, period)}, kSearchSize, CV_8U, 1),
+                    kLampPeriods_lines);
+    ASSERT_FALSE(lights.empty()) << period;
+    for (const ModulatedLight& light : lights) EXPECT_FALSE(light.lamp) << period;
   }
 }
 

@@ -138,6 +138,7 @@ TEST(EstimateRowTime, ReturnsAllCandidatesWithTheirLamps) {
     const double ratio = candidate.row_time.row_time_s / kTrue_s;
     const bool is_true = std::abs(ratio - 1) < 1e-9;
     EXPECT_TRUE(is_true || std::abs(ratio - 1.25) < 1e-9) << ratio;
+    ASSERT_EQ(candidate.lamps.size(), 3);
     for (std::size_t i = 0; i < 3; ++i) {
       const double period_lines = std::exp(result.groups[i].log_period);
       ASSERT_EQ(candidate.lamps[i].size(), 1);
