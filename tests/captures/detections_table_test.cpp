@@ -28,6 +28,7 @@ TEST_F(ReadDetections, GroupsRowsByImageInOrderOfAppearance) {
   ASSERT_EQ(frames.size(), 2);
   EXPECT_EQ(frames[0].image, "b");
   ASSERT_EQ(frames[0].detections.size(), 2);
+  ASSERT_EQ(frames[1].detections.size(), 1);
   EXPECT_EQ(frames[0].detections[1].lamp, 1);
   EXPECT_EQ(frames[0].detections[1].pixel, Eigen::Vector2d(3, 4));
   EXPECT_EQ(frames[1].detections[0].pixel, Eigen::Vector2d(1.5, -2));
@@ -37,6 +38,7 @@ TEST_F(ReadDetections, GroupsRowsByImageInOrderOfAppearance) {
 TEST_F(ReadDetections, ReadsSigmaWhenGiven) {
   const auto frames = read("lamp,sigma_px,image,v_px,u_px,note\n1,0.05,a,2,1,x\n2,,a,4,3,y\n");
   ASSERT_EQ(frames.size(), 1);
+  ASSERT_EQ(frames[0].detections.size(), 2);
   EXPECT_EQ(frames[0].detections[0].sigma_px, 0.05);
   EXPECT_FALSE(frames[0].detections[1].sigma_px);
 }

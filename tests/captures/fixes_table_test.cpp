@@ -35,6 +35,7 @@ TEST(ReadFixes, ReturnsWrittenRows) {
                {"c,d.png", "too_few_lamps", {}, 1}});
   const auto rows = read_fixes(folder / "fixes.csv");
   ASSERT_EQ(rows.size(), 3);
+  ASSERT_TRUE(rows[0].fix && rows[0].fix->sd && rows[1].fix);
   EXPECT_EQ(rows[0].fix->pose.position_m, pose.position_m);
   EXPECT_EQ(rows[0].fix->pose.yaw_rad, 3);
   EXPECT_EQ(*rows[0].fix->sd, Eigen::Vector4d(0.1, 0.2, 0.3, 0.4));
@@ -64,6 +65,8 @@ TEST(WriteFixes, WritesMotionLeanAndTimeWhenGiven) {
             "1.000000000,-0.500000000,0.250000000,-0.125000000\n"
             "b.png,too_few_lamps,,,,,,,,,1,,0.750000000,,,,\n");
   const auto rows = read_fixes(folder / "fixes.csv");
+  ASSERT_EQ(rows.size(), 2);
+  ASSERT_TRUE(rows[0].fix && rows[0].fix->inclination);
   EXPECT_EQ(rows[0].time_s, 0.5);
   EXPECT_EQ(rows[0].fix->velocity_m_per_s, Eigen::Vector2d(1, -0.5));
   EXPECT_EQ(rows[0].fix->inclination->roll_rad, 0.25);
@@ -115,6 +118,8 @@ TEST(WriteFixes, WritesNoisePartAndRejectedLampsWhenGiven) {
                         "rejected,outside_region\n"));
   EXPECT_THAT(folder.read_content(folder / "whole.csv"), HasSubstr("7 12"));
   const auto read = read_fixes(folder / "whole.csv");
+  ASSERT_EQ(read.size(), 2);
+  ASSERT_TRUE(read[0].fix && read[1].fix);
   EXPECT_FALSE(read[0].fix->noise_sd);
   EXPECT_EQ(read[1].fix->noise_sd, whole.fix->noise_sd);
   EXPECT_TRUE(read[0].rejected.empty());

@@ -16,6 +16,7 @@ using testing::HasSubstr;
 TEST(ReadPath, ReadsOptionalHeights) {
   const TemporaryFolder folder;
   const Path flat = read_path(folder.file("p.csv", "y_m,x_m\n1,2\n3,4\n"));
+  ASSERT_EQ(flat.waypoints_m.size(), 2);
   EXPECT_EQ(flat.waypoints_m[1], Eigen::Vector2d(4, 3));
   EXPECT_TRUE(flat.z_m.empty());
   EXPECT_EQ(read_path(folder.file("p.csv", "x_m,y_m,z_m\n1,2,3\n4,5,6\n")).z_m,
@@ -69,9 +70,9 @@ TEST(ReadPath, RejectsDistantWaypoint) {
 
 TEST(FindNearestOnPath, InterpolatesHeight) {
   const Path path{{{0, 0}, {2, 0}, {2, 2}}, {0, 1, 5}};
-  EXPECT_DOUBLE_EQ(*find_nearest_on_path(path, {1, 1e-3}).z_m, 0.5);
-  EXPECT_DOUBLE_EQ(*find_nearest_on_path(path, {3, 1.5}).z_m, 4);
-  EXPECT_DOUBLE_EQ(*find_nearest_on_path(path, {9, 9}).z_m, 5);
+  EXPECT_DOUBLE_EQ(find_nearest_on_path(path, {1, 1e-3}).z_m.value(), 0.5);
+  EXPECT_DOUBLE_EQ(find_nearest_on_path(path, {3, 1.5}).z_m.value(), 4);
+  EXPECT_DOUBLE_EQ(find_nearest_on_path(path, {9, 9}).z_m.value(), 5);
 }
 
 }  // namespace
