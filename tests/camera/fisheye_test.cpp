@@ -62,15 +62,16 @@ TEST(FisheyeLens, JacobiansMatchDifferenceQuotientsBeyond90Degrees) {
     ASSERT_TRUE(at);
     for (int i = 0; i < 3; ++i) {
       const Eigen::Vector3d off = step * Eigen::Vector3d::Unit(i);
-      const Eigen::Vector2d by = (*lens.project(point + off) - *lens.project(point - off)) / 2e-5;
+      const Eigen::Vector2d by =
+          (lens.project(point + off).value() - lens.project(point - off).value()) / 2e-5;
       EXPECT_THAT(Eigen::Vector2d(at->d_pixel_d_point.col(i)), IsNear(by, 1e-6)) << degrees;
     }
     const auto ray = lens.unproject(at->pixel);
     ASSERT_TRUE(ray);
     for (int i = 0; i < 2; ++i) {
       const Eigen::Vector2d off = 1e-3 * Eigen::Vector2d::Unit(i);
-      const Eigen::Vector3d by = (lens.unproject(at->pixel + off)->direction -
-                                  lens.unproject(at->pixel - off)->direction) /
+      const Eigen::Vector3d by = (lens.unproject(at->pixel + off).value().direction -
+                                  lens.unproject(at->pixel - off).value().direction) /
                                  2e-3;
       EXPECT_THAT(Eigen::Vector3d(ray->d_direction_d_pixel.col(i)), IsNear(by, 1e-9)) << degrees;
     }
