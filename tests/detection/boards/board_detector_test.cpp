@@ -81,6 +81,7 @@ TEST_P(BoardDetectorOnRenderedBoard, ReturnsSameCornersForUpsideDownImage) {
   cv::rotate(image, turned, cv::ROTATE_180);
   const BoardDetection upright = BoardDetector(board).detect(image);
   const BoardDetection upside_down = BoardDetector(board).detect(turned);
+  ASSERT_FALSE(upright.tags.empty());
   ASSERT_EQ(upside_down.tags.size(), upright.tags.size());
   const Eigen::Vector2d last(image.cols - 1, image.rows - 1);
   for (std::size_t i = 0; i < upright.tags.size(); ++i) {

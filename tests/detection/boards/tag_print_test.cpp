@@ -57,12 +57,15 @@ TEST(TagGeometry, ShiftsBitsByWidthOfBorder) {
   EXPECT_EQ(wide.width(), 10);
   EXPECT_EQ(wide.inside(), 2);
   const TagGeometry::Sides sides = wide.find_white_segments(3);
+  std::size_t segments = 0;
   for (std::size_t k = 0; k < 4; ++k) {
     ASSERT_EQ(sides[k].size(), narrow[k].size());
     for (std::size_t i = 0; i < sides[k].size(); ++i) {
       EXPECT_EQ(sides[k][i].from, narrow[k][i].from + 1);
     }
+    segments += sides[k].size();
   }
+  EXPECT_GT(segments, 0U);
 }
 
 TEST(TagGeometry, ReturnsNoSegmentsForWhiteBorder) {
