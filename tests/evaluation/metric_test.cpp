@@ -12,13 +12,15 @@ namespace {
 
 TEST(MetricKinds, HaveUniqueNamesAndDescriptions) {
   std::set<std::string> names;
-  for (const MetricKind& kind :
-       metric_kinds({MetricSource::station, MetricSource::lens, MetricSource::rotation,
-                     MetricSource::dispersion, MetricSource::evaluation})) {
+  const auto kinds =
+      metric_kinds({MetricSource::station, MetricSource::lens, MetricSource::rotation,
+                    MetricSource::dispersion, MetricSource::evaluation});
+  ASSERT_FALSE(kinds.empty());
+  for (const MetricKind& kind : kinds) {
     EXPECT_TRUE(names.insert(kind.name).second) << kind.name;
     EXPECT_STRNE(kind.cause, "");
     EXPECT_STRNE(kind.meaning, "");
-    EXPECT_EQ(metric_kind(kind.name)->name, kind.name);
+    EXPECT_EQ(metric_kind(kind.name).value().name, kind.name);
     const std::string unit = kind.unit;
     if (unit == "mm" || unit == "px" || unit == "deg") {
       EXPECT_TRUE(std::string(kind.name).ends_with("_" + unit)) << kind.name;

@@ -88,6 +88,7 @@ TEST(FormatGates, OwnRunWithMissingCapturesPasses) {
   const auto gates = read_gates(
       folder.file("gates.yaml", format_gates(propose_gates(input, evaluation), evaluation)),
       metric_kinds({MetricSource::evaluation}));
+  ASSERT_FALSE(gates.empty());
   EXPECT_EQ(describe_failed_gates(check_gates(gates, collect_metrics(evaluation))), "");
 }
 
@@ -98,6 +99,7 @@ TEST(FormatGates, RoundTripsThroughReadGates) {
   const TemporaryFolder folder;
   const auto read = read_gates(folder.file("gates.yaml", format_gates(gates, evaluation)),
                                metric_kinds({MetricSource::evaluation}));
+  ASSERT_EQ(gates.size(), 5);
   ASSERT_EQ(read.size(), gates.size());
   for (std::size_t i = 0; i < gates.size(); ++i) {
     EXPECT_EQ(read[i].metric, gates[i].metric);

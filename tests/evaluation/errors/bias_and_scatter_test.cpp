@@ -40,6 +40,7 @@ TEST(BiasAndScatter, IsUnbiasedUnderLargeScatter) {
         {i, {1e-3 + 2e-3 * random.normal(), 2e-3 * random.normal()}, {}, {}, i / 4, 0});
   }
   const auto statistics = compute_bias_and_scatter(errors, {{"a", {0, 0}, {}, {}}});
+  ASSERT_TRUE(statistics);
   // Means of four scatter by as much as the bias is; standard errors are 0.02 and 0.03 mm.
   EXPECT_NEAR(statistics->scatter_m, 2e-3 * std::sqrt(2), 0.06e-3);
   EXPECT_NEAR(statistics->bias_m, 1e-3, 0.1e-3);

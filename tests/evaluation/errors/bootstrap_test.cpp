@@ -49,14 +49,15 @@ std::array<int, 4> count_covered(std::size_t stations, std::size_t captures, dou
   Random random(1);
   for (int i = 0; i < 300; ++i) {
     const Errors errors = draw(stations, captures, bias, scatter, random);
-    const auto intervals = compute_error_intervals(errors.values, errors.clusters, 1);
+    const ErrorIntervals intervals =
+        compute_error_intervals(errors.values, errors.clusters, 1).value();
     const auto holds = [](const Interval& interval, double truth) {
       return interval.low <= truth && truth <= interval.high ? 1 : 0;
     };
-    counts[0] += holds(intervals->mean, mean);
-    counts[1] += holds(intervals->median, median);
-    counts[2] += holds(*intervals->p90, p90);
-    counts[3] += holds(intervals->rms, rms);
+    counts[0] += holds(intervals.mean, mean);
+    counts[1] += holds(intervals.median, median);
+    counts[2] += holds(intervals.p90.value(), p90);
+    counts[3] += holds(intervals.rms, rms);
   }
   return counts;
 }
@@ -81,9 +82,9 @@ TEST(ErrorIntervals, CoversTrueValuesWithPerStationBias) {
 TEST(ErrorIntervals, SingleCapturesAsUnitsAreTooNarrow) {
   Random random(2);
   Errors errors = draw(40, 12, 1, 0.1, random);
-  const Interval together = compute_error_intervals(errors.values, errors.clusters, 1)->mean;
+  const Interval together = compute_error_intervals(errors.values, errors.clusters, 1).value().mean;
   std::iota(errors.clusters.begin(), errors.clusters.end(), std::size_t{0});
-  const Interval singly = compute_error_intervals(errors.values, errors.clusters, 1)->mean;
+  const Interval singly = compute_error_intervals(errors.values, errors.clusters, 1).value().mean;
   EXPECT_LT(2 * (singly.high - singly.low), together.high - together.low);
 }
 
@@ -106,7 +107,7 @@ TEST(ErrorIntervals, WidthMatchesTheoryForManyErrors) {
     return std::sqrt(q * (1 - q)) / density / root;
   };
   expect_width(intervals->median, quantile_sd(0.5));
-  expect_width(*intervals->p90, quantile_sd(0.9));
+  expect_width(intervals->p90.value(), quantile_sd(0.9));
 }
 
 TEST(ErrorIntervals, IsIndependentOfThreadCount) {
@@ -114,6 +115,8 @@ TEST(ErrorIntervals, IsIndependentOfThreadCount) {
   const Errors errors = draw(3000, 2, 1, 1, random);
   const auto one = compute_error_intervals(errors.values, errors.clusters, 1);
   const auto four = compute_error_intervals(errors.values, errors.clusters, 4);
+  ASSERT_TRUE(one && four);
+  ASSERT_TRUE(one->p90 && four->p90);
   for (const auto figure : {&ErrorIntervals::mean, &ErrorIntervals::median, &ErrorIntervals::rms}) {
     EXPECT_EQ(((*one).*figure).low, ((*four).*figure).low);
     EXPECT_EQ(((*one).*figure).high, ((*four).*figure).high);
@@ -134,9 +137,9 @@ TEST(ErrorIntervals, ReturnsNulloptForFewUnits) {
 TEST(ErrorIntervals, OmitsP90ForFewUnits) {
   Random random(5);
   const Errors few = draw(kMinClustersForP90 - 1, 3, 1, 1, random);
-  EXPECT_FALSE(compute_error_intervals(few.values, few.clusters, 1)->p90);
+  EXPECT_FALSE(compute_error_intervals(few.values, few.clusters, 1).value().p90);
   const Errors sufficient = draw(kMinClustersForP90, 3, 1, 1, random);
-  EXPECT_TRUE(compute_error_intervals(sufficient.values, sufficient.clusters, 1)->p90);
+  EXPECT_TRUE(compute_error_intervals(sufficient.values, sufficient.clusters, 1).value().p90);
 }
 
 TEST(ErrorIntervals, HasZeroWidthForEqualErrors) {
@@ -144,6 +147,7 @@ TEST(ErrorIntervals, HasZeroWidthForEqualErrors) {
   std::vector<std::size_t> clusters(20);
   std::iota(clusters.begin(), clusters.end(), std::size_t{0});
   const auto intervals = compute_error_intervals(errors, clusters, 1);
+  ASSERT_TRUE(intervals && intervals->p90);
   EXPECT_EQ(intervals->median.low, 2.5);
   EXPECT_EQ(intervals->p90->high, 2.5);
   EXPECT_DOUBLE_EQ(intervals->mean.low, 2.5);

@@ -60,6 +60,7 @@ TEST(Compare, ReportsInsignificantDifferenceAsTheSame) {
   for (FixError& error : small.other_errors) error.horizontal_m = {1e-5, 0};
   Comparison comparison = compare(small.fixes, small.errors, small.others, small.other_errors, 1);
   EXPECT_EQ(comparison.words(), "the same within 0.001 mm");
+  ASSERT_TRUE(comparison.interval_m);
   EXPECT_GT(comparison.interval_m->low, 0);
   comparison.min_relevant_m = 1e-7;
   EXPECT_EQ(comparison.words(), "worse by more than 0.0001 mm");
@@ -73,6 +74,7 @@ TEST(Compare, RequiresUnitsNotPairs) {
   const Comparison comparison = compare(all.fixes, all.errors, all.others, all.other_errors, 1);
   EXPECT_EQ(comparison.clusters, 19);
   EXPECT_EQ(comparison.verdict(), "no evidence");
+  ASSERT_TRUE(comparison.interval_m);
   EXPECT_GT(comparison.interval_m->low, 0);
 }
 

@@ -28,11 +28,11 @@ TEST(NormalizedErrors, IsOneIfErrorsMatchReportedSd) {
   }
   const auto ratio = compute_normalized_errors(fixes, errors);
   ASSERT_TRUE(ratio);
-  EXPECT_NEAR(ratio->horizontal, 1, 0.015);  // three standard errors
-  EXPECT_NEAR(*ratio->height, 2, 0.05);      // stated too small by a factor of two
+  EXPECT_NEAR(ratio->horizontal, 1, 0.015);     // three standard errors
+  EXPECT_NEAR(ratio->height.value(), 2, 0.05);  // stated too small by a factor of two
   EXPECT_FALSE(ratio->yaw);
   EXPECT_NEAR(ratio->within_95, 0.95, 0.006);
-  EXPECT_NEAR(*ratio->height_within_95, std::erf(kWithin95 / 2 / std::sqrt(2)), 0.015);
+  EXPECT_NEAR(ratio->height_within_95.value(), std::erf(kWithin95 / 2 / std::sqrt(2)), 0.015);
   EXPECT_FALSE(ratio->yaw_within_95);
   fixes.resize(1);
   fixes[0].fix->sd.reset();

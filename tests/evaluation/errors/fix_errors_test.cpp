@@ -25,8 +25,8 @@ TEST(ErrorsAgainstTruth, MatchesRowsByImage) {
   EXPECT_EQ(errors.missing, (std::map<std::string, std::size_t>{{"degenerate", 1}, {"no row", 1}}));
   ASSERT_EQ(errors.errors.size(), 2);
   EXPECT_THAT(errors.errors[0].horizontal_m, IsNear(Eigen::Vector2d(0.003, 0.004), 1e-12));
-  EXPECT_NEAR(*errors.errors[0].height_m, 0.1, 1e-12);
-  EXPECT_NEAR(*errors.errors[0].yaw_rad, 6.2 - 2 * 3.14159265358979, 1e-12);
+  EXPECT_NEAR(errors.errors[0].height_m.value(), 0.1, 1e-12);
+  EXPECT_NEAR(errors.errors[0].yaw_rad.value(), 6.2 - 2 * 3.14159265358979, 1e-12);
   EXPECT_EQ(errors.errors[0].cluster, 1);
   EXPECT_EQ(errors.errors[1].cluster, 0);
 }
@@ -48,7 +48,7 @@ TEST(ErrorsAgainstPath, UsesNearestPointOfPath) {
   EXPECT_EQ(errors.captures, 4);
   ASSERT_EQ(errors.errors.size(), 3);
   EXPECT_THAT(errors.errors[0].horizontal_m, IsNear(Eigen::Vector2d(0, 0.1), 1e-12));
-  EXPECT_NEAR(*errors.errors[0].height_m, 0.2, 1e-12);
+  EXPECT_NEAR(errors.errors[0].height_m.value(), 0.2, 1e-12);
   EXPECT_DOUBLE_EQ(errors.errors[1].horizontal_m.norm(), 5);
   EXPECT_THAT(errors.errors[2].horizontal_m, IsNear(Eigen::Vector2d(0.2, 0), 1e-12));
   EXPECT_FALSE(errors.errors[2].yaw_rad);
@@ -57,6 +57,7 @@ TEST(ErrorsAgainstPath, UsesNearestPointOfPath) {
 TEST(ErrorsAgainstPath, GroupsFixesIntoThirtyUnits) {
   const std::vector<FixRow> fixes(3000, fix_at("a", 0, 0));
   const FixErrors errors = errors_against_path(fixes, {{{0, 0}, {1, 0}}, {}});
+  ASSERT_EQ(errors.errors.size(), 3000);
   EXPECT_EQ(errors.errors.front().cluster, 0);
   EXPECT_EQ(errors.errors[99].cluster, 0);
   EXPECT_EQ(errors.errors[100].cluster, 1);
