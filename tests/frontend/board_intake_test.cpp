@@ -73,14 +73,17 @@ TEST_F(BoardIntakeOfFolder, RejectsPoorImagesWithMeasuredValues) {
   cv::GaussianBlur(good, blurred, {}, 3);
   const Observation blur = observe(blurred);
   EXPECT_EQ(rejection_reason(blur), RejectionReason::blurred);
+  ASSERT_TRUE(blur.rejection);
   EXPECT_THAT(blur.rejection->message, testing::MatchesRegex("blurred: [23]\\.[0-9] px, 2\\.0 .*"));
 
   const Observation dark = observe(scaled(good, 0.012));
   EXPECT_EQ(rejection_reason(dark), RejectionReason::too_dark);
+  ASSERT_TRUE(dark.rejection);
   EXPECT_THAT(dark.rejection->message, HasSubstr("of the full scale, 10 % at least"));
 
   const Observation white = observe(scaled(good, 8));
   EXPECT_EQ(rejection_reason(white), RejectionReason::overexposed);
+  ASSERT_TRUE(white.rejection);
   EXPECT_THAT(white.rejection->message, HasSubstr("is at full scale, 25 % at most"));
 
   EXPECT_EQ(rejection_reason(observe(cv::Mat1b(600, 800, uchar(128)))),
@@ -112,6 +115,7 @@ TEST_F(BoardIntakeOfFolder, RejectsImagesWithTooFewTags) {
   }
   const Observation image = observe(few);
   EXPECT_EQ(rejection_reason(image), RejectionReason::too_few_corners);
+  ASSERT_TRUE(image.rejection);
   EXPECT_THAT(image.rejection->message, StartsWith("only 2 tags of the board can be used"));
   cv::rectangle(none, {100, 100, 80, 80}, cv::Scalar(0), -1);  // sharp edges
   EXPECT_EQ(rejection_reason(observe(none)), RejectionReason::no_board);
@@ -140,17 +144,21 @@ TEST_F(BoardIntakeOfFolder, ReturnsSameResultForAnyNumberOfThreads) {
   EXPECT_EQ(last, 6U);
   ASSERT_EQ(four.images.size(), 6U);
   ASSERT_EQ(one.images.size(), 6U);
+  int compared = 0;
   for (std::size_t i = 0; i < one.images.size(); ++i) {
     EXPECT_EQ(one.images[i].name(), four.images[i].name());
     ASSERT_EQ(one.images[i].is_kept(), four.images[i].is_kept()) << one.images[i].name();
     ASSERT_EQ(one.images[i].board.has_value(), four.images[i].board.has_value());
     if (!one.images[i].board) continue;
     const auto &tags = one.images[i].board->seen.tags, &others = four.images[i].board->seen.tags;
+    ASSERT_FALSE(tags.empty());
     ASSERT_EQ(tags.size(), others.size());
+    ++compared;
     for (std::size_t k = 0; k < tags.size(); ++k) {
       EXPECT_EQ(tags[k].corners_px, others[k].corners_px);
     }
   }
+  EXPECT_GT(compared, 0);
 }
 
 TEST_F(BoardIntakeOfFolder, RejectsRepeatedImagesAndViews) {
@@ -165,6 +173,7 @@ TEST_F(BoardIntakeOfFolder, RejectsRepeatedImagesAndViews) {
   ASSERT_EQ(seen.images.size(), 4U);
   EXPECT_TRUE(seen.images[0].is_kept());
   EXPECT_EQ(rejection_reason(seen.images[1]), RejectionReason::same_image);
+  ASSERT_TRUE(seen.images[1].rejection && seen.images[2].rejection);
   EXPECT_EQ(seen.images[1].rejection->message, "is the same image as a.png");
   EXPECT_EQ(rejection_reason(seen.images[2]), RejectionReason::same_view);
   EXPECT_EQ(seen.images[2].rejection->message, "shows the same view as a.png: views count once");
@@ -180,6 +189,7 @@ TEST_F(BoardIntakeOfFolder, RejectsImagesOfMinoritySize) {
   const Observations seen = observe_all();
   ASSERT_EQ(seen.images.size(), 3U);
   EXPECT_EQ(rejection_reason(seen.images[0]), RejectionReason::wrong_size);
+  ASSERT_TRUE(seen.images[0].rejection);
   EXPECT_THAT(seen.images[0].rejection->message,
               StartsWith("is 700 x 600 px, the camera's images are 800 x 600"));
   EXPECT_TRUE(seen.images[1].is_kept());
@@ -211,6 +221,8 @@ TEST_F(BoardIntakeOfFolder, ReturnsCachedDetection) {
   ASSERT_FALSE(fs::is_empty(options.corner_cache));
   const Observation cached = intake.observe(SourceImage(file));
   ASSERT_TRUE(detected.board && cached.board);
+  ASSERT_TRUE(detected.blur_px);
+  ASSERT_FALSE(detected.board->seen.tags.empty());
   EXPECT_EQ(detected.blur_px, cached.blur_px);
   EXPECT_EQ(detected.size_px, cached.size_px);
   EXPECT_EQ(detected.board->seen.tags.size(), cached.board->seen.tags.size());

@@ -46,6 +46,7 @@ TEST(CornerCache, IgnoresTruncatedFiles) {
     EXPECT_EQ(again.seen.tags.back().corners_px, whole.seen.tags.back().corners_px);
     EXPECT_EQ(TemporaryFolder::read_content(kept), text);
   }
+  EXPECT_GT(ends, 0U);
 }
 
 /// The tone curve is estimated from all images of a camera, so that fits for all curves are stored.

@@ -98,7 +98,8 @@ TEST_F(VideoOfFrames, SourceReturnsEveryNthFrameBetweenImages) {
   ImageSource source({film}, options);
   source.next();
   const auto second = source.next();
-  EXPECT_NEAR(*second->time_s, 0.75, 1e-9);
+  ASSERT_TRUE(second);
+  EXPECT_NEAR(second->time_s.value(), 0.75, 1e-9);
   EXPECT_EQ(cv::norm(second->read(options), frames[15], cv::NORM_INF), 0);
 }
 
@@ -156,6 +157,7 @@ TEST_F(VideoOfFrames, SourceThrowsForInvalidVideos) {
 
 TEST_F(VideoOfFrames, YieldsSameLampsAsImages) {
   const auto files = list_images(kRig + "/sample");
+  ASSERT_EQ(files.size(), 2U);
   std::vector<cv::Mat> images;
   for (const auto& file : files) images.push_back(read_image(file));
   ASSERT_TRUE(write_video(film, images));
@@ -193,6 +195,7 @@ TEST_F(VideoOfFrames, YieldsSameBoardsAsImages) {
   const Board board = read_board(kRig + "/board.yaml");
   const BoardDetector detector(board);
   const BoardDetection of_image = detector.detect(image);
+  ASSERT_GE(of_image.tags.size(), 20U);
   for (int run = 0; run < 2; ++run) {
     FrontendOptions options;
     options.threads = 2;
