@@ -162,7 +162,9 @@ TEST_P(PositionerNoiselessBody, MatchesTruthWhenPriorMeanIsTrue) {
     sensors.inclination = motion.inclination;
     sensors.inclination_sigma_rad = GetParam().lean ? 0.02 : 0;
     expect_state(rig.positioner().locate(detections, sensors), rig.body, kExactBody);
+    ++fixes;
   }
+  EXPECT_GT(fixes, 40);
 }
 
 INSTANTIATE_TEST_SUITE_P(Estimates, PositionerNoiselessBody, testing::ValuesIn(kCombinations),
@@ -202,11 +204,13 @@ TEST(WhitenedPixelFromRay, MatchesLens) {
   constexpr double step_px = 1e-3, sigma_px = 0.25;
   for (const Eigen::Vector2d& pixel : {Eigen::Vector2d(100, 500), Eigen::Vector2d(420, 290)}) {
     const auto ray = lens.unproject(pixel);
+    ASSERT_TRUE(ray);
     const auto matrix = whitened_pixel_from_ray(ray->direction, ray->d_direction_d_pixel, sigma_px);
+    ASSERT_TRUE(matrix);
     const Eigen::Vector3d unit_ray = ray->direction.normalized();
     EXPECT_THAT(Eigen::Vector2d(*matrix * unit_ray), IsNear(Eigen::Vector2d(0, 0), 1e-9));
     for (const Eigen::Vector2d& move : {Eigen::Vector2d(step_px, 0), Eigen::Vector2d(0, step_px)}) {
-      const Eigen::Vector3d moved = lens.unproject(pixel + move)->direction;
+      const Eigen::Vector3d moved = lens.unproject(pixel + move).value().direction;
       const Eigen::Vector2d found = *matrix * moved / unit_ray.dot(moved) * sigma_px;
       EXPECT_THAT(found, IsNear(move, 1e-7));
     }
@@ -274,10 +278,10 @@ class BodyScatter {
   using Vector = Eigen::Matrix<double, kBodyStates, 1>;
 
   static Vector to_vector(const Fix& fix) {
+    const BodyEstimate& body = fix.body.value();
     Vector all;
-    all << fix.estimate.pose.position_m, fix.estimate.pose.yaw_rad, fix.body->velocity_m_per_s,
-        fix.body->yaw_rate_rad_per_s, fix.body->inclination.roll_rad,
-        fix.body->inclination.pitch_rad;
+    all << fix.estimate.pose.position_m, fix.estimate.pose.yaw_rad, body.velocity_m_per_s,
+        body.yaw_rate_rad_per_s, body.inclination.roll_rad, body.inclination.pitch_rad;
     return all;
   }
 
@@ -331,6 +335,7 @@ TEST_P(BodyFixCovariance, MatchesScatterWithLampsAlone) {
   const Sensors sensors = sensors_for(rig.body, GetParam());
   const Fix stated = positioner.locate(exact, sensors);
   ASSERT_TRUE(stated.ok()) << to_string(stated.status);
+  ASSERT_TRUE(stated.body);
   const auto truth = BodyScatter::to_vector(stated);
   BodyScatter scatter;
   Random random(51);
@@ -346,6 +351,7 @@ TEST_P(BodyFixCovariance, MatchesScatterWithLampsAlone) {
 TEST_P(BodyFixCovariance, MatchesScatterWithLampsAndSensors) {
   rig.mount = CameraMount{{0.2, -0.1, 0.3}, 0.5};
   auto exact = seen_from(rig, 0.05);
+  ASSERT_GE(exact.size(), 4);
   exact.resize(4);
   const Positioner positioner = rig.positioner();
   const BodyMotion& motion = rig.body.motion;
@@ -356,6 +362,7 @@ TEST_P(BodyFixCovariance, MatchesScatterWithLampsAndSensors) {
   sensors.inclination_sigma_rad = GetParam().lean ? 0.003 : 0;
   const Fix stated = positioner.locate(exact, sensors);
   ASSERT_TRUE(stated.ok()) << to_string(stated.status);
+  ASSERT_TRUE(stated.body);
   const auto truth = BodyScatter::to_vector(stated);
   BodyScatter scatter;
   Random random(52);

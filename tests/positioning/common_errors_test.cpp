@@ -88,6 +88,7 @@ TEST_P(CommonErrorsOfFix, MatchesFiniteDifferencesOfFix) {
   }
   const Fix fix = Positioner(rig.map, rig.calibration, options).locate(detections, known);
   ASSERT_TRUE(fix.ok());
+  ASSERT_EQ(fix.body.has_value(), known.motion || known.inclination_sigma_rad > 0);
   expect_common(fix, by_parameters, adjustment.covariance);
   rig.calibration.adjustment.reset();
   const Fix noise = Positioner(rig.map, rig.calibration, options).locate(detections, known);
@@ -162,6 +163,7 @@ TEST_F(CommonErrorsTest, StatedReportsLensOnlyWithDerivatives) {
 TEST_F(CommonErrorsTest, PropagatesStandardDeviationOfSurvey) {
   for (Lamp& lamp : rig.map.lamps) lamp.sd_m = 0.002;
   const Fix fix = Positioner(rig.map, rig.calibration).locate(seen_from(rig, 0.1));
+  ASSERT_TRUE(fix.ok());
   const Matrix4 common = fix.estimate.covariance - fix.noise_covariance;
   // Eight lamps of 2 mm around the camera: slightly more than 2 / sqrt(8).
   EXPECT_NEAR(std::sqrt(common(0, 0)), 0.00075, 0.00008);

@@ -33,7 +33,7 @@ Eigen::Matrix4d compute_limit(const SyntheticRig& rig, double sigma_px) {
   const Camera& camera = rig.calibration.camera;
   const auto budget = compute_error_budget(lamps_m, Lens(camera.lens_model, camera.intrinsics),
                                            rig.camera, {sigma_px, 0, 0, 0});
-  return budget->noise;
+  return budget.value().noise;
 }
 
 void expect_efficient(const Scatter& scatter) {
@@ -66,6 +66,7 @@ class FixCovariance : public testing::TestWithParam<std::size_t> {
 TEST_P(FixCovariance, EqualsCramerRaoBound) {
   const double sigma_px = 0.2;
   const Fix fix = Positioner(rig.map, rig.calibration).locate(seen_from(rig, sigma_px));
+  ASSERT_TRUE(fix.ok());
   const Eigen::Matrix4d limit = compute_limit(rig, sigma_px);
   EXPECT_LT((fix.estimate.covariance - limit).norm(), 1e-6 * limit.norm());
 }
@@ -86,9 +87,12 @@ TEST(FixCovariance, MatchesScatterWithDifferentNoise) {
   const SyntheticRig rig = make_rig(4);
   const Positioner positioner(rig.map, rig.calibration);
   auto exact = seen_from(rig, 0.1);
+  ASSERT_EQ(exact.size(), 4);
   exact[1].sigma_px = 0.5;
   exact[3].sigma_px = 0.3;
-  Scatter scatter(rig.camera, positioner.locate(exact).estimate.covariance);
+  const Fix reported = positioner.locate(exact);
+  ASSERT_TRUE(reported.ok());
+  Scatter scatter(rig.camera, reported.estimate.covariance);
   Random random(12);
   for (int i = 0; i < kDraws; ++i) {
     scatter.add(positioner.locate(with_noise(exact, random)).estimate.pose);
@@ -102,8 +106,9 @@ TEST(FixCovariance, IncludesNoiseOfInclinationSensor) {
   const Positioner positioner(rig.map, rig.calibration);
   const auto exact = seen_from(rig, 0.1);
   const double sigma_rad = 0.002;
-  Scatter scatter(rig.camera,
-                  positioner.locate(exact, {rig.inclination, sigma_rad, {}}).estimate.covariance);
+  const Fix reported = positioner.locate(exact, {rig.inclination, sigma_rad, {}});
+  ASSERT_TRUE(reported.ok());
+  Scatter scatter(rig.camera, reported.estimate.covariance);
   Random random(13);
   for (int i = 0; i < kDraws; ++i) {
     const Inclination read{rig.inclination->roll_rad + sigma_rad * random.normal(),
@@ -121,6 +126,7 @@ TEST(FixCovariance, MatchesScatterOfRobotCenter) {
   const Positioner positioner(rig.map, rig.calibration, options);
   const auto exact = seen_from(rig, 0.2);
   const Fix truth = positioner.locate(exact);
+  ASSERT_TRUE(truth.ok());
   Scatter scatter(truth.estimate.pose, truth.estimate.covariance);
   Random random(14);
   for (int i = 0; i < kDraws; ++i) {
@@ -138,6 +144,7 @@ TEST(FixCovariance, IncludesInclinationOfMountArm) {
   const auto exact = seen_from(rig, 0.1);
   const double sigma_rad = 0.005;
   const Fix truth = positioner.locate(exact, {Inclination{0, 0}, sigma_rad, {}});
+  ASSERT_TRUE(truth.ok());
   Scatter scatter(truth.estimate.pose, truth.estimate.covariance);
   Random random(17);
   for (int i = 0; i < kDraws; ++i) {
@@ -153,8 +160,9 @@ TEST(FixCovariance, IncludesInclinationForOneLamp) {
   const double sigma_rad = 0.005;
   const HeightAndYaw known{rig.camera.position_m.z(), rig.camera.yaw_rad};
   const auto exact = seen_from(rig, 0.1);
-  Eigen::Matrix4d covariance =
-      positioner.locate(exact, {Inclination{0, 0}, sigma_rad, known}).estimate.covariance;
+  const Fix reported = positioner.locate(exact, {Inclination{0, 0}, sigma_rad, known});
+  ASSERT_TRUE(reported.ok());
+  Eigen::Matrix4d covariance = reported.estimate.covariance;
   covariance.bottomRightCorner<2, 2>().setIdentity();
   Scatter scatter(rig.camera, covariance);
   Random random(18);
@@ -173,7 +181,9 @@ TEST(FixCovariance, MatchesScatterWithStereographicLens) {
   rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.1, 1);
   const Positioner positioner(rig.map, rig.calibration);
   const auto exact = seen_from(rig, 0.1);
-  Scatter scatter(rig.camera, positioner.locate(exact).estimate.covariance);
+  const Fix reported = positioner.locate(exact);
+  ASSERT_TRUE(reported.ok());
+  Scatter scatter(rig.camera, reported.estimate.covariance);
   Random random(19);
   for (int i = 0; i < kDraws; ++i) {
     scatter.add(positioner.locate(with_noise(exact, random)).estimate.pose);
@@ -186,7 +196,9 @@ TEST(FixCovariance, MatchesScatterForOneLamp) {
   const Positioner positioner(rig.map, rig.calibration);
   const Sensors known{{}, 0, HeightAndYaw{rig.camera.position_m.z(), rig.camera.yaw_rad}};
   const auto exact = seen_from(rig, 0.2);
-  Eigen::Matrix4d covariance = positioner.locate(exact, known).estimate.covariance;
+  const Fix reported = positioner.locate(exact, known);
+  ASSERT_TRUE(reported.ok());
+  Eigen::Matrix4d covariance = reported.estimate.covariance;
   EXPECT_EQ(covariance(2, 2), 0);
   EXPECT_EQ(covariance(3, 3), 0);
   covariance.bottomRightCorner<2, 2>().setIdentity();  // height and yaw do not scatter
@@ -274,7 +286,7 @@ TEST(FixCovariance, ClosedFormsReachCramerRaoBoundWithPinhole) {
                      sigma_px / 520 * Eigen::Vector2d(random.normal(), random.normal());
       }
       scatter.add(lamps == 2 ? compute_two_lamp_poses(sightings[0], sightings[1]).poses[0]
-                             : *compute_coplanar_pose(sightings));
+                             : compute_coplanar_pose(sightings).value());
     }
     expect_efficient(scatter);
   }

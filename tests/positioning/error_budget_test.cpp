@@ -55,8 +55,9 @@ class ErrorBudgetTerm : public testing::Test {
 
   ErrorBudget budget(const ErrorSources& sources) {
     const Camera& camera = rig.calibration.camera;
-    return *compute_error_budget(positions_of(rig.map), Lens(camera.lens_model, camera.intrinsics),
-                                 rig.camera, sources);
+    return compute_error_budget(positions_of(rig.map), Lens(camera.lens_model, camera.intrinsics),
+                                rig.camera, sources)
+        .value();
   }
 
   /// Unit weights, as the budget assumes.
@@ -125,6 +126,7 @@ TEST(ComputeErrorBudget, TotalIsSumOfSources) {
   const Lens lens(LensModel::pinhole, std::array{520.0, 520.0, 400.0, 300.0});
   const auto budget = compute_error_budget(positions_of(synthetic_lamps()), lens, {{0, 0, 0}, 0},
                                            {0.1, 0.2, 0.003, 0.004});
+  ASSERT_TRUE(budget);
   EXPECT_THAT(budget->total(),
               IsNear(Matrix4(budget->noise + budget->center + budget->tilt + budget->lamp_map), 0));
   EXPECT_GT(budget->lamp_map(0, 0), 0);
@@ -208,7 +210,9 @@ TEST_P(ErrorBudgetWithPrior, MatchesReportedCovarianceOfFix) {
 /// The effects of single errors on fixes match the budget.
 TEST_P(ErrorBudgetWithPrior, MatchesEffectOfErrorsOnFix) {
   const auto found = budget(prior(GetParam()));
+  ASSERT_TRUE(found);
   const auto exact = seen_from(rig, kNoise_px);
+  ASSERT_FALSE(exact.empty());
   Eigen::Matrix4d by_center = Eigen::Matrix4d::Zero(), by_tilt = by_center, by_lamps = by_center;
   for (const int axis : {0, 1}) {
     const Eigen::Vector4d shift = per_step(0.01, [&](double step_px) {

@@ -60,6 +60,7 @@ TEST(ComputeFloorLimits, CoversGridRowByRow) {
   const auto limits =
       compute_floor_limits(map, pinhole_camera(), {0, 0.3, -0.1, 0.1, 0.1}, 0.2, 0, kNoise);
   ASSERT_EQ(limits.places.size(), 4 * 3);
+  ASSERT_FALSE(limits.sources.empty());
   EXPECT_THAT(limits.places[5].camera.position_m, IsNear(Eigen::Vector3d(0.1, 0, 0.2), 1e-15));
   for (const auto& place : limits.places) {
     EXPECT_EQ(place.parts.size(), place.lamps >= 2 ? limits.sources.size() : 0);
@@ -79,6 +80,7 @@ TEST(ComputeFloorLimits, IncludesMotionAndLeanWhenFree) {
   ASSERT_EQ(limits.sources.size(), 6);
   EXPECT_EQ(limits.sources[1].key, "motion");
   EXPECT_EQ(limits.sources[2].key, "lean");
+  ASSERT_EQ(standing.places.size(), limits.places.size());
   int with_fix = 0, without = 0;
   for (std::size_t i = 0; i < limits.places.size(); ++i) {
     const auto& place = limits.places[i];
@@ -90,6 +92,7 @@ TEST(ComputeFloorLimits, IncludesMotionAndLeanWhenFree) {
     }
     ++with_fix;
     ASSERT_EQ(place.parts.size(), 6);
+    ASSERT_FALSE(standing.places[i].parts.empty());
     // Additional estimated states increase the covariance.
     EXPECT_THAT(place.parts[0], IsNear(standing.places[i].parts[0], 1e-12));
     EXPECT_GT(place.total()(0, 0), standing.places[i].total()(0, 0));
@@ -108,6 +111,7 @@ TEST(ComputeFloorLimits, MatchesScatterWithFisheye) {
   Random random{23};
   for (const auto& place : limits.places) {
     EXPECT_EQ(place.lamps, 8);
+    ASSERT_FALSE(place.parts.empty());
     rig.camera = place.camera;
     const auto exact = seen_from(rig, kNoise.noise_px);
     Scatter scatter(place.camera, place.parts[0]);

@@ -60,6 +60,7 @@ TEST(Positioner, LocateDoesNotAllocate) {
   options.mount = CameraMount{{0.1, 0.2, 0.3}, 0.4};
   const Positioner positioner(rig.map, rig.calibration, options);
   const auto good = seen_from(rig);
+  ASSERT_EQ(good.size(), 8U);
   auto swapped = good, bad = good;
   std::swap(swapped[0].lamp, swapped[6].lamp);
   for (Detection& detection : bad) detection.lamp = 1 + detection.lamp % 8;
@@ -110,6 +111,7 @@ TEST(VlpLocate, DoesNotAllocate) {
   for (const Detection& detection : seen_from(rig)) {
     seen.push_back({detection.lamp, detection.pixel.x(), detection.pixel.y(), 0.1});
   }
+  ASSERT_EQ(seen.size(), 8U);
   vlp_sensors sensors = {};
   sensors.inclination_sigma_rad = 1.6;
   vlp_fix fix;

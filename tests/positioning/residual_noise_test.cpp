@@ -42,13 +42,15 @@ TEST(SumResiduals, ExcludesFixWithWrongLamp) {
 }
 
 TEST(EstimateNoiseFactor, SubtractsCommonErrors) {
-  EXPECT_DOUBLE_EQ(*estimate_noise_factor({.chi_squared = 36, .degrees_of_freedom = 9}), 2);
-  EXPECT_DOUBLE_EQ(*estimate_noise_factor(
-                       {.chi_squared = 36, .common_chi_squared = 27, .degrees_of_freedom = 9}),
-                   1);
-  EXPECT_EQ(*estimate_noise_factor(
-                {.chi_squared = 36, .common_chi_squared = 35, .degrees_of_freedom = 9}),
-            1);
+  EXPECT_DOUBLE_EQ(estimate_noise_factor({.chi_squared = 36, .degrees_of_freedom = 9}).value(), 2);
+  EXPECT_DOUBLE_EQ(
+      estimate_noise_factor({.chi_squared = 36, .common_chi_squared = 27, .degrees_of_freedom = 9})
+          .value(),
+      1);
+  EXPECT_EQ(
+      estimate_noise_factor({.chi_squared = 36, .common_chi_squared = 35, .degrees_of_freedom = 9})
+          .value(),
+      1);
   EXPECT_FALSE(estimate_noise_factor({}));
 }
 

@@ -54,7 +54,7 @@ std::vector<Detection> make_detections(const StatedRig& rig) {
   for (const Lamp& lamp : rig.map.lamps) {
     const auto pixel =
         lens.project(camera_from_level * level_from_world(rig.camera, lamp.position_m));
-    detections.push_back({lamp.id, *pixel, kNoise_px});
+    detections.push_back({lamp.id, pixel.value(), kNoise_px});
   }
   return detections;
 }
@@ -112,6 +112,7 @@ TEST_P(UnitErrorsParts, SumToJointCovariance) {
   const StatedRig& rig = GetParam();
   const UnitErrors unit(rig.map, rig.calibration);
   const Eigen::MatrixXd& whole = unit.common().joint();
+  ASSERT_GT(whole.rows(), 0);
   Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(whole.rows(), whole.cols());
   for (const CommonErrorSource part : kCommonErrorSources) sum += unit.common().only(part).joint();
   const Eigen::VectorXd inverse_sd = whole.diagonal().cwiseSqrt().cwiseInverse();
@@ -247,7 +248,7 @@ TEST(FloorSummary, LargestReturnsDominantSource) {
                                                     {-0.2, 0.2, -0.1, 0.1, 0.1}, 0, 0.4, noise_px);
     EXPECT_EQ(limits.sources.size(), 5U);
     EXPECT_EQ(limits.places.size(), 15U);
-    return *summarize(limits);
+    return summarize(limits).value();
   };
   EXPECT_EQ(summary_of(0.01, 0.1).largest().source.key, "lamp_map");
   EXPECT_EQ(summary_of(1e-5, 5).largest().source.key, "noise");

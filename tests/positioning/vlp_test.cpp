@@ -235,6 +235,7 @@ TEST_F(CInterface, LocateRejectsHeightWithoutStandardDeviation) {
 }
 
 TEST_F(CInterface, LocateReportsStampAndUnknownLampsWithoutFix) {
+  ASSERT_FALSE(given.empty());
   for (vlp_detection& detection : given) detection.lamp += 100;
   vlp_sensors sensors = {};
   sensors.stamp = -7;
