@@ -112,9 +112,10 @@ TEST(MakeBudgetPlot, OmitsLampsRejectedByFix) {
   StatedRoom room;
   room.lamps.lamps[0].sd_m = 0.1;
   auto fixes = room.fixes();
-  EXPECT_THAT(make_budget_plot(fixes, room.lamps, room.calibration)->alt, HasSubstr("zenith 0 %"));
+  EXPECT_THAT(make_budget_plot(fixes, room.lamps, room.calibration).value().alt,
+              HasSubstr("zenith 0 %"));
   for (FixRow& row : fixes) row.rejected = {1};
-  EXPECT_THAT(make_budget_plot(fixes, room.lamps, room.calibration)->alt,
+  EXPECT_THAT(make_budget_plot(fixes, room.lamps, room.calibration).value().alt,
               testing::Not(HasSubstr("zenith 0 %")));
 }
 

@@ -119,6 +119,7 @@ TEST(ReportHtml, OrdersPlotsByPart) {
   report.pictures = {{ReportPart::distribution, "<svg>", "second", "b"},
                      {ReportPart::camera, "\x89PNG", "first", "a"}};
   const std::string html = report_html(report);
+  ASSERT_NE(html.find("second"), std::string::npos);
   EXPECT_LT(html.find("first"), html.find("second"));
   EXPECT_THAT(html, HasSubstr("src=\"data:image/svg+xml;base64,PHN2Zz4=\""));
   EXPECT_THAT(html, HasSubstr("src=\"data:image/png;base64,iVBORw==\""));

@@ -37,6 +37,7 @@ TEST_F(FloorPlotTest, IsReproducible) {
   for (const char* name : {"a.png", "a.svg"}) {
     draw_floor_plot(folder / name, plot, lamps);
     const std::string first = TemporaryFolder::read_content(folder / name);
+    ASSERT_FALSE(first.empty()) << name;
     draw_floor_plot(folder / name, plot, lamps);
     EXPECT_EQ(TemporaryFolder::read_content(folder / name), first);
   }
