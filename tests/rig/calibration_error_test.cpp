@@ -24,6 +24,7 @@ Calibration leaning() {
 TEST(WithLensError, KeepsZenithAndMovesItsPixel) {
   const Calibration moved = with_lens_error(leaning(), Eigen::Vector4d(10, -5, 1, 2));
   EXPECT_EQ(moved.camera.intrinsics, (std::vector<double>{510, 505, 401, 302}));
+  ASSERT_TRUE(moved.rotation_center);
   EXPECT_EQ(moved.rotation_center->zenith_in_camera, leaning().rotation_center->zenith_in_camera);
   EXPECT_THAT(moved.rotation_center->center_px,
               IsNear(Eigen::Vector2d(401 + 0.02 * 510, 302 - 0.01 * 505), 1e-9));
@@ -34,6 +35,7 @@ TEST(WithLensError, KeepsZenithAndMovesItsPixel) {
 
 TEST(WithZenithError, MovesNormalizedPoint) {
   const Calibration moved = with_zenith_error(leaning(), {0.001, 0.002});
+  ASSERT_TRUE(moved.rotation_center);
   EXPECT_THAT(zenith_point(*moved.rotation_center), IsNear(Eigen::Vector2d(0.021, -0.008), 1e-15));
   EXPECT_NEAR(moved.rotation_center->zenith_in_camera.norm(), 1, 1e-15);
   EXPECT_THAT(moved.rotation_center->center_px,
@@ -42,6 +44,7 @@ TEST(WithZenithError, MovesNormalizedPoint) {
 
 TEST(WithOffsetError, UsesUnitsOfNormalizedPlane) {
   const Calibration moved = with_offset_error(leaning(), {0.001, -0.002});
+  ASSERT_TRUE(moved.dispersion && moved.rotation_center);
   EXPECT_THAT(moved.dispersion->offset_px, IsNear(Eigen::Vector2d(1, -1.22), 1e-12));
   EXPECT_EQ(moved.rotation_center->center_px, leaning().rotation_center->center_px);
 }
