@@ -106,7 +106,7 @@ TEST_P(FrameRendererBoard, RenderedCornersMatchTrueCorners) {
     for (const auto& [tag, corner, pixel] : find_true_corners(scene_, renderer, shot)) {
       constexpr double edge_px = 8;
       if (pixel.minCoeff() > edge_px && pixel.x() < 799 - edge_px && pixel.y() < 599 - edge_px) {
-        tags[*tag][corner] = pixel;
+        tags[tag.value()][corner] = pixel;
       }
     }
     for (const auto& [tag, at] : tags) {
@@ -134,7 +134,10 @@ TEST_P(FrameRendererBoard, TrueCornersMatchMrcalProjection) {
   const BoardShot shot = make_board_shot(scene_, views_, 1);
   const auto layout = compute_board_layout(scene_.board->print);
   const Eigen::Vector2d field_m = tag_field_m(scene_.board->print);
-  for (const auto& [tag, corner, pixel] : find_true_corners(scene_, renderer, shot)) {
+  const auto truth = find_true_corners(scene_, renderer, shot);
+  ASSERT_FALSE(truth.empty());
+  for (const auto& [tag, corner, pixel] : truth) {
+    ASSERT_TRUE(tag);
     const Eigen::Vector2d at_m = layout.at(std::size_t(*tag)).corners_m.at(std::size_t(corner));
     const Eigen::Vector2d fraction = 2 * at_m.cwiseQuotient(field_m) - Eigen::Vector2d(1, 1);
     const double depth_m = scene_.board->warp_m.dot(

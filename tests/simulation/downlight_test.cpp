@@ -43,6 +43,7 @@ class FrameRendererDownlight : public testing::Test {
 TEST_F(FrameRendererDownlight, IsDiscIfWallsEqualSource) {
   const Eigen::Vector3d eye_m(0.21, -0.4, 0.1);
   const cv::Mat1f disc = rendered(eye_m);
+  ASSERT_GT(measure_brightness(disc).sum, 0);
   glow().recess = Recess{0.05, 0.03, 1, {}};
   EXPECT_LT(cv::norm(rendered(eye_m), disc, cv::NORM_INF), 1e-6 * kFull) << "rim and all";
 }

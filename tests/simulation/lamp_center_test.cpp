@@ -114,7 +114,7 @@ TEST_P(FrameRendererDisc, CentroidOnCeilingMatchesLampPosition) {
     const Eigen::Isometry3d world_from_camera = shot.motion.world_from_camera(0);
     const auto ceiling_m = [&](double u, double v) {
       const Eigen::Vector3d ray =
-          world_from_camera.linear() * renderer.rays().lens().unproject({u, v})->direction;
+          world_from_camera.linear() * renderer.rays().lens().unproject({u, v}).value().direction;
       return Eigen::Vector2d(world_from_camera.translation().head<2>() +
                              (lamp_m.z() - world_from_camera.translation().z()) / ray.z() *
                                  ray.head<2>());

@@ -94,6 +94,7 @@ TEST_F(FrameRendererMirror, DoesNotReflectLampBehindPane) {
   pane() = {{0.4, -1, 0}, {0, 2, 0}, {0, 0, 4}, 0};
   scene_.lamps[0].glow.position_m.x() = 0.6;
   const cv::Mat1f with = rendered();
+  ASSERT_GT(measure_brightness(with).sum, 0);
   EXPECT_TRUE(truth().empty());
   scene_.clutter.mirrors.clear();
   EXPECT_EQ(cv::norm(with, rendered(), cv::NORM_INF), 0);

@@ -36,6 +36,7 @@ TEST(ReadScene, ReadsCameraAndSensor) {
   EXPECT_EQ(scene.sensor.full_well_e, 13000);
   EXPECT_EQ(scene.sensor.read_noise_e, 8);
   EXPECT_TRUE(scene.sensor.shot_noise);
+  ASSERT_TRUE(scene.sensor.bloom);
   EXPECT_EQ(scene.sensor.bloom->fraction, 0.3);
   EXPECT_EQ(scene.sensor.bloom->sigma_px, 2.5);
 }
@@ -75,6 +76,7 @@ TEST(ReadScene, ReadsClutterAndBoard) {
   EXPECT_EQ(clutter.reflections.at(0).lamp, 1U) << "the index of lamp 5";
   EXPECT_EQ(clutter.reflections.at(0).glow.edge_share, 0) << "it fades towards its rim";
   EXPECT_EQ(clutter.occluders.at(0).corner_m, Vector3d(-0.7, -0.2, 1.4));
+  ASSERT_TRUE(scene.board);
   EXPECT_EQ(scene.board->print.first_id, 9);
   EXPECT_EQ(scene.board->margin_m, 0.02);
   EXPECT_EQ(scene.board->warp_m, Vector2d(0.0003, -0.0002));
@@ -95,14 +97,17 @@ TEST(ReadScene, ReadsReflectionOfRectangle) {
 
 TEST(ReadScene, ReadsRecessesAndHalos) {
   const Scene scene = read_scene_text(kSceneYaml);
+  ASSERT_EQ(scene.lamps.size(), 2U);
   EXPECT_FALSE(scene.lamps[0].glow.recess);
   EXPECT_FALSE(scene.lamps[0].glow.halo);
+  ASSERT_TRUE(scene.lamps[1].glow.halo);
   EXPECT_EQ(scene.lamps[1].glow.halo->fraction, 0.02);
   EXPECT_EQ(scene.lamps[1].glow.halo->length_m, 0.015);
   const Recess recess = scene.clutter.steady_lamps.at(1).recess.value();
   EXPECT_EQ(recess.depth_m, 0.07);
   EXPECT_EQ(recess.source_diameter_m, 0.04);
   EXPECT_EQ(recess.reflector_share, 0.1);
+  ASSERT_TRUE(recess.dark_side);
   EXPECT_EQ(recess.dark_side->reflector_share, 0.05);
   EXPECT_NEAR(recess.dark_side->azimuth_rad, std::numbers::pi / 2, kRounding);
 }
@@ -110,6 +115,7 @@ TEST(ReadScene, ReadsRecessesAndHalos) {
 TEST(ReadScene, ReadsPicture) {
   const ImageProcessing picture = read_scene_text(kSceneYaml).picture.value();
   EXPECT_EQ(picture.gamma, 2.2);
+  ASSERT_TRUE(picture.sharpening);
   EXPECT_EQ(picture.sharpening->amount, 0.6);
   EXPECT_EQ(picture.sharpening->radius_px, 1.5);
   EXPECT_EQ(picture.jpeg_quality, 90);
@@ -121,6 +127,7 @@ TEST(ReadScene, ReadsSpotsInOrderOfFile) {
   EXPECT_EQ(set.folder, "spots");
   EXPECT_EQ(set.exposure_s, 5e-5);
   EXPECT_FALSE(set.board);
+  ASSERT_TRUE(set.lamps);
   EXPECT_THAT(set.lamps->spots_m, ElementsAre(Vector2d(0.1, -0.05), Vector2d(-0.2, 0.3)));
   EXPECT_THAT(set.lamps->heights_m, ElementsAre(0, 0.2));
   EXPECT_THAT(set.lamps->yaws_rad,
@@ -133,7 +140,7 @@ TEST(ReadScene, ReadsSpotsInOrderOfFile) {
 }
 
 TEST(ReadScene, OrdersGridRowByRowFromFirstCorner) {
-  const LampShots captures = *read_scene_text(kSceneYaml).sets.at(1).lamps;
+  const LampShots captures = read_scene_text(kSceneYaml).sets.at(1).lamps.value();
   const std::vector<Vector2d> expected{{-0.6, 0.3},  {0, 0.3},  {0.6, 0.3},
                                        {-0.6, -0.3}, {0, -0.3}, {0.6, -0.3}};
   ASSERT_EQ(captures.spots_m.size(), expected.size());
@@ -150,7 +157,8 @@ TEST(ReadScene, OrdersGridRowByRowFromFirstCorner) {
 }
 
 TEST(ReadScene, ComputesPositionsAlongDriveUpToItsEnd) {
-  const LampShots captures = *read_scene_text(kSceneYaml).sets.at(2).lamps;
+  const LampShots captures = read_scene_text(kSceneYaml).sets.at(2).lamps.value();
+  ASSERT_TRUE(captures.drive);
   EXPECT_EQ(captures.drive->speed_m_per_s, 0.5);
   // 0.894 m in steps of 0.125 m.
   ASSERT_EQ(captures.spots_m.size(), 8U);
@@ -160,7 +168,7 @@ TEST(ReadScene, ComputesPositionsAlongDriveUpToItsEnd) {
                 IsNear(Vector2d(-0.3, 0) + i * step_m, kRounding));
   }
   const std::string whole_steps = scene_with("to_m: [0.5, 0.4]", "to_m: [0.7, 0]");
-  EXPECT_THAT(read_scene_text(whole_steps).sets.at(2).lamps->spots_m.back(),
+  EXPECT_THAT(read_scene_text(whole_steps).sets.at(2).lamps.value().spots_m.back(),
               IsNear(Vector2d(0.7, 0), kRounding));
 }
 
@@ -168,6 +176,7 @@ TEST(ReadScene, ReadsBoardViews) {
   const CaptureSet set = read_scene_text(kSceneYaml).sets.at(3);
   EXPECT_FALSE(set.lamps);
   EXPECT_EQ(count_shots(set), 5U);
+  ASSERT_TRUE(set.board);
   EXPECT_EQ(set.board->distance_m, std::pair(0.2, 0.4));
   EXPECT_NEAR(set.board->tilt_rad, std::numbers::pi / 4, kRounding);
   EXPECT_NEAR(set.board->roll_rad, std::numbers::pi, kRounding);

@@ -46,6 +46,7 @@ void expect_all_read(const Scene& scene, apriltag_family_t* family) {
     const BoardShot shot = make_board_shot(scene, views, index);
     const Corners found = detected(expose(scene.sensor, renderer.board_electrons(shot), 1), family);
     const auto truth = find_true_corners(scene, renderer, shot);
+    ASSERT_FALSE(truth.empty());
     EXPECT_EQ(found.size(), truth.size());
     for (const auto& [tag, corner, pixel] : truth) {
       ASSERT_TRUE(tag);
