@@ -42,6 +42,8 @@ class Module(unittest.TestCase):
         self.assertEqual(self.calibration.imager_px, [800, 600])
         self.assertEqual(self.calibration.lens_model, "LENSMODEL_OPENCV8")
         self.assertEqual(self.calibration.row_time_s, 3e-5)
+        self.assertEqual(len(self.seen["images"]), 36)
+        self.assertGreater(len(self.seen["lamps"]), 0)
         self.assertEqual(self.seen["pixels"].shape, (len(self.seen["lamps"]), 2))
 
     def test_unproject_inverts_project(self):
@@ -54,6 +56,7 @@ class Module(unittest.TestCase):
 
     def test_locate_frames_matches_ground_truth(self):
         fixes = self.located()
+        self.assertEqual(len(fixes["status"]), 36)
         self.assertTrue((fixes["status"] == 0).all())
         error = fixes["position_m"] - self.truth["position_m"]
         self.assertLess(np.abs(error).max(), 1e-3)
@@ -193,6 +196,7 @@ class Module(unittest.TestCase):
         detector = self.detector()
         image = np.array(PIL.Image.open(RENDERED / "sample/0000.png"))
         found = detector.detect(image)
+        self.assertEqual(len(found[0]), 6)
         wide = np.zeros((image.shape[0], 2 * image.shape[1]), image.dtype)
         wide[:, ::2] = image  # whose rows do not follow each other
         for given in (np.asfortranarray(image), wide[:, ::2]):
@@ -213,6 +217,7 @@ class Module(unittest.TestCase):
         fixes = self.positioner.locate_frames(frames, lamps, pixels)
         took = time.process_time() - begin
         print(f"{len(fixes['status'])} fixes in {took:.2f} s of processor time")
+        self.assertEqual(len(fixes["status"]), count * copies)
         self.assertTrue((fixes["status"] == 0).all())
         self.assertLess(took, 5)  # 1 s on a machine of its own
 
