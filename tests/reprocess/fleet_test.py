@@ -224,6 +224,7 @@ class OverTime(unittest.TestCase):
         self.assertGreater(found, 3 * FLEETS, words)
         self.assertGreaterEqual(right_kind, 0.95 * found, words)
         self.assertLessEqual(undecided, 0.25 * found, words)  # 16 % of 300 fleets
+        self.assertGreater(dated, 0, words)
         self.assertGreaterEqual(right_date, 0.95 * dated, words)
         self.assertLessEqual(false, 0.05 * FLEETS + 3 * (0.05 * FLEETS) ** 0.5, words)
 

@@ -64,7 +64,9 @@ class Overview(unittest.TestCase):
         items = items_of(vanished=["c/9"], lost_results=["c/2"])
         document = document_of(rows, items, {"vanished": 0, "mean_mm": 1})
         html = overview.page({"version": "1", "toolbox": "t"}, rows, document, items, "", "")
-        for section in re.findall(r'href="#([^"]*)"', html):
+        sections = re.findall(r'href="#([^"]*)"', html)
+        self.assertGreater(len(sections), 0)
+        for section in sections:
             self.assertIn(f'id="{section}"', html)
 
     def test_has_metrics_before_and_now_where_inputs_changed(self):
