@@ -30,6 +30,8 @@ TEST(AdjustCaptures, ReturnsExactResultWithoutNoise) {
   EXPECT_THAT(found.center.zenith_in_camera,
               IsNear(survey.truth.calibration.rotation_center->zenith_in_camera, 1e-9));
   ASSERT_TRUE(found.center.lever_arm_m);
+  ASSERT_EQ(found.refined.lamps.size(), 8U);
+  ASSERT_EQ(found.lamps.size(), 8U);
   EXPECT_THAT(*found.center.lever_arm_m, IsNear(survey.lever_arm_m, 1e-9));
   for (std::size_t i = 0; i < 8; ++i) {
     EXPECT_THAT(survey.misplaced(i, found.refined), IsNear(Eigen::Vector3d(0, 0, 0), 1e-9));
@@ -47,12 +49,14 @@ TEST(AdjustCaptures, RefinesMapWithMillimeterOrCentimeterErrors) {
     survey.add_noise(random, true, true, true);
     const AdjustmentResult found = adjust_captures(survey.input);
     ASSERT_TRUE(found.ok()) << found.undetermined;
+    ASSERT_EQ(found.refined.lamps.size(), 8U);
+    ASSERT_EQ(found.lamps.size(), 8U);
     double worst_xy_m = 0, worst_z_m = 0;
     for (std::size_t i = 0; i < 8; ++i) {
       const Eigen::Vector3d error_m = survey.misplaced(i, found.refined);
       worst_xy_m = std::max(worst_xy_m, error_m.head<2>().norm());
       worst_z_m = std::max(worst_z_m, std::abs(error_m.z()));
-      EXPECT_NEAR(*found.refined.lamps[i].sd_m, 1e-4, 1e-4);
+      EXPECT_NEAR(found.refined.lamps[i].sd_m.value(), 1e-4, 1e-4);
     }
     RecordProperty("xy_um", static_cast<int>(1e6 * worst_xy_m));
     EXPECT_LT(worst_xy_m, 2.5e-4) << sd_m;
@@ -99,6 +103,7 @@ TEST(AdjustCaptures, KeepsOtherLampsExactWhenOneMoved) {
   survey.input.lamps.lamps[4].position_m += Eigen::Vector3d(0.02, -0.02, 0);
   const AdjustmentResult found = adjust_captures(survey.input);
   ASSERT_TRUE(found.ok()) << found.undetermined;
+  ASSERT_EQ(found.refined.lamps.size(), 8U);
   EXPECT_EQ(moved_lamps(found), std::vector<int>{5});
   // Without the survey of the moved lamp, the other lamps are exact.
   for (std::size_t i = 0; i < 8; ++i) {
@@ -115,6 +120,7 @@ TEST(AdjustCaptures, ReportsMissingSecondHeight) {
   survey.turn({0, 0, 0.3}, 12);
   const AdjustmentResult found = adjust_captures(survey.input);
   ASSERT_TRUE(found.ok()) << found.undetermined;
+  ASSERT_TRUE(found.center.lever_arm_m);
   EXPECT_THAT(*found.center.lever_arm_m, IsNear(survey.lever_arm_m, 1e-6));
 }
 
@@ -177,6 +183,8 @@ TEST(AdjustCaptures, EstimatesLensOfUnknownUncertainty) {
   survey.input.calibration.intrinsics_report->covariance = make_lens_covariance(camera, 10);
   const AdjustmentResult found = adjust_captures(survey.input);
   ASSERT_TRUE(found.ok()) << found.undetermined;
+  ASSERT_TRUE(found.center.lever_arm_m);
+  ASSERT_EQ(found.lamps.size(), 8U);
   EXPECT_FALSE(found.lens_contradicted);
   EXPECT_TRUE(moved_lamps(found).empty());
   EXPECT_LT(found.residual_px, 1.1 * survey.sigma_px);
@@ -195,6 +203,7 @@ TEST(AdjustCaptures, RejectsMisidentifiedDetections) {
             survey.input.captures[7].detections[3].lamp);
   const AdjustmentResult found = adjust_captures(survey.input);
   ASSERT_TRUE(found.ok());
+  ASSERT_TRUE(found.center.lever_arm_m);
   EXPECT_EQ(found.rejected_detections, 2);
   EXPECT_THAT(*found.center.lever_arm_m, IsNear(survey.lever_arm_m, 1e-7));
 }
@@ -207,6 +216,7 @@ TEST(AdjustCaptures, ReturnsIdenticalResultWhenRepeated) {
   const AdjustmentResult once = adjust_captures(survey.input);
   const std::vector<double> elsewhere(12345);  // other addresses
   const AdjustmentResult again = adjust_captures(survey.input);
+  ASSERT_TRUE(once.ok()) << once.undetermined;
   EXPECT_EQ(once.refined_covariance, again.refined_covariance);
   EXPECT_EQ(once.center.zenith_in_camera, again.center.zenith_in_camera);
 }

@@ -168,7 +168,7 @@ class DenseAdjustment {
         const Eigen::Vector3d lamp_m = state.segment<3>(lamps_ + 3 * (detection.lamp - 1));
         const Eigen::Vector3d level = world_from_level.inverse() * (lamp_m - camera_m);
         const Eigen::Vector2d pixel =
-            *lens.project(camera_from_base * (level_from_base.inverse() * level));
+            lens.project(camera_from_base * (level_from_base.inverse() * level)).value();
         add(Eigen::Vector2d((detection.pixel - pixel) / *detection.sigma_px));
       }
       if (!capture.place || (local.on_spot && axis_counted[capture.spot])) continue;
@@ -221,6 +221,7 @@ TEST_P(AdjustCapturesReference, MatchesDenseLeastSquares) {
   ASSERT_EQ(found.rejected_detections, 0);
   ASSERT_EQ(found.noise_scale, 1);
   ASSERT_TRUE(found.center.lever_arm_m);
+  ASSERT_EQ(found.refined.lamps.size(), 8U);
   DenseAdjustment dense(survey);
   dense.solve();
 
@@ -308,8 +309,10 @@ TEST_F(AdjustmentDerivatives, LinearizeMatchesFiniteDifferences) {
     for (const std::size_t lamp : {0U, 1U}) {
       const AdjustmentProblem::Sighting sighting{
           capture, lamp, {400, 300}, 0.5, Eigen::Matrix2d::Identity() / 0.5, 0.012};
-      const auto residual = [&] { return problem.linearize(sighting, *problem.lens())->residual; };
-      const auto found = problem.linearize(sighting, *problem.lens());
+      const auto residual = [&] {
+        return problem.linearize(sighting, problem.lens().value()).value().residual;
+      };
+      const auto found = problem.linearize(sighting, problem.lens().value());
       ASSERT_TRUE(found);
       const auto expect = [&](const Eigen::MatrixXd& derivative, Eigen::Index first) {
         const Eigen::MatrixXd expected = differences(first, derivative.cols(), residual);

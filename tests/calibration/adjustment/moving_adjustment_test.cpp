@@ -39,7 +39,7 @@ AdjustmentInput tracked_drive(const BodyRig& rig, const MovingCaptures& captures
 Eigen::Vector4d compute_error(const AdjustmentResult& found, const BodyRig& rig) {
   Eigen::Vector4d error;
   error << zenith_point(found.center) - zenith_point(*rig.calibration.rotation_center),
-      *found.center.lever_arm_m - kArm_m;
+      found.center.lever_arm_m.value() - kArm_m;
   return error;
 }
 

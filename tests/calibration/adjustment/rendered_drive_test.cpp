@@ -110,13 +110,13 @@ class RenderedDriveCalibration : public testing::Test {
     if (!found.center.lever_arm_m) return {};
     return {zenith_error(found.center), zenith_sd(found.center),
             (*found.center.lever_arm_m - scene.mount.lever_arm_m).norm(),
-            std::sqrt(found.center.lever_arm_covariance->trace())};
+            std::sqrt(found.center.lever_arm_covariance.value().trace())};
   }
   double zenith_error(const RotationCenter& center) const {
     return (center.zenith_in_camera - truth.rotation_center->zenith_in_camera).norm();
   }
   double zenith_sd(const RotationCenter& center) const {
-    return std::sqrt(center.covariance->trace()) / scene.camera.focal_px().x();
+    return std::sqrt(center.covariance.value().trace()) / scene.camera.focal_px().x();
   }
   static void print(const char* what, const Found& found) {
     std::printf("%-28s zenith %.5f deg (sd %.5f), lever arm %.4f mm (sd %.4f)\n", what,

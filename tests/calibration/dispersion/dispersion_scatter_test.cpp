@@ -24,6 +24,7 @@ void expect_consistent(const Station& station, const std::vector<ReferencePointC
                        DispersionMethod method, bool stated) {
   Random random(41);
   const auto reference = fit_dispersion(exact, station.rig.map, station.believed, method);
+  ASSERT_EQ(reference.status, DispersionStatus::ok);
   Eigen::Array4d scatter = Eigen::Array4d::Zero(), reported = scatter;
   const bool world = method == DispersionMethod::camera;
   for (int i = 0; i < kStations; ++i) {
@@ -38,8 +39,10 @@ void expect_consistent(const Station& station, const std::vector<ReferencePointC
     ASSERT_EQ(fit.status, DispersionStatus::ok);
     Eigen::Array4d error = Eigen::Array4d::Zero(), variance = error;
     error.head<2>() = fit.dispersion.offset_px - reference.dispersion.offset_px;
+    ASSERT_TRUE(fit.dispersion.covariance);
     variance.head<2>() = fit.dispersion.covariance->diagonal();
     if (world) {
+      ASSERT_TRUE(fit.world_offset_m && reference.world_offset_m);
       error.tail<2>() = *fit.world_offset_m - *reference.world_offset_m;
       variance.tail<2>() = fit.world_covariance.diagonal();
     }
@@ -208,6 +211,8 @@ TEST_P(FitDispersionUncertainty, CoversErrorAtReportedRate) {
       const double square = error * error / (*covariance_px2)(axis, axis);
       squares += square / (2 * kStations);
       beyond += square > 1.96 * 1.96 ? 1 : 0;
+      ASSERT_EQ(fit.world_offset_m.has_value(), cell.method == DispersionMethod::camera);
+      ASSERT_EQ(truth.world_offset_m.has_value(), cell.method == DispersionMethod::camera);
       if (!fit.world_offset_m) continue;
       const double world_error_m = (*fit.world_offset_m)[axis] - (*truth.world_offset_m)[axis];
       world_squares += world_error_m * world_error_m / fit.world_covariance(axis, axis);

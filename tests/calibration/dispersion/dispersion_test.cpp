@@ -23,6 +23,7 @@ TEST(FitDispersion, SeparatesCameraAndWorldErrorsExactly) {
     const auto fit =
         fit_dispersion(captures, station.rig.map, station.believed, DispersionMethod::camera);
     ASSERT_EQ(fit.status, DispersionStatus::ok) << describe(fit.status);
+    ASSERT_TRUE(fit.world_offset_m);
     EXPECT_THAT(*fit.world_offset_m, IsNear(wrong_m, 1e-9));
     EXPECT_LT(fit.after.radius, 1e-9);
     EXPECT_TRUE(error_rad == 0 || fit.before.radius > 0.005);
@@ -103,6 +104,7 @@ TEST(FitDispersion, PaperMethodAttributesReferencePointErrorToCamera) {
     for (auto& capture : captures) capture.reference_point_m.x() -= 0.008;
     const auto fit =
         fit_dispersion(captures, station.rig.map, station.believed, DispersionMethod::paper);
+    ASSERT_EQ(fit.status, DispersionStatus::ok);
     EXPECT_NEAR(fit.dispersion.offset_px.x(), -sign * 520 * 0.008 / 1.6, 0.01);
   }
 }
@@ -114,6 +116,7 @@ TEST(FitDispersion, RejectsWrongFixes) {
     auto captures = method == DispersionMethod::camera ? station.captures(40, true, {0, 0})
                                                        : station.captures_at(0.5, 40);
     const auto clean = fit_dispersion(captures, station.rig.map, station.believed, method);
+    ASSERT_EQ(clean.status, DispersionStatus::ok);
     for (std::size_t i = 0; i < 40; ++i) {
       captures[i].detections = with_noise(captures[i].detections, random);
       if (i % 4 == 0)
@@ -121,6 +124,7 @@ TEST(FitDispersion, RejectsWrongFixes) {
     }
     const auto fit = fit_dispersion(captures, station.rig.map, station.believed, method);
     ASSERT_EQ(fit.status, DispersionStatus::ok);
+    ASSERT_TRUE(fit.dispersion.covariance);
     EXPECT_EQ(fit.dispersion.captures, 30);
     const Eigen::Vector2d error = fit.dispersion.offset_px - clean.dispersion.offset_px;
     EXPECT_LT(error.dot(fit.dispersion.covariance->inverse() * error), 20);

@@ -34,8 +34,8 @@ class CheckBoard : public testing::TestWithParam<bool> {
 TEST_P(CheckBoard, ReportsNoProblemForCorrectBoard) {
   EXPECT_THAT(problem(views_.board), IsEmpty());
   EXPECT_THAT(problem(views_.board, views_.lens), IsEmpty());
-  EXPECT_NEAR(*check_board(views_.board, seen_, views_.lens).pitch, 1 + views_.board.tag_spacing,
-              0.005);
+  EXPECT_NEAR(check_board(views_.board, seen_, views_.lens).pitch.value(),
+              1 + views_.board.tag_spacing, 0.005);
 }
 
 TEST_P(CheckBoard, IgnoresTagSize) {

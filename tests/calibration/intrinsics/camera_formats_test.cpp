@@ -480,6 +480,7 @@ TEST(FitLensModel, ReportsLargestDifference) {
       ++both;
       worst = std::max(worst, (*pixel - Eigen::Vector2d(u, v)).norm());
     }
+    ASSERT_GT(both, 0U);
     EXPECT_LE(worst, fitted.worst_px);
     EXPECT_GE(worst, 0.8 * fitted.worst_px);
     EXPECT_EQ(both < kPoints, fitted.common_fraction < 1);

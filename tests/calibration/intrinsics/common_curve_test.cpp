@@ -66,8 +66,9 @@ struct CodedCamera {
   }
 };
 
+/// Returns the largest distance of a corner from the truth; infinity if there are no tags.
 double worst_px(const std::vector<BoardView>& views, const std::vector<BoardView>& truth) {
-  double worst_px = 0;
+  double worst_px = -1;
   for (std::size_t i = 0; i < views.size(); ++i) {
     for (std::size_t tag = 0; tag < views[i].seen.tags.size(); ++tag) {
       for (std::size_t k = 0; k < 4; ++k) {
@@ -77,7 +78,7 @@ double worst_px(const std::vector<BoardView>& views, const std::vector<BoardView
       }
     }
   }
-  return worst_px;
+  return worst_px < 0 ? INFINITY : worst_px;
 }
 
 /// Also with more views than are used.

@@ -109,7 +109,7 @@ TEST(CornerWeights, ReducesProjectionErrorOfSolve) {
       EXPECT_TRUE(solution.ok());
       const auto difference =
           compute_projection_difference(views.lens, solution.lens(), views.imager_px, even);
-      return std::pow(difference->rms_px, 2);
+      return std::pow(difference.value().rms_px, 2);
     };
     known_px2 += square_px2();
     for (auto& view : input.views) {
@@ -147,6 +147,7 @@ TEST(CornerWeights, LimitsEffectOfCornersWithoutDeviation) {
   EXPECT_LT(with.outliers, without.outliers + unknown / 4);
   const auto apart =
       compute_projection_difference(without.lens(), with.lens(), views.imager_px, even);
+  ASSERT_TRUE(apart);
   EXPECT_LT(apart->rms_px, 0.02);
 }
 

@@ -26,15 +26,15 @@ constexpr double kReach = 0.8;
 Eigen::Vector3d fit_parabola(const Lens& lens, const Eigen::Vector2d& from,
                              const Eigen::Vector2d& to, const Eigen::Vector2d& outwards) {
   constexpr int steps = 2000;
-  const auto a = lens.unproject(from), b = lens.unproject(to);
+  const Eigen::Vector3d a = lens.unproject(from).value().direction,
+                        b = lens.unproject(to).value().direction;
   const Eigen::Vector2d length = to - from;
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
   double before = -1;
   for (int i = 1; i < steps; ++i) {
     const double share = double(i) / steps;
-    const auto pixel = lens.project((1 - share) * a->direction + share * b->direction);
-    const Eigen::Vector2d off = *pixel - from;
+    const Eigen::Vector2d off = lens.project((1 - share) * a + share * b).value() - from;
     const double w = 2 * length.dot(off) / length.squaredNorm() - 1, step = w - before;
     before = w;
     if (std::abs(w) > kReach) continue;

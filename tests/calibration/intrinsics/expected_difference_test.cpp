@@ -35,19 +35,21 @@ Scatter scatter(double bent_m) {
     const IntrinsicsSolution solution = solve_intrinsics(input);
     EXPECT_TRUE(solution.ok());
     const Lens lens = solution.lens();
-    const auto difference = compute_projection_difference(views.lens, lens, views.imager_px,
-                                                          [](const auto&) { return 1; });
+    const ProjectionDifference difference =
+        compute_projection_difference(views.lens, lens, views.imager_px, [](const auto&) {
+          return 1;
+        }).value();
     const auto noise = compute_expected_difference(
         lens, views.imager_px, ProjectionUncertainty(solution).intrinsics_covariance());
     const auto by_views =
         compute_expected_difference(lens, views.imager_px, estimate_covariance_by_views(solution));
-    sum.found += difference->rms_px * difference->rms_px / kSeeds;
+    sum.found += difference.rms_px * difference.rms_px / kSeeds;
     sum.by_noise += noise.rms_px * noise.rms_px / kSeeds;
     sum.by_views += by_views.rms_px * by_views.rms_px / kSeeds;
     sum.degrees_of_freedom += noise.degrees_of_freedom;
     const double worst_px = estimate_expected_worst_px(
         lens, views.imager_px, ProjectionUncertainty(solution).intrinsics_covariance());
-    sum.worst_found += difference->worst_px * difference->worst_px / kSeeds;
+    sum.worst_found += difference.worst_px * difference.worst_px / kSeeds;
     sum.worst_by_noise += worst_px * worst_px / kSeeds;
   }
   return sum;

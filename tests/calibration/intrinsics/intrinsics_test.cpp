@@ -11,7 +11,7 @@ namespace vlp {
 namespace {
 
 ProjectionDifference difference(const IntrinsicsSolution& solution, const SyntheticViews& views) {
-  return *compute_projection_difference(views.lens, solution.lens(), views.imager_px, even);
+  return compute_projection_difference(views.lens, solution.lens(), views.imager_px, even).value();
 }
 
 class SolveIntrinsics : public testing::TestWithParam<bool> {

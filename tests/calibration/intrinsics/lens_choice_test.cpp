@@ -39,9 +39,10 @@ Lens fisheye_lens() {
 }
 
 double find_rms(const LensChoice& choice, LensModel model) {
-  return std::find_if(choice.tried.begin(), choice.tried.end(),
-                      [model](const LensCandidate& tried) { return tried.model == model; })
-      ->rms_px;
+  const auto found =
+      std::find_if(choice.tried.begin(), choice.tried.end(),
+                   [model](const LensCandidate& tried) { return tried.model == model; });
+  return found == choice.tried.end() ? INFINITY : found->rms_px;
 }
 
 void expect_chosen(const Lens& lens) {
@@ -109,10 +110,11 @@ TEST(ChooseLens, SkipsOpencvModelsBeyondRightAngle) {
   EXPECT_EQ(choice->model, LensModel::fisheye);
   EXPECT_GT(choice->beyond_rad, 1.58);
   EXPECT_LT(choice->beyond_rad, 2);
+  ASSERT_FALSE(choice->tried.empty());
   for (const LensCandidate& tried : choice->tried) {
     EXPECT_EQ(std::isfinite(tried.rms_px), tried.model == LensModel::fisheye);
   }
-  EXPECT_EQ(choose_lens(seen_through(fisheye_lens(), 8))->beyond_rad, 0);
+  EXPECT_EQ(choose_lens(seen_through(fisheye_lens(), 8)).value().beyond_rad, 0);
 }
 
 TEST(DescribeLensChoice, ExplainsFisheyeBeyondRightAngle) {

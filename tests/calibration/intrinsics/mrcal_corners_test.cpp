@@ -36,6 +36,7 @@ TEST_P(WriteCorners, KeepsSolutionAfterRoundTrip) {
   for (int i = 0; i < count; ++i) names.push_back(std::to_string(i) + ".png");
   write_corners(folder / "corners.vnl", solution, names);
   const auto read = read_corners(folder / "corners.vnl", views.board, kImager_px);
+  ASSERT_FALSE(read.empty());
   ASSERT_EQ(read.size(), solution.views.size());
   std::size_t corners = 0;
   for (std::size_t i = 0; i < read.size(); ++i) {
@@ -46,9 +47,10 @@ TEST_P(WriteCorners, KeepsSolutionAfterRoundTrip) {
   const IntrinsicsSolution again =
       solve_intrinsics(make_input(views.board, read, LensModel::opencv8));
   ASSERT_TRUE(again.ok());
-  EXPECT_LT(
-      compute_projection_difference(solution.lens(), again.lens(), kImager_px, even)->worst_px,
-      1e-3);
+  EXPECT_LT(compute_projection_difference(solution.lens(), again.lens(), kImager_px, even)
+                .value()
+                .worst_px,
+            1e-3);
   EXPECT_NEAR(again.rms_px, solution.rms_px, 1e-5);
 }
 
@@ -106,6 +108,8 @@ TEST(ReadCorners, ComputesWeightsFromLevels) {
   EXPECT_EQ(by_level[0].seen.points[0].weight, 1);  // mrcal takes the whole part
   EXPECT_EQ(by_level[0].seen.points[1].weight, 0.5);
   const auto by_weight = read("# filename x y weight\n");
+  ASSERT_EQ(by_weight.size(), 2U);
+  ASSERT_EQ(by_weight[0].seen.points.size(), 11U);
   EXPECT_EQ(by_weight[0].seen.points[0].weight, 0.5);
   EXPECT_EQ(by_weight[0].seen.points[1].weight, 1);
 }
@@ -128,6 +132,7 @@ TEST(ReadCorners, ReturnsWrittenWeights) {
     }
     const IntrinsicsSolution solution = solve_intrinsics(input);
     ASSERT_TRUE(solution.ok());
+    ASSERT_GT(solution.corners, 0);
     const TemporaryFolder folder;
     const auto file = folder / "corners.vnl";
     const std::vector<std::string> names{"0", "1", "2", "3", "4", "5"};
@@ -172,7 +177,8 @@ TEST(CornerWeight, ScalesInfluenceOnSolve) {
     }
     const IntrinsicsSolution spoilt = solve_intrinsics(input);
     ASSERT_TRUE(spoilt.ok());
-    EXPECT_LT(compute_projection_difference(lens, spoilt.lens(), kImager_px, even)->mean_px, 0.1);
+    EXPECT_LT(compute_projection_difference(lens, spoilt.lens(), kImager_px, even).value().mean_px,
+              0.1);
   }
 }
 

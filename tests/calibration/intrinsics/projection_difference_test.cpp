@@ -11,7 +11,7 @@ namespace {
 
 TEST(ProjectionDifference, IsZeroForSameLens) {
   const Lens lens = synthetic_lens();
-  EXPECT_LT(compute_projection_difference(lens, lens, {800, 600}, even)->worst_px, 1e-6);
+  EXPECT_LT(compute_projection_difference(lens, lens, {800, 600}, even).value().worst_px, 1e-6);
 }
 
 // A displaced center is equivalent to a rotation, except for terms of second order in the angle.
@@ -19,6 +19,7 @@ TEST(ProjectionDifference, IgnoresRotation) {
   const std::array near{3000.0, 3000.0, 400.0, 300.0}, shifted{3000.0, 3000.0, 403.0, 300.0};
   const auto difference = compute_projection_difference(
       Lens(LensModel::pinhole, near), Lens(LensModel::pinhole, shifted), {800, 600}, even);
+  ASSERT_TRUE(difference);
   EXPECT_LT(difference->worst_px, 0.1);
 }
 
@@ -26,6 +27,7 @@ TEST(ProjectionDifference, IncludesFocalLength) {
   const std::array one{500.0, 500.0, 399.5, 299.5}, other{501.0, 501.0, 399.5, 299.5};
   const auto difference = compute_projection_difference(
       Lens(LensModel::pinhole, one), Lens(LensModel::pinhole, other), {800, 600}, even);
+  ASSERT_TRUE(difference);
   EXPECT_NEAR(difference->worst_px, 500.0 / 500, 0.01);  // the corner, 500 px from the center
 }
 

@@ -76,11 +76,13 @@ inline IntrinsicsInput wide_input(bool kalibr, int count, Random& random, double
 
 /// Computes the difference from wide_lens() over the pixels up to `degrees` off the axis.
 inline ProjectionDifference up_to(double degrees, const Lens& found) {
-  return *compute_projection_difference(wide_lens(), found, kWideImager, [&](const auto& pixel) {
-    const auto ray = wide_lens().unproject(pixel);
-    const double cosine = ray ? ray->direction.normalized().z() : -1;
-    return cosine > std::cos(degrees * std::numbers::pi / 180) ? 1.0 : INFINITY;
-  });
+  const auto difference =
+      compute_projection_difference(wide_lens(), found, kWideImager, [&](const auto& pixel) {
+        const auto ray = wide_lens().unproject(pixel);
+        const double cosine = ray ? ray->direction.normalized().z() : -1;
+        return cosine > std::cos(degrees * std::numbers::pi / 180) ? 1.0 : INFINITY;
+      });
+  return difference.value();
 }
 
 }  // namespace vlp

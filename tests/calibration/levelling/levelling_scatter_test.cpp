@@ -26,6 +26,7 @@ void expect_consistent(const std::vector<Frame>& exact, const SyntheticRig& rig,
   options.refine_map = refine_map;
   const auto reference = estimate_tilt_from_lamps(exact, surveyed, rig.calibration.camera, options);
   ASSERT_EQ(reference.undetermined, "");
+  ASSERT_EQ(reference.corrections.size(), refine_map ? 8 : 0);
   Matrix2 scatter = Matrix2::Zero(), reported = Matrix2::Zero();
   Eigen::ArrayXd lamp_scatter = Eigen::ArrayXd::Zero(24), lamp_reported = lamp_scatter;
   for (int i = 0; i < kDrives; ++i) {
@@ -37,6 +38,8 @@ void expect_consistent(const std::vector<Frame>& exact, const SyntheticRig& rig,
     }
     const auto result = estimate_tilt_from_lamps(frames, surveyed, rig.calibration.camera, options);
     ASSERT_EQ(result.undetermined, "");
+    ASSERT_TRUE(result.center.covariance);
+    ASSERT_EQ(result.corrections.size(), reference.corrections.size());
     const Eigen::Vector2d error = result.center.center_px - reference.center.center_px;
     scatter += error * error.transpose() / kDrives;
     reported += *result.center.covariance / kDrives;

@@ -29,17 +29,20 @@ LampMap perturb_lamps(LampMap map, double size_m, Random& random) {
 /// translation, yaw and scale.
 double compute_shape_error_m(const LampMap& found, const LampMap& truth) {
   const auto lamp = [](const LampMap& map, std::size_t i) { return map.lamps[i].position_m; };
-  const auto fit = fit_similarity(
-      truth.lamps.size(), [&](std::size_t i) { return Eigen::Vector2d(lamp(found, i).head<2>()); },
-      [&](std::size_t i) { return Eigen::Vector2d(lamp(truth, i).head<2>()); });
-  const double scale = fit->factor.norm();
+  const Similarity fit =
+      fit_similarity(
+          truth.lamps.size(),
+          [&](std::size_t i) { return Eigen::Vector2d(lamp(found, i).head<2>()); },
+          [&](std::size_t i) { return Eigen::Vector2d(lamp(truth, i).head<2>()); })
+          .value();
+  const double scale = fit.factor.norm();
   double lift_m = 0, worst_m = 0;
   for (std::size_t i = 0; i < truth.lamps.size(); ++i) {
     lift_m += (lamp(truth, i).z() - scale * lamp(found, i).z()) / double(truth.lamps.size());
   }
   for (std::size_t i = 0; i < truth.lamps.size(); ++i) {
     Eigen::Vector3d fitted;
-    fitted << fit->offset + complex_product(fit->factor, lamp(found, i).head<2>()),
+    fitted << fit.offset + complex_product(fit.factor, lamp(found, i).head<2>()),
         scale * lamp(found, i).z() + lift_m;
     worst_m = std::max(worst_m, (fitted - lamp(truth, i)).norm());
   }
@@ -99,6 +102,8 @@ TEST(EstimateTiltFromLamps, RecoversMapShapeWhenRefiningMap) {
   EXPECT_LT(angle_between(result.center.zenith_in_camera,
                           rig.calibration.rotation_center->zenith_in_camera),
             1e-8);
+  ASSERT_EQ(result.map.lamps.size(), 8);
+  ASSERT_EQ(result.corrections.size(), 8);
   EXPECT_GT(compute_shape_error_m(surveyed, rig.map), 0.003);
   EXPECT_LT(compute_shape_error_m(result.map, rig.map), 1e-8);
 
@@ -130,6 +135,7 @@ TEST(EstimateTiltFromLamps, KeepsUndetectedLampsWhenRefiningMap) {
   const auto result = estimate_tilt_from_lamps(frames, rig.map, rig.calibration.camera, options);
   ASSERT_EQ(result.undetermined, "");
   EXPECT_EQ(result.corrections.size(), 7);
+  ASSERT_EQ(result.map.lamps.size(), 8);
   EXPECT_EQ(result.map.lamps[2].position_m, rig.map.lamps[2].position_m);
 }
 
@@ -151,6 +157,7 @@ TEST(EstimateTiltFromLamps, RejectsWrongDetections) {
   EXPECT_LE(result.detections_rejected, 20);
   const Eigen::Vector2d error =
       result.center.center_px - rig.calibration.rotation_center->center_px;
+  ASSERT_TRUE(result.center.covariance);
   EXPECT_LT(error.dot(result.center.covariance->inverse() * error), 20);
   EXPECT_NEAR(result.residual_px, 0.05, 0.03);
 }

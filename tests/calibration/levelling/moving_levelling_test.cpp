@@ -74,7 +74,7 @@ double mean_chi_squared(const std::vector<KnownMotion>& stated, double sd_m_per_
     EXPECT_EQ(found.undetermined, "");
     const Eigen::Vector2d error =
         found.center.center_px - rig.calibration.rotation_center->center_px;
-    sum += error.dot(found.center.covariance->inverse() * error) / 2;
+    sum += error.dot(found.center.covariance.value().inverse() * error) / 2;
     EXPECT_LT(found.detections_rejected, 3);
     EXPECT_NEAR(found.noise_scale, 1, 0.3);
   }

@@ -74,7 +74,9 @@ TEST_F(EstimateLampDisplacements, OffsetsOfOtherLampsMatchProjector) {
   const auto q = [&](int id) -> Eigen::Vector2d {
     return lamps_.lamps[static_cast<std::size_t>(id - 1)].position_m.head<2>() - middle_m;
   };
-  for (const LampOffset& one : found()) {
+  const auto offsets = found();
+  ASSERT_EQ(offsets.size(), 8U);
+  for (const LampOffset& one : offsets) {
     if (one.lamp == 3) continue;
     const double own = 1 - 1.0 / 8 - q(one.lamp).squaredNorm() / squares;
     const Eigen::Vector2d by = Eigen::Vector2d(-1.0 / 8, 0) -
@@ -88,7 +90,9 @@ TEST_F(EstimateLampDisplacements, StandardDeviationMatchesScatter) {
   Eigen::Array2d squares(0, 0);
   for (int trial = 0; trial < trials; ++trial) {
     seed_ = 10 + static_cast<std::uint64_t>(trial);
-    for (const LampOffset& one : found(2e-4)) {
+    const auto offsets = found(2e-4);
+    ASSERT_EQ(offsets.size(), 8U);
+    for (const LampOffset& one : offsets) {
       squares += (one.offset_m.array() / one.sd_m.array()).square() / (8 * trials);
     }
   }
@@ -100,6 +104,7 @@ TEST_F(EstimateLampDisplacements, RejectsMisidentifiedLamps) {
   const auto right = found(1e-4);
   misidentified_ = true;
   const auto offsets = found(1e-4);
+  ASSERT_EQ(right.size(), 8U);
   ASSERT_EQ(offsets.size(), right.size());
   int captures = 0;
   for (std::size_t i = 0; i < offsets.size(); ++i) {

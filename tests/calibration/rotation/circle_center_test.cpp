@@ -183,6 +183,8 @@ TEST(FitCircleCenters, IgnoresHeightWithTwoOppositeYaws) {
     ASSERT_TRUE(expected.mean.converged);
     ASSERT_TRUE(found.mean.converged);
     EXPECT_THAT(found.mean.center.center_px, IsNear(expected.mean.center.center_px, 1e-9));
+    ASSERT_FALSE(expected.circles.empty());
+    ASSERT_FALSE(expected.mean.used_observations.empty());
     EXPECT_EQ(found.circles.size(), expected.circles.size());
     EXPECT_EQ(found.mean.used_observations, expected.mean.used_observations);
     EXPECT_GT(found.undetermined, 0);

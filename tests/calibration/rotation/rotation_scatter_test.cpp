@@ -57,6 +57,7 @@ void expect_consistent(const RotationScene& scene, Method method, bool unbiased)
   PlanarScatter scatter(method(exact, scene.camera).center.center_px);
   for (int i = 0; i < kDraws; ++i) {
     const RotationFit fit = draw_fit(scene, frames, method, random);
+    ASSERT_TRUE(fit.center.covariance);
     scatter.add(fit.center.center_px, *fit.center.covariance);
   }
   expect_consistent(scatter);
@@ -127,7 +128,8 @@ TEST_P(FitRotationAxisWithMapErrors, ReportsConsistentCovariances) {
         find_rotation_captures(with_noise(frames, random), surveyed, scene.camera);
     ASSERT_EQ(rotation.status, RotationStatus::ok);
     const RotationFit fit = fit_rotation_axis(rotation, scene.camera);
-    ASSERT_TRUE(fit.converged && fit.center.covariance && fit.center.lever_arm_covariance);
+    ASSERT_TRUE(fit.converged && fit.center.covariance);
+    ASSERT_TRUE(fit.center.lever_arm_m && fit.center.lever_arm_covariance);
     for (int axis = 0; axis < 2; ++axis) {
       const double zenith_px = fit.center.center_px[axis] - scene.truth().center_px[axis];
       const double arm_m = (*fit.center.lever_arm_m)[axis] - scene.lever_arm_m[axis];
@@ -288,7 +290,8 @@ TEST(FitRotationAxis, CovariancesMatchScatterForTwoHeights) {
   PlanarScatter center(scene.truth().center_px), lever_arm(scene.lever_arm_m);
   for (int i = 0; i < kDraws; ++i) {
     const RotationFit fit = draw_fit(scene, frames, fit_rotation_axis, random);
-    ASSERT_TRUE(fit.center.lever_arm_covariance);
+    ASSERT_TRUE(fit.center.covariance);
+    ASSERT_TRUE(fit.center.lever_arm_m && fit.center.lever_arm_covariance);
     center.add(fit.center.center_px, *fit.center.covariance);
     lever_arm.add(*fit.center.lever_arm_m, *fit.center.lever_arm_covariance);
   }

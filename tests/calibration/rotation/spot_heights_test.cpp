@@ -41,6 +41,7 @@ TEST(FindRotationCaptures, SeparatesHeightsTenCentimetersApart) {
     const RotationFit found = fit_rotation_axis(rotation, scene.camera);
     ASSERT_TRUE(found.converged && found.center.covariance);
     const auto sd_rad = axis_sd_rad(found.center, scene.camera);
+    ASSERT_TRUE(sd_rad);
     EXPECT_LT(*sd_rad, rad_from_deg(0.1));
     // For 20 draws of a planar normal distribution, none exceeds five standard deviations.
     EXPECT_LT(angle_between(found.center.zenith_in_camera, scene.truth().zenith_in_camera),
