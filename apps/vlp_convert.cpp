@@ -9,12 +9,12 @@
 
 #include "calibration/intrinsics/camera_exports.h"
 #include "calibration/intrinsics/camera_imports.h"
-#include "calibration/intrinsics/known_region.h"
+#include "calibration/intrinsics/valid_region.h"
 #include "captures/printable.h"
 #include "program/app.h"
 #include "program/steps/history.h"
+#include "rig/calibration_builder.h"
 #include "rig/file.h"
-#include "rig/stage.h"
 
 namespace vlp {
 namespace {

@@ -9,7 +9,7 @@
 #include "program/app.h"
 #include "program/steps/capture_options.h"
 #include "program/steps/rotation_by_lamps.h"
-#include "program/steps/rotation_on_spot.h"
+#include "program/steps/rotation_in_place.h"
 
 namespace vlp {
 namespace {

@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "calibration/intrinsics/board_check.h"
-#include "calibration/intrinsics/corner_blunders.h"
+#include "calibration/intrinsics/corner_outliers.h"
 #include "calibration/intrinsics/mrcal_files.h"
 #include "detection/boards/corner_table.h"
 #include "detection/boards/other_tags.h"

@@ -5,7 +5,7 @@
 #include <mutex>
 #include <opencv2/core/utility.hpp>
 
-#include "captures/in_parallel.h"
+#include "captures/parallel_for.h"
 
 namespace vlp {
 

@@ -3,7 +3,7 @@
 #include "positioning/error_budget.h"
 
 #include "geometry/symmetric.h"
-#include "positioning/body_limit.h"
+#include "positioning/pose_bound.h"
 #include "positioning/sighting.h"
 
 namespace vlp {

@@ -9,7 +9,7 @@
 #include "../camera/lens.h"
 #include "../geometry/frames.h"
 #include "../geometry/types.h"
-#include "body_fix.h"
+#include "pose_estimation.h"
 #include "row_clock.h"
 
 namespace vlp {

@@ -64,7 +64,7 @@ struct Fix {
   FixStatus status = FixStatus::too_few_lamps;
   /// Pose of the camera, or of the robot's center if there is a CameraMount. The covariance of (X,
   /// Y, Z, yaw) includes all known errors: noise_covariance, and the errors of calibration and lamp
-  /// map as far as they are reported (common_errors.h).
+  /// map as far as they are reported (correlated_errors.h).
   PoseEstimate estimate;
   /// Part of the covariance due to pixel noise and inclination, and, for one lamp, height, yaw and
   /// motion. It averages out over frames as far as these errors are independent between frames.

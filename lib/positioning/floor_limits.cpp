@@ -7,8 +7,8 @@
 #include <stdexcept>
 
 #include "camera/lens.h"
-#include "positioning/body_limit.h"
 #include "positioning/lamps_in_view.h"
+#include "positioning/pose_bound.h"
 
 namespace vlp {
 namespace {

@@ -13,12 +13,12 @@
 
 #include "camera/lens.h"
 #include "geometry/plane.h"
-#include "positioning/body_frame.h"
 #include "positioning/camera_mount.h"
-#include "positioning/common_errors.h"
+#include "positioning/correlated_errors.h"
 #include "positioning/known_motion.h"
 #include "positioning/one_lamp_fix.h"
-#include "positioning/robust_fix.h"
+#include "positioning/outlier_rejection.h"
+#include "positioning/pose_observations.h"
 #include "positioning/row_clock.h"
 #include "positioning/sighting.h"
 

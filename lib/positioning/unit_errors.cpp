@@ -6,9 +6,9 @@
 #include <Eigen/LU>
 
 #include "geometry/symmetric.h"
-#include "positioning/body_limit.h"
 #include "positioning/correction.h"
 #include "positioning/lamps_in_view.h"
+#include "positioning/pose_bound.h"
 
 namespace vlp {
 

@@ -14,8 +14,8 @@
 #include "../geometry/types.h"
 #include "../rig/calibration.h"
 #include "../rig/lamp_map.h"
-#include "body_fix.h"
-#include "common_errors.h"
+#include "correlated_errors.h"
+#include "pose_estimation.h"
 
 namespace vlp {
 

@@ -10,13 +10,13 @@
 #include <stdexcept>
 #include <utility>
 
+#include "calibration/rotation/rotation_captures.h"
 #include "calibration/rotation/rotation_fit.h"
-#include "calibration/rotation/spot_captures.h"
 #include "geometry/angles.h"
 #include "positioning/known_motion.h"
+#include "rig/calibration_builder.h"
 #include "rig/calibration_error.h"
 #include "rig/input_error.h"
-#include "rig/stage.h"
 #include "session/capture_motion.h"
 #include "session/rotation_step.h"
 

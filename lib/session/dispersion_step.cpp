@@ -9,12 +9,12 @@
 #include <functional>
 #include <utility>
 
-#include "calibration/passed_on.h"
+#include "calibration/error_propagation.h"
 #include "geometry/frames.h"
 #include "positioning/positioner.h"
 #include "report/plots/calibration_plots.h"
+#include "rig/calibration_builder.h"
 #include "rig/calibration_error.h"
-#include "rig/stage.h"
 
 namespace vlp {
 

@@ -12,7 +12,7 @@
 #include "calibration/intrinsics/board_check.h"
 #include "geometry/angles.h"
 #include "report/plots/calibration_plots.h"
-#include "rig/stage.h"
+#include "rig/calibration_builder.h"
 #include "session/skipped_images.h"
 
 namespace vlp {

@@ -9,14 +9,14 @@
 #include <functional>
 #include <utility>
 
-#include "calibration/passed_on.h"
+#include "calibration/error_propagation.h"
 #include "calibration/rotation/joint_center.h"
-#include "calibration/rotation/turning_axis.h"
+#include "calibration/rotation/rotation_axis.h"
 #include "geometry/angles.h"
 #include "positioning/known_motion.h"
 #include "report/plots/calibration_plots.h"
+#include "rig/calibration_builder.h"
 #include "rig/calibration_error.h"
-#include "rig/stage.h"
 #include "session/capture_motion.h"
 
 namespace vlp {

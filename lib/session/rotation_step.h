@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "calibration/levelling/levelling.h"
 #include "calibration/map/map_errors.h"
 #include "calibration/rotation/circle_center.h"
+#include "calibration/tilt/tilt_calibration.h"
 #include "session/lamp_captures.h"
 #include "session/step_result.h"
 

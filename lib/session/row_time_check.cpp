@@ -6,7 +6,7 @@
 
 #include <cmath>
 
-#include "lamps/signal/lamp_rule.h"
+#include "lamps/signal/frequency_identification.h"
 #include "session/row_time_step.h"
 
 namespace vlp {

@@ -40,9 +40,9 @@ std::string compare_row_times(const RowTime& measured, const GivenRowTime& given
 ///
 ///     |log(measured / stated)| > kLampDrift + 3 sd / measured.
 ///
-/// A lamp may deviate from its frequency by kLampDrift (lamp_rule.h). The mean of several lamps
-/// then deviates by at most kLampDrift, whether their deviations are independent or common. The
-/// second term covers the measurement, and lamps that deviate by more.
+/// A lamp may deviate from its frequency by kLampDrift (frequency_identification.h). The mean of
+/// several lamps then deviates by at most kLampDrift, whether their deviations are independent or
+/// common. The second term covers the measurement, and lamps that deviate by more.
 RowTimeCheck check_row_time(const std::vector<Observation>& images, const LampMap& lamps,
                             const GivenRowTime& given);
 

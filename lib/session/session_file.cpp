@@ -6,11 +6,11 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "calibration/passed_on.h"
+#include "calibration/error_propagation.h"
 #include "calibration/rotation/rotation_fit.h"
 #include "evaluation/junit.h"
 #include "geometry/angles.h"
-#include "positioning/common_errors.h"
+#include "positioning/correlated_errors.h"
 #include "rig/calibration_error.h"
 #include "session/step_file.h"
 

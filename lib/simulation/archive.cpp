@@ -7,7 +7,7 @@
 #include <stdexcept>
 
 #include "captures/csv_writer.h"
-#include "captures/in_parallel.h"
+#include "captures/parallel_for.h"
 #include "rig/input_error.h"
 
 namespace vlp {

@@ -7,7 +7,7 @@
 #include <regex>
 #include <stdexcept>
 
-#include "captures/in_parallel.h"
+#include "captures/parallel_for.h"
 #include "rig/file.h"
 #include "rig/input_error.h"
 #include "simulation/exposure.h"

@@ -16,7 +16,7 @@
 #include <thread>
 
 #include "calibration/intrinsics/projection_difference.h"
-#include "captures/in_parallel.h"
+#include "captures/parallel_for.h"
 #include "geometry/median.h"
 #include "geometry/polygon.h"
 #include "session/lens_step.h"

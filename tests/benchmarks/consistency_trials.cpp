@@ -27,7 +27,7 @@
 #include <string_view>
 #include <vector>
 
-#include "calibration/levelling/drive.h"
+#include "calibration/tilt/drive.h"
 #include "geometry/angles.h"
 #include "geometry/frames.h"
 #include "rig/calibration_error.h"

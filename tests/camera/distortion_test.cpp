@@ -8,7 +8,7 @@
 #include <cmath>
 
 #include "camera/random_lens.h"
-#include "support/near.h"
+#include "support/matchers.h"
 #include "support/random.h"
 
 namespace vlp {

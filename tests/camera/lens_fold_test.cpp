@@ -9,7 +9,7 @@
 
 #include "camera/distortion.h"
 #include "camera/random_lens.h"
-#include "support/near.h"
+#include "support/matchers.h"
 
 namespace vlp {
 namespace {

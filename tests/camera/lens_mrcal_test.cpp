@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "camera/random_lens.h"
-#include "support/near.h"
+#include "support/matchers.h"
 
 namespace vlp {
 namespace {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "camera/lens.h"
-#include "support/near.h"
+#include "support/matchers.h"
 
 namespace vlp {
 namespace {

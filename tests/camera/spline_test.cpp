@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "camera/random_lens.h"
-#include "support/near.h"
+#include "support/matchers.h"
 
 namespace vlp {
 namespace {

@@ -4,7 +4,7 @@
 
 #include "captures/csv_reader.h"
 #include "captures/csv_writer.h"
-#include "support/refused.h"
+#include "support/rejection_message.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {

@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "support/refused.h"
+#include "support/rejection_message.h"
 
 namespace vlp {
 namespace {

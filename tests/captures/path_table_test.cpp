@@ -5,7 +5,7 @@
 #include <gmock/gmock.h>
 
 #include "support/random.h"
-#include "support/refused.h"
+#include "support/rejection_message.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {

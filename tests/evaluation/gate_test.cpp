@@ -11,7 +11,7 @@
 #include "evaluation/evaluation_metrics.h"
 #include "evaluation/junit.h"
 #include "support/random.h"
-#include "support/refused.h"
+#include "support/rejection_message.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {

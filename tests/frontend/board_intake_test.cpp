@@ -11,7 +11,7 @@
 #include "frontend/image_file.h"
 #include "frontend/image_folder.h"
 #include "support/datasets.h"
-#include "support/refused.h"
+#include "support/rejection_message.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {

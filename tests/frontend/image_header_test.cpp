@@ -8,7 +8,7 @@
 
 #include "frontend/image_file.h"
 #include "rig/input_error.h"
-#include "support/refused.h"
+#include "support/rejection_message.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {

@@ -8,7 +8,7 @@
 #include <stdexcept>
 
 #include "support/datasets.h"
-#include "support/refused.h"
+#include "support/rejection_message.h"
 
 namespace vlp {
 namespace {

@@ -13,7 +13,7 @@
 #include "frontend/lamp_intake.h"
 #include "rig/lamp_map.h"
 #include "support/datasets.h"
-#include "support/refused.h"
+#include "support/rejection_message.h"
 #include "support/temporary_folder.h"
 #include "support/write_video.h"
 

@@ -9,7 +9,7 @@
 #include <numbers>
 
 #include "geometry/arc.h"
-#include "support/near.h"
+#include "support/matchers.h"
 
 namespace vlp {
 namespace {

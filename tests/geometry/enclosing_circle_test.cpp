@@ -6,7 +6,7 @@
 
 #include <vector>
 
-#include "support/near.h"
+#include "support/matchers.h"
 #include "support/random.h"
 
 namespace vlp {

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "support/near.h"
+#include "support/matchers.h"
 #include "support/random.h"
 
 namespace vlp {

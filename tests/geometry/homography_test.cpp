@@ -8,7 +8,7 @@
 #include <Eigen/LU>
 #include <vector>
 
-#include "support/near.h"
+#include "support/matchers.h"
 #include "support/random.h"
 
 namespace vlp {

@@ -7,7 +7,7 @@
 #include <Eigen/Core>
 #include <Eigen/LU>
 
-#include "support/near.h"
+#include "support/matchers.h"
 #include "support/random.h"
 
 namespace vlp {

@@ -6,7 +6,7 @@
 
 #include <complex>
 
-#include "support/near.h"
+#include "support/matchers.h"
 #include "support/random.h"
 
 namespace vlp {

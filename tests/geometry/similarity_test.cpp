@@ -7,7 +7,7 @@
 #include <Eigen/LU>
 
 #include "geometry/similarity_fit.h"
-#include "support/near.h"
+#include "support/matchers.h"
 
 namespace vlp {
 namespace {

@@ -7,7 +7,7 @@
 #include <Eigen/LU>
 #include <limits>
 
-#include "support/near.h"
+#include "support/matchers.h"
 
 namespace vlp {
 namespace {

@@ -26,7 +26,7 @@
 #include "station/records/unit_report.h"
 #include "support/program.h"
 #include "support/random.h"
-#include "support/refused.h"
+#include "support/rejection_message.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {

@@ -7,7 +7,7 @@
 
 #include "captures/csv_reader.h"
 #include "positioning/stated_rig.h"
-#include "rig/stage.h"
+#include "rig/calibration_builder.h"
 #include "support/program.h"
 #include "support/synthetic_rig.h"
 #include "support/temporary_folder.h"

@@ -8,7 +8,7 @@
 
 #include "geometry/angles.h"
 #include "rotation_program.h"
-#include "support/near.h"
+#include "support/matchers.h"
 
 namespace vlp {
 namespace {

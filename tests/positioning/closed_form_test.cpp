@@ -6,7 +6,7 @@
 #include "positioning/initial_pose.h"
 #include "positioning/one_lamp_fix.h"
 #include "positioning/two_lamp_fix.h"
-#include "support/near.h"
+#include "support/matchers.h"
 #include "support/random.h"
 
 namespace vlp {

@@ -7,7 +7,7 @@
 #include <Eigen/Geometry>
 #include <stdexcept>
 
-#include "support/near.h"
+#include "support/matchers.h"
 #include "support/synthetic_rig.h"
 
 namespace vlp {

@@ -8,7 +8,7 @@
 
 #include "positioning/positioner.h"
 #include "support/body_rig.h"
-#include "support/near.h"
+#include "support/matchers.h"
 #include "support/scatter.h"
 #include "support/synthetic_rig.h"
 

@@ -6,7 +6,7 @@
 #include "camera/lens.h"
 #include "geometry/angles.h"
 #include "positioning/positioner.h"
-#include "support/near.h"
+#include "support/matchers.h"
 #include "support/synthetic_rig.h"
 
 namespace vlp {

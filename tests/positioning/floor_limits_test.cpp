@@ -8,7 +8,7 @@
 #include <stdexcept>
 
 #include "positioning/positioner.h"
-#include "support/near.h"
+#include "support/matchers.h"
 #include "support/random.h"
 #include "support/scatter.h"
 #include "support/synthetic_rig.h"

@@ -7,7 +7,7 @@
 
 #include "positioning/floor_limits.h"
 #include "positioning/positioner.h"
-#include "support/near.h"
+#include "support/matchers.h"
 #include "support/synthetic_rig.h"
 
 namespace vlp {

@@ -15,8 +15,8 @@
 #include "positioning/positioner.h"
 #include "positioning/stated_rig.h"
 #include "rig/calibration_error.h"
-#include "support/judged.h"
-#include "support/near.h"
+#include "support/matchers.h"
+#include "support/station_verdicts.h"
 
 namespace vlp {
 namespace {

@@ -11,7 +11,7 @@
 #include <CLI/CLI.hpp>
 
 #include "rig/input_error.h"
-#include "support/refused.h"
+#include "support/rejection_message.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {

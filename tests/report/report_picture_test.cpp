@@ -6,7 +6,7 @@
 
 #include "report/plots/dispersion_plot.h"
 #include "report/plots/rotation_plot.h"
-#include "support/refused.h"
+#include "support/rejection_message.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {

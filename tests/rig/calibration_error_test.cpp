@@ -6,7 +6,7 @@
 
 #include <Eigen/Geometry>
 
-#include "support/near.h"
+#include "support/matchers.h"
 
 namespace vlp {
 namespace {

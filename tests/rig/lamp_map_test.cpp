@@ -10,7 +10,7 @@
 
 #include "rig/find_lamp.h"
 #include "rig/samples.h"
-#include "support/refused.h"
+#include "support/rejection_message.h"
 
 namespace vlp {
 namespace {

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "rig/samples.h"
-#include "support/near.h"
+#include "support/matchers.h"
 
 // The formats are shared with the people who took the real captures.
 namespace vlp {

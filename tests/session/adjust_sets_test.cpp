@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "session/adjust_step.h"
-#include "support/refused.h"
+#include "support/rejection_message.h"
 
 namespace vlp {
 namespace {

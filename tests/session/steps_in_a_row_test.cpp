@@ -9,11 +9,11 @@
 #include <cstdio>
 
 #include "calibration/adjustment/survey.h"
-#include "positioning/common_errors.h"
+#include "positioning/correlated_errors.h"
 #include "rig/calibration_error.h"
 #include "session/dispersion_step.h"
 #include "session/rotation_step.h"
-#include "support/judged.h"
+#include "support/station_verdicts.h"
 
 namespace vlp {
 namespace {

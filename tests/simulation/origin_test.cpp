@@ -5,7 +5,7 @@
 
 #include "simulation/board_pdf.h"
 #include "simulation/simulate.h"
-#include "support/refused.h"
+#include "support/rejection_message.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {

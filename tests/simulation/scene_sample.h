@@ -5,7 +5,7 @@
 #include <string>
 
 #include "simulation/scene.h"
-#include "support/refused.h"
+#include "support/rejection_message.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {

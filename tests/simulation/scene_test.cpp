@@ -7,7 +7,7 @@
 #include "geometry/angles.h"
 #include "simulation/scene_sample.h"
 #include "simulation/shot.h"
-#include "support/near.h"
+#include "support/matchers.h"
 
 namespace vlp {
 namespace {

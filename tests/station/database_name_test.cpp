@@ -9,7 +9,7 @@
 #include <cstdlib>
 #include <string>
 
-#include "support/refused.h"
+#include "support/rejection_message.h"
 
 namespace vlp {
 namespace {

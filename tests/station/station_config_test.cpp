@@ -7,7 +7,7 @@
 #include <regex>
 
 #include "support/datasets.h"
-#include "support/refused.h"
+#include "support/rejection_message.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {

@@ -8,7 +8,7 @@
 
 #include "camera/lens.h"
 #include "geometry/angles.h"
-#include "positioning/body_fix.h"
+#include "positioning/pose_estimation.h"
 #include "positioning/positioner.h"
 #include "support/random.h"
 #include "support/synthetic_rig.h"

@@ -20,7 +20,7 @@
 #include "geometry/statistical_bounds.h"
 #include "geometry/symmetric.h"
 #include "positioning/inclination_rotation.h"
-#include "positioning/robust_fix.h"
+#include "positioning/outlier_rejection.h"
 #include "positioning/row_clock.h"
 #include "rig/calibration_error.h"
 #include "rig/find_lamp.h"

@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "calibration/dispersion/station_fixes.h"
+#include "calibration/dispersion/reference_point_fixes.h"
 
 namespace vlp {
 

@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "calibration/intrinsics/intrinsics.h"
-#include "calibration/intrinsics/known_region.h"
+#include "calibration/intrinsics/valid_region.h"
 
 namespace vlp {
 

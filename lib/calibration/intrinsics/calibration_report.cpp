@@ -9,8 +9,8 @@
 
 #include <Eigen/Geometry>
 
-#include "calibration/intrinsics/edge_bow.h"
-#include "calibration/intrinsics/edge_shift.h"
+#include "calibration/intrinsics/edge_curvature.h"
+#include "calibration/intrinsics/edge_displacement.h"
 #include "calibration/intrinsics/expected_difference.h"
 #include "calibration/intrinsics/image_coverage.h"
 #include "calibration/intrinsics/projection_uncertainty.h"

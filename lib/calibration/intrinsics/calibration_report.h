@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "calibration/intrinsics/intrinsics.h"
-#include "calibration/intrinsics/known_region.h"
 #include "calibration/intrinsics/projection_difference.h"
+#include "calibration/intrinsics/valid_region.h"
 #include "rig/calibration.h"
 
 namespace vlp {

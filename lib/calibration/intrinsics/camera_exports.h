@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "calibration/intrinsics/known_region.h"
+#include "calibration/intrinsics/valid_region.h"
 #include "rig/calibration.h"
 
 namespace vlp {

@@ -5,7 +5,7 @@
 #include <Eigen/Core>
 #include <array>
 
-#include "calibration/intrinsics/known_region.h"
+#include "calibration/intrinsics/valid_region.h"
 #include "camera/lens.h"
 
 namespace vlp {

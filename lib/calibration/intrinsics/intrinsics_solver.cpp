@@ -12,8 +12,8 @@
 #include <Eigen/Geometry>
 
 #include "calibration/intrinsics/corner_variance.h"
-#include "calibration/intrinsics/edge_bow.h"
-#include "calibration/intrinsics/edge_shift.h"
+#include "calibration/intrinsics/edge_curvature.h"
+#include "calibration/intrinsics/edge_displacement.h"
 #include "calibration/intrinsics/projection_difference.h"
 #include "calibration/intrinsics/rotation_vector.h"
 #include "calibration/intrinsics/spline_fit.h"

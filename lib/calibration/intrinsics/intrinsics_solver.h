@@ -6,9 +6,9 @@
 #include <utility>
 #include <vector>
 
-#include "calibration/intrinsics/edge_shift.h"
+#include "calibration/intrinsics/edge_displacement.h"
+#include "calibration/intrinsics/initial_board_poses.h"
 #include "calibration/intrinsics/intrinsics.h"
-#include "calibration/intrinsics/pose_seeds.h"
 
 namespace vlp {
 

@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "calibration/intrinsics/calibration_report.h"
-#include "calibration/intrinsics/pose_seeds.h"
+#include "calibration/intrinsics/initial_board_poses.h"
 #include "geometry/angles.h"
 #include "geometry/median.h"
 

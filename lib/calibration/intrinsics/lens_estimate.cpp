@@ -12,11 +12,11 @@
 
 #include "calibration/intrinsics/board_check.h"
 #include "calibration/intrinsics/board_print.h"
-#include "calibration/intrinsics/common_curve.h"
 #include "calibration/intrinsics/inconsistent_views.h"
 #include "calibration/intrinsics/projection_difference.h"
 #include "calibration/intrinsics/projection_uncertainty.h"
 #include "calibration/intrinsics/spline_fit.h"
+#include "calibration/intrinsics/tone_curve_estimation.h"
 #include "camera/spline_surface.h"
 #include "geometry/angles.h"
 #include "geometry/median.h"

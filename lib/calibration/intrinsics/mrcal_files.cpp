@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "calibration/intrinsics/camera_exports.h"
-#include "calibration/intrinsics/known_region.h"
 #include "calibration/intrinsics/numpy_archive.h"
+#include "calibration/intrinsics/valid_region.h"
 #include "captures/number_text.h"
 #include "rig/file.h"
 #include "rig/yaml_text.h"

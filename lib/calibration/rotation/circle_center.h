@@ -6,8 +6,8 @@
 #include <cstddef>
 #include <vector>
 
+#include "calibration/rotation/rotation_captures.h"
 #include "calibration/rotation/rotation_fit.h"
-#include "calibration/rotation/spot_captures.h"
 #include "geometry/circle_fit.h"
 
 namespace vlp {

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "calibration/rotation/robust_fit.h"
+#include "calibration/rotation/rotation_captures.h"
 #include "calibration/rotation/rotation_fit.h"
-#include "calibration/rotation/spot_captures.h"
 
 namespace vlp {
 

@@ -7,7 +7,7 @@
 
 #include "calibration/rotation/fit_parts.h"
 #include "calibration/rotation/robust_fit.h"
-#include "calibration/rotation/spot_residual.h"
+#include "calibration/rotation/rotation_residual.h"
 
 namespace vlp {
 namespace {

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "calibration/rotation/rotation_captures.h"
 #include "calibration/rotation/rotation_fit.h"
-#include "calibration/rotation/spot_captures.h"
 
 namespace vlp {
 

@@ -9,7 +9,7 @@
 #include <numeric>
 #include <vector>
 
-#include "captures/in_parallel.h"
+#include "captures/parallel_for.h"
 #include "evaluation/errors/split_mix.h"
 
 namespace vlp {

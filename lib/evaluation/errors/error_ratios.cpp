@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "camera/lens.h"
-#include "captures/in_parallel.h"
+#include "captures/parallel_for.h"
 #include "positioning/error_budget.h"
 #include "positioning/floor_limits.h"
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "captures/name_index.h"
-#include "evaluation/errors/stations.h"
+#include "evaluation/errors/reference_points.h"
 #include "geometry/angles.h"
 #include "rig/input_error.h"
 

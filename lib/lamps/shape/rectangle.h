@@ -9,7 +9,7 @@
 #include "lamps/image/background.h"
 #include "lamps/image/image_view.h"
 #include "lamps/image/pixel_box.h"
-#include "lamps/image/runs.h"
+#include "lamps/image/pixel_runs.h"
 #include "lamps/shape/light.h"
 #include "lamps/shape/light_shape.h"
 

@@ -6,7 +6,7 @@
 
 #include "lamps/image/background.h"
 #include "lamps/image/image_view.h"
-#include "lamps/image/runs.h"
+#include "lamps/image/pixel_runs.h"
 
 namespace vlp {
 

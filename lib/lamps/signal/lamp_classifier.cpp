@@ -11,7 +11,7 @@
 #include <Eigen/Cholesky>
 
 #include "geometry/symmetric.h"
-#include "lamps/signal/lamp_rule.h"
+#include "lamps/signal/frequency_identification.h"
 #include "rig/file.h"
 #include "rig/yaml_reader.h"
 #include "rig/yaml_writer.h"

@@ -8,7 +8,7 @@
 #include <numbers>
 #include <set>
 
-#include "lamps/signal/lamp_rule.h"
+#include "lamps/signal/frequency_identification.h"
 #include "lamps/signal/stripes.h"
 
 namespace vlp {

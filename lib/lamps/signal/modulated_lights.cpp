@@ -9,7 +9,7 @@
 #include <numbers>
 #include <utility>
 
-#include "lamps/signal/lamp_rule.h"
+#include "lamps/signal/frequency_identification.h"
 #include "lamps/signal/stripes.h"
 
 namespace vlp {

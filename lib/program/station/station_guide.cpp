@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "station/records/golden_due.h"
+#include "station/records/golden_unit_schedule.h"
 #include "station/unit/station_screen.h"
 
 namespace vlp {

@@ -25,7 +25,7 @@
 #include "station/records/publish_run.h"
 #include "station/records/retention.h"
 #include "station/statistics/control_chart.h"
-#include "station/statistics/run_figures.h"
+#include "station/statistics/run_metrics.h"
 #include "station/unit/station_screen.h"
 
 namespace vlp {

@@ -16,7 +16,7 @@
 #include "program/app.h"
 #include "program/station/station_guide.h"
 #include "rig/input_error.h"
-#include "station/records/golden_due.h"
+#include "station/records/golden_unit_schedule.h"
 #include "station/records/hook.h"
 #include "station/records/publish_run.h"
 #include "station/records/run_hooks.h"

@@ -22,7 +22,7 @@
 #include "program/app.h"
 #include "program/station/terminal.h"
 #include "rig/input_error.h"
-#include "station/records/golden_due.h"
+#include "station/records/golden_unit_schedule.h"
 
 namespace vlp {
 namespace {

@@ -19,8 +19,9 @@ namespace vlp {
 /// and options of the display.
 std::span<const std::string_view> options_without_history();
 
-/// Makes the history entry of a part of a calibration, without the name of the part (rig/stage.h).
-/// Holds program and version, the given options in the order of --help, and a digest of each input.
+/// Makes the history entry of a part of a calibration, without the name of the part
+/// (rig/calibration_builder.h). Holds program and version, the given options in the order of
+/// --help, and a digest of each input.
 ///
 /// The entry is the same on every machine: paths are reduced to their last component, and
 /// options_without_history() are omitted.

@@ -10,7 +10,7 @@
 
 #include "captures/digest.h"
 #include "captures/number_text.h"
-#include "positioning/common_errors.h"
+#include "positioning/correlated_errors.h"
 #include "report/calibration_sections.h"
 #include "report/html.h"
 #include "rig/calibration_error.h"

@@ -14,7 +14,7 @@
 #include "captures/printable.h"
 #include "rig/input_error.h"
 #include "station/database_name.h"
-#include "station/records/golden_due.h"
+#include "station/records/golden_unit_schedule.h"
 #include "station/records/hook.h"
 #include "station/records/publish_run.h"
 #include "station/records/run_hooks.h"

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "station/records/audit_trail.h"
 #include "station/records/run_record.h"
-#include "station/records/trail.h"
 
 namespace vlp {
 namespace {

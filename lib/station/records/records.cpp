@@ -22,7 +22,7 @@
 #include "rig/input_error.h"
 #include "station/database_name.h"
 #include "station/records/record_tables.h"
-#include "station/records/run_rows.h"
+#include "station/records/run_storage.h"
 
 namespace vlp {
 namespace {

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "rig/input_error.h"
+#include "station/records/audit_trail.h"
 #include "station/records/run_record.h"
-#include "station/records/trail.h"
 
 namespace vlp {
 
@@ -74,8 +74,8 @@ class RecordsRefused : public RecordsOffline {
 ///
 /// Missing tables are created and tables of earlier versions migrated; later versions are an error.
 /// Any number of programs may use a database at the same time. Each run is written in one
-/// transaction, together with its entries in the trail (trail.h). A transaction waits for those of
-/// other programs. Committed data is on the disk. A lost connection is opened again.
+/// transaction, together with its entries in the trail (audit_trail.h). A transaction waits for
+/// those of other programs. Committed data is on the disk. A lost connection is opened again.
 ///
 /// All functions throw InputError that names the database, without passwords. The error is
 /// RecordsOffline if
@@ -116,8 +116,8 @@ class Records {
   std::vector<RunSummary> list(const RunFilter& filter);
   /// Returns the values of a metric in the runs that match the filter, without voided runs.
   std::vector<TrendPoint> trend(const std::string& metric, const RunFilter& filter);
-  /// Checks by the trail (trail.h) that the records are unchanged. `expected_digest` is the last
-  /// digest of an earlier check, which the trail must still contain, or empty.
+  /// Checks by the trail (audit_trail.h) that the records are unchanged. `expected_digest` is the
+  /// last digest of an earlier check, which the trail must still contain, or empty.
   TrailCheck check(const std::string& expected_digest);
 
  private:

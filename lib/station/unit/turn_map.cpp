@@ -7,7 +7,7 @@
 #include <numbers>
 #include <span>
 
-#include "calibration/rotation/turning.h"
+#include "calibration/rotation/rotation_model.h"
 #include "positioning/positioner.h"
 
 namespace vlp {

@@ -5,7 +5,7 @@
 #include <gmock/gmock.h>
 
 #include "calibration/adjustment/survey.h"
-#include "support/near.h"
+#include "support/matchers.h"
 
 namespace vlp {
 namespace {

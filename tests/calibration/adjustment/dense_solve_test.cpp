@@ -13,7 +13,7 @@
 
 #include "calibration/adjustment/adjustment_problem.h"
 #include "calibration/adjustment/survey.h"
-#include "support/near.h"
+#include "support/matchers.h"
 
 namespace vlp {
 namespace {

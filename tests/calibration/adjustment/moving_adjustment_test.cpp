@@ -9,7 +9,7 @@
 #include "calibration/moving_captures.h"
 #include "geometry/frames.h"
 #include "rig/calibration_error.h"
-#include "support/near.h"
+#include "support/matchers.h"
 
 namespace vlp {
 namespace {

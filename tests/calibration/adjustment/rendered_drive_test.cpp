@@ -8,7 +8,7 @@
 #include <cstdio>
 
 #include "calibration/adjustment/adjustment.h"
-#include "calibration/levelling/levelling.h"
+#include "calibration/tilt/tilt_calibration.h"
 #include "frontend/mat_view.h"
 #include "geometry/angles.h"
 #include "lamps/light_detector.h"

@@ -7,8 +7,8 @@
 #include <cmath>
 
 #include "calibration/adjustment/survey.h"
-#include "rig/stage.h"
-#include "support/judged.h"
+#include "rig/calibration_builder.h"
+#include "support/station_verdicts.h"
 
 namespace vlp {
 namespace {

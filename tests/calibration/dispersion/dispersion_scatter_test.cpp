@@ -9,8 +9,8 @@
 #include <optional>
 #include <vector>
 
+#include "calibration/dispersion/reference_point_statistics.h"
 #include "calibration/dispersion/station.h"
-#include "calibration/dispersion/station_statistics.h"
 #include "positioning/positioner.h"
 #include "rig/calibration_error.h"
 

@@ -7,9 +7,9 @@
 #include <Eigen/LU>
 
 #include "calibration/dispersion/station.h"
-#include "calibration/levelling/levelling.h"
+#include "calibration/tilt/tilt_calibration.h"
 #include "positioning/positioner.h"
-#include "support/near.h"
+#include "support/matchers.h"
 
 namespace vlp {
 namespace {

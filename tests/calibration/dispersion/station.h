@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "calibration/dispersion/dispersion.h"
-#include "calibration/levelling/drive.h"
+#include "calibration/tilt/drive.h"
 
 namespace vlp {
 

@@ -15,15 +15,15 @@
 
 #include "calibration/intrinsics/camera_exports.h"
 #include "calibration/intrinsics/camera_imports.h"
-#include "calibration/intrinsics/known_region.h"
 #include "calibration/intrinsics/mrcal_files.h"
 #include "calibration/intrinsics/sample_cameras.h"
 #include "calibration/intrinsics/synthetic_views.h"
+#include "calibration/intrinsics/valid_region.h"
 #include "camera/lens.h"
 #include "camera/spline_grid.h"
-#include "support/near.h"
+#include "support/matchers.h"
 #include "support/program.h"
-#include "support/refused.h"
+#include "support/rejection_message.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {

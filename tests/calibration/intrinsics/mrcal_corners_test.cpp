@@ -5,7 +5,7 @@
 #include "calibration/intrinsics/mrcal_files.h"
 #include "calibration/intrinsics/projection_difference.h"
 #include "calibration/intrinsics/synthetic_views.h"
-#include "support/refused.h"
+#include "support/rejection_message.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {

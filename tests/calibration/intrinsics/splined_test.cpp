@@ -7,9 +7,9 @@
 #include <numbers>
 
 #include "calibration/intrinsics/calibration_report.h"
-#include "calibration/intrinsics/known_region.h"
 #include "calibration/intrinsics/projection_uncertainty.h"
 #include "calibration/intrinsics/rotation_vector.h"
+#include "calibration/intrinsics/valid_region.h"
 #include "calibration/intrinsics/wide_views.h"
 #include "camera/spline_grid.h"
 #include "geometry/polygon.h"

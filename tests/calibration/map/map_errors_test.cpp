@@ -7,7 +7,7 @@
 #include <cmath>
 #include <utility>
 
-#include "calibration/levelling/drive.h"
+#include "calibration/tilt/drive.h"
 
 namespace vlp {
 namespace {

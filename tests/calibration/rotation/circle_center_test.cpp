@@ -12,7 +12,7 @@
 #include "calibration/rotation/joint_center.h"
 #include "calibration/rotation/spot.h"
 #include "geometry/angles.h"
-#include "support/near.h"
+#include "support/matchers.h"
 
 namespace vlp {
 namespace {

@@ -11,10 +11,10 @@
 #include "calibration/rotation/circle_center.h"
 #include "calibration/rotation/joint_center.h"
 #include "calibration/rotation/planar_scatter.h"
+#include "calibration/rotation/rotation_axis.h"
 #include "calibration/rotation/spot.h"
-#include "calibration/rotation/turning_axis.h"
 #include "geometry/angles.h"
-#include "support/near.h"
+#include "support/matchers.h"
 
 namespace vlp {
 namespace {

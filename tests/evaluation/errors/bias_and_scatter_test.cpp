@@ -6,7 +6,7 @@
 
 #include <cmath>
 
-#include "support/near.h"
+#include "support/matchers.h"
 #include "support/random.h"
 
 namespace vlp {

@@ -6,7 +6,7 @@
 
 #include "fix_at.h"
 #include "support/random.h"
-#include "support/refused.h"
+#include "support/rejection_message.h"
 
 namespace vlp {
 namespace {

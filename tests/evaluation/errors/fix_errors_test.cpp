@@ -5,8 +5,8 @@
 #include <gmock/gmock.h>
 
 #include "fix_at.h"
-#include "support/near.h"
-#include "support/refused.h"
+#include "support/matchers.h"
+#include "support/rejection_message.h"
 
 namespace vlp {
 namespace {

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
 #include "lamps/shape/rim.h"
-#include "lamps/signal/lamp_rule.h"
+#include "lamps/signal/frequency_identification.h"
 
 #include <gtest/gtest.h>
 

@@ -12,7 +12,7 @@
 
 #include "geometry/arc.h"
 #include "lamps/shape/robust_circle.h"
-#include "support/near.h"
+#include "support/matchers.h"
 
 namespace vlp {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "geometry/arc.h"
 #include "lamps/shape/robust_circle.h"
-#include "support/near.h"
+#include "support/matchers.h"
 #include "support/random.h"
 
 namespace vlp {

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "lamps/signal/lamp_classifier.h"
-#include "support/refused.h"
+#include "support/rejection_message.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {

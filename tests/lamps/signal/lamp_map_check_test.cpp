@@ -4,7 +4,7 @@
 
 #include <gmock/gmock.h>
 
-#include "lamps/signal/lamp_rule.h"
+#include "lamps/signal/frequency_identification.h"
 #include "lamps/signal/square_wave.h"
 #include "lamps/signal/stripes.h"
 

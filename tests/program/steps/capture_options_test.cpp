@@ -5,7 +5,7 @@
 #include <gmock/gmock.h>
 
 #include "geometry/angles.h"
-#include "support/refused.h"
+#include "support/rejection_message.h"
 
 namespace vlp {
 namespace {

@@ -9,7 +9,7 @@
 #include "captures/digest.h"
 #include "session/step_history.h"
 #include "support/program.h"
-#include "support/refused.h"
+#include "support/rejection_message.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {

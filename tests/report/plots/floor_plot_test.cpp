@@ -7,7 +7,7 @@
 
 #include "report/plots/gnuplot.h"
 #include "report/plots/plot_parts.h"
-#include "support/refused.h"
+#include "support/rejection_message.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {

@@ -10,8 +10,8 @@
 #include <fstream>
 
 #include "station/records/records.h"
-#include "station/statistics/run_figures.h"
-#include "support/refused.h"
+#include "station/statistics/run_metrics.h"
+#include "support/rejection_message.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {

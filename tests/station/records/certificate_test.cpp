@@ -9,7 +9,7 @@
 
 #include "station/station_config.h"
 #include "support/datasets.h"
-#include "support/refused.h"
+#include "support/rejection_message.h"
 
 namespace vlp {
 namespace {

@@ -7,7 +7,7 @@
 #include <stdexcept>
 
 #include "rig/input_error.h"
-#include "station/records/golden_due.h"
+#include "station/records/golden_unit_schedule.h"
 #include "station/records/hook.h"
 #include "station/sample_records.h"
 

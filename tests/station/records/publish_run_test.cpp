@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "support/refused.h"
+#include "support/rejection_message.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {

@@ -18,7 +18,7 @@
 #include "station/station_config.h"
 #include "support/child_process.h"
 #include "support/postgres_server.h"
-#include "support/refused.h"
+#include "support/rejection_message.h"
 #include "support/schema.h"
 #include "support/temporary_folder.h"
 

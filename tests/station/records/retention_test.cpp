@@ -8,7 +8,7 @@
 
 #include "rig/input_error.h"
 #include "station/records/spool.h"
-#include "support/refused.h"
+#include "support/rejection_message.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {

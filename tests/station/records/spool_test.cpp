@@ -23,7 +23,7 @@
 #include "support/child_process.h"
 #include "support/postgres_server.h"
 #include "support/random.h"
-#include "support/refused.h"
+#include "support/rejection_message.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {

@@ -10,7 +10,7 @@
 #include <stdexcept>
 
 #include "support/random.h"
-#include "support/refused.h"
+#include "support/rejection_message.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {

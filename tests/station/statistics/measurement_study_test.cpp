@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "support/random.h"
-#include "support/refused.h"
+#include "support/rejection_message.h"
 
 namespace vlp {
 namespace {

@@ -5,7 +5,7 @@
 #include <gmock/gmock.h>
 
 #include "station/unit/step_sources.h"
-#include "support/refused.h"
+#include "support/rejection_message.h"
 #include "support/temporary_folder.h"
 #include "support/write_video.h"
 

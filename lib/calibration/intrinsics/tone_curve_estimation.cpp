@@ -1,0 +1,131 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/intrinsics/tone_curve_estimation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <utility>
+
+#include "calibration/intrinsics/board_check.h"
+#include "calibration/intrinsics/board_lattice.h"
+#include "calibration/intrinsics/intrinsics.h"
+#include "calibration/intrinsics/lens_choice.h"
+#include "detection/boards/tone_curve.h"
+#include "geometry/median.h"
+
+namespace vlp {
+namespace {
+
+/// Returns the detection with corners corrected for one of kGammas.
+BoardDetection correct_for_curve(const BoardDetection& seen, std::size_t curve) {
+  BoardDetection corrected;
+  for (const TagDetection& tag : seen.tags) {
+    if (curve == 0 || tag.tone_curve_fits.empty()) {
+      corrected.tags.push_back(
+          {tag.id, tag.corners_px, tag.curvatures, tag.corner_sds_px, {}, tag.steps});
+      continue;
+    }
+    const auto& [corners_px, curvatures, corner_sds_px, steps] = tag.tone_curve_fits[curve - 1];
+    corrected.tags.push_back({tag.id, corners_px, curvatures, corner_sds_px, {}, steps});
+  }
+  return corrected;
+}
+
+/// Returns at most 24 views with enough corners, evenly spaced among all of them.
+std::vector<const BoardDetection*> select_detections(const std::vector<BoardView>& views,
+                                                     const BoardLattice& lattice) {
+  constexpr std::size_t max_views = 24;
+  std::vector<const BoardDetection*> sufficient;
+  for (const BoardView& view : views) {
+    if (lattice.sufficient(view.seen)) sufficient.push_back(&view.seen);
+  }
+  if (sufficient.size() <= max_views) return sufficient;
+  std::vector<const BoardDetection*> selected;
+  for (std::size_t i = 0; i < max_views; ++i)
+    selected.push_back(sufficient[i * sufficient.size() / max_views]);
+  return selected;
+}
+
+/// Solves OPENCV8 and OPENCV_FISHEYE and returns the solution with the smaller residuals.
+IntrinsicsSolution solve_better_model(IntrinsicsInput input) {
+  auto fisheye = may_be_wide(input) ? fit_fisheye(input) : std::nullopt;
+  if (fisheye && fisheye->farthest_rad >= kRightAngle_rad) return std::move(fisheye->solution);
+  input.lens_model = LensModel::opencv8;
+  IntrinsicsSolution solution = solve_intrinsics(input);
+  const bool other = fisheye && !(solution.ok() && solution.rms_px < fisheye->solution.rms_px);
+  return other ? std::move(fisheye->solution) : solution;
+}
+
+/// Returns the median standard deviation of the corners from pixel noise; std::nullopt if unknown.
+std::optional<double> compute_median_sd_px(const IntrinsicsInput& input) {
+  std::vector<double> known_sds_px;
+  for (const auto& view : input.views) {
+    for (const auto& corner : view) {
+      if (corner.sd_px > 0) known_sds_px.push_back(corner.sd_px);
+    }
+  }
+  if (known_sds_px.empty()) return {};
+  return upper_median(std::move(known_sds_px));
+}
+
+/// Returns the RMS residual of the lens for each curve, divided by the noise of the corners;
+/// std::nullopt if no lens is found.
+std::optional<PerCurve> compute_noise_ratios(const std::vector<BoardView>& views,
+                                             const Board& board) {
+  constexpr double exact_px = 1e-6;
+  IntrinsicsInput input{BoardLattice(board), {}, views.front().imager_px, LensModel::opencv8};
+  auto selected = select_detections(views, input.lattice);
+  PerCurve ratios{};
+  for (std::size_t curve = 0; curve < ratios.size(); ++curve) {
+    input.views.clear();
+    for (const BoardDetection* seen : selected) {
+      input.views.push_back(input.lattice.corners(correct_for_curve(*seen, curve)));
+    }
+    const IntrinsicsSolution solution =
+        curve == 0 ? solve_better_model(input) : solve_intrinsics(input);
+    const auto noise_px = compute_median_sd_px(input);
+    if (!solution.ok() || !noise_px) return {};
+    ratios[curve] = std::max(solution.rms_px, exact_px) / *noise_px;
+    if (curve > 0) continue;
+    // The other curves are solved with the same model, warp and views, so that ratios are
+    // comparable.
+    input.lens_model = solution.problem.lens_model;
+    input.warp = solution.solved_for.warp ? WarpChoice::on : WarpChoice::off;
+    std::vector<const BoardDetection*> kept;
+    for (const std::size_t view : solution.views) kept.push_back(selected[view]);
+    selected = std::move(kept);
+  }
+  return ratios;
+}
+
+bool has_level_costs(const BoardView& view) { return !view.seen.curve_costs.empty(); }
+
+bool may_have_curve(const BoardView& view) {
+  return std::ranges::any_of(view.seen.tags,
+                             [](const TagDetection& tag) { return !tag.tone_curve_fits.empty(); });
+}
+
+}  // namespace
+
+double estimate_and_apply_tone_curve(std::vector<BoardView>& views, const Board& board) {
+  constexpr double levels_sd = 0.2, residuals = 50;
+  const PerCurve level_costs = sum_tone_curve_costs(views);
+  const bool has_no_curve = 2 * std::ranges::count_if(views, may_have_curve) <=
+                            std::ranges::count_if(views, has_level_costs);
+  if (has_no_curve || !check_board(board, views, {}).problem.empty())
+    return apply_tone_curve(views, level_costs);
+  const auto ratios = compute_noise_ratios(views, board);
+  if (!ratios) return apply_tone_curve(views, level_costs);
+  const double levels_gamma = estimate_gamma(level_costs);
+  const double n = residuals / *std::ranges::min_element(*ratios);
+  PerCurve costs{};
+  for (std::size_t i = 0; i < costs.size(); ++i) {
+    const double off = std::log(kGammas[i] / levels_gamma) / levels_sd;
+    costs[i] = n * std::log((*ratios)[i]) + off * off / 2;
+  }
+  return apply_tone_curve(views, costs);
+}
+
+}  // namespace vlp

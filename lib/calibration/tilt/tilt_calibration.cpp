@@ -1,0 +1,251 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/tilt/tilt_calibration.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <utility>
+
+#include "calibration/adjustment/adjustment.h"
+#include "captures/number_text.h"
+#include "geometry/angles.h"
+#include "rig/find_lamp.h"
+
+namespace vlp {
+namespace {
+
+constexpr int kDigits = 3;
+constexpr double kOneYaw_rad = rad_from_deg(10);
+constexpr double kOnePlace = 0.1;  // of the lamps' height above the camera
+constexpr const char* kUndeterminedMessage =
+    "the captures do not determine it: the lamps they see are too few or in one line; add captures "
+    "that see more lamps, at other places and yaws";
+
+/// Captures whose lamps agree with the map and with a camera at one zenith, with their poses.
+struct Placement {
+  std::vector<AdjustmentCapture> captures;
+  std::vector<Pose> poses;
+  /// Mean height of the lamps above the camera.
+  double height_m = 0;
+  /// Number of detections of each lamp of the map.
+  std::vector<int> detection_counts;
+  /// Sum of the squared residuals of the captures in the undistorted image.
+  double squares_px2 = 0;
+
+  int detections() const {
+    return std::accumulate(detection_counts.begin(), detection_counts.end(), 0);
+  }
+  int degrees_of_freedom() const { return 2 * detections() - 4 * static_cast<int>(poses.size()); }
+};
+
+/// Returns the captures of three lamps of the map or more, without detections of other lamps.
+/// Counts the other captures, and all detections of the returned captures.
+std::vector<AdjustmentCapture> select_captures(std::span<const Frame> frames, const LampMap& map,
+                                               const std::vector<KnownMotion>& motions,
+                                               TiltCalibration& result) {
+  std::vector<AdjustmentCapture> captures;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    AdjustmentCapture capture{frames[i].image, frames[i].detections};
+    std::erase_if(capture.detections, [&](const Detection& detection) {
+      return find_lamp(map.lamps, detection.lamp) == nullptr;
+    });
+    if (capture.detections.size() < 3) {
+      ++result.captures_of_few_lamps;
+      continue;
+    }
+    if (!motions.empty()) capture.motion = motions[i];
+    result.detections_rejected += static_cast<int>(capture.detections.size());
+    captures.push_back(std::move(capture));
+  }
+  return captures;
+}
+
+/// Locates each capture separately, as a stationary camera. Rejects lamps and captures that
+/// contradict the map.
+Placement place(const std::vector<AdjustmentCapture>& captures, LampMap map,
+                const Calibration& calibration) {
+  for (Lamp& lamp : map.lamps) lamp.sd_m.reset();
+  const Positioner positioner(map, calibration);
+  Placement placement;
+  placement.detection_counts.resize(map.lamps.size());
+  std::vector<Detection> detections;
+  for (const AdjustmentCapture& capture : captures) {
+    // Residuals beyond the given noise may be due to the unknown tilt, so that sigma_px is not
+    // used.
+    detections = capture.detections;
+    for (Detection& detection : detections) detection.sigma_px.reset();
+    const Fix fix = positioner.locate(detections);
+    if (!fix.ok() || fix.lamps < 3) continue;
+    AdjustmentCapture placed = capture;
+    const auto rejected_end =
+        fix.rejected_ids.begin() +
+        std::min(static_cast<std::ptrdiff_t>(fix.rejected_lamps), std::ssize(fix.rejected_ids));
+    std::erase_if(placed.detections, [&](const Detection& detection) {
+      return std::find(fix.rejected_ids.begin(), rejected_end, detection.lamp) != rejected_end;
+    });
+    for (const Detection& detection : placed.detections) {
+      const Lamp* lamp = find_lamp(map.lamps, detection.lamp);
+      ++placement.detection_counts[static_cast<std::size_t>(lamp - map.lamps.data())];
+      placement.height_m += lamp->position_m.z() - fix.estimate.pose.position_m.z();
+    }
+    placement.squares_px2 += fix.lamps * fix.residual_px * fix.residual_px;
+    placement.poses.push_back(fix.estimate.pose);
+    placement.captures.push_back(std::move(placed));
+  }
+  placement.height_m /= std::max(1, placement.detections());
+  return placement;
+}
+
+/// Variation of yaws and positions of the captures.
+struct PoseVariation {
+  /// Approximate RMS sine of the yaws relative to their mean.
+  double yaw;
+  /// RMS distance of the positions from their mean, divided by the height of the lamps.
+  double place;
+};
+
+PoseVariation compute_variation(const Placement& placement) {
+  Eigen::Vector3d mean_m = Eigen::Vector3d::Zero();
+  Eigen::Vector2d mean_heading = Eigen::Vector2d::Zero();
+  const double n = static_cast<double>(placement.poses.size());
+  for (const Pose& pose : placement.poses) {
+    mean_m += pose.position_m / n;
+    mean_heading += Eigen::Vector2d(std::cos(pose.yaw_rad), std::sin(pose.yaw_rad)) / n;
+  }
+  double square_m2 = 0;
+  for (const Pose& pose : placement.poses) {
+    square_m2 += (pose.position_m - mean_m).squaredNorm() / n;
+  }
+  return {std::sqrt(std::max(0.0, 1 - mean_heading.squaredNorm())),
+          std::sqrt(square_m2) / placement.height_m};
+}
+
+/// Returns the reason why yaws and positions of the captures cannot determine the tilt (and the
+/// map), and the remedy. Returns an empty string if they can.
+std::string explain_undetermined(const Placement& placement, const LampMap& map, bool refine_map) {
+  if (placement.captures.size() < 2) {
+    return "two captures or more are needed that see three lamps of the map or more which agree "
+           "with it; there " +
+           std::string(placement.captures.empty() ? "is none" : "is one") +
+           ": add captures that see more lamps, or see that lamp map and camera are the right ones";
+  }
+  const PoseVariation variation = compute_variation(placement);
+  const bool one_yaw = variation.yaw < std::sin(kOneYaw_rad),
+             one_place = variation.place < kOnePlace;
+  if (one_yaw && one_place) {
+    return "all captures are alike: from one place and yaw a lamp map that is a little off looks "
+           "like a tilt; turn the camera on the spot, or drive, and add those captures";
+  }
+  if (!refine_map) return "";
+  if (one_yaw) {
+    return "all captures are at one yaw: a tilt of all lamps cannot be told from the camera's; "
+           "turn the camera and add those captures, or leave the lamp map as it is";
+  }
+  if (one_place) {
+    return "all captures are from one place: the distances of the lamps do not show; add captures "
+           "from elsewhere, or leave the lamp map as it is";
+  }
+  const auto& counts = placement.detection_counts;
+  if (const auto once = std::find(counts.begin(), counts.end(), 1); once != counts.end()) {
+    return "lamp " + std::to_string(map.lamps[static_cast<std::size_t>(once - counts.begin())].id) +
+           " is in one capture only: add captures that see it, or leave the lamp map as it is";
+  }
+  const auto lamps = std::ssize(counts) - std::count(counts.begin(), counts.end(), 0);
+  return placement.degrees_of_freedom() > 2 + 3 * lamps - 5 ? "" : kUndeterminedMessage;
+}
+
+/// Returns the reason if a standard deviation exceeds the limits of the options, otherwise an empty
+/// string.
+std::string explain_uncertainty(const TiltCalibration& result, const Eigen::Vector2d& focal_px,
+                                const TiltCalibrationOptions& options) {
+  const double sd_rad =
+      result.center.covariance->diagonal().cwiseSqrt().cwiseQuotient(focal_px).maxCoeff();
+  if (!(sd_rad <= options.max_sd_rad)) {
+    return "the tilt would be known to " + significant(deg_from_rad(sd_rad), kDigits) +
+           " degrees only: add captures, of more lamps, at other places and yaws";
+  }
+  for (const auto& lamp : result.corrections) {
+    const double sd_m = lamp.sd_m.maxCoeff();
+    if (!(sd_m <= options.max_lamp_sd_m)) {
+      return "lamp " + std::to_string(lamp.id) + " would be known to " +
+             significant(1e3 * sd_m, kDigits) +
+             " mm only: add captures that see it, at other places and yaws, or leave the lamp map "
+             "as it is";
+    }
+  }
+  return "";
+}
+
+bool all_have_sigma(std::span<const Frame> frames) {
+  return std::all_of(frames.begin(), frames.end(), [](const Frame& frame) {
+    return std::all_of(frame.detections.begin(), frame.detections.end(),
+                       [](const Detection& detection) { return detection.sigma_px.has_value(); });
+  });
+}
+
+/// Adjusts the captures that agree with the map. A capture that contradicts the map for a level
+/// camera may agree with it at the zenith that the other captures determine, and is then used.
+/// Iterates until the number of detections is unchanged, at most six times.
+AdjustmentResult adjust_iteratively(const std::vector<AdjustmentCapture>& captures,
+                                    AdjustmentInput& input, TiltCalibration& result) {
+  constexpr int max_iterations = 6;
+  constexpr double no_limit = std::numeric_limits<double>::infinity();
+  AdjustmentResult found;
+  for (int iteration = 0, detections = 0; iteration < max_iterations; ++iteration) {
+    Placement placement = place(captures, input.lamps, input.calibration);
+    result.undetermined = explain_undetermined(placement, input.lamps, input.frees_map_shape);
+    if (!result.undetermined.empty() || placement.detections() == detections) break;
+    detections = placement.detections();
+    if (iteration == 0) {
+      result.residual_before_px = std::sqrt(placement.squares_px2 / placement.degrees_of_freedom());
+    }
+    input.captures = std::move(placement.captures);
+    found = adjust_captures(input, {no_limit, no_limit});
+    if (!found.ok()) {
+      result.undetermined = kUndeterminedMessage;
+      break;
+    }
+    input.calibration.rotation_center = found.center;
+  }
+  return found;
+}
+
+void store_lamps(TiltCalibration& result, const AdjustmentResult& found) {
+  for (const auto& [id, correction_m, sd_m, moved] : found.lamps) {
+    result.corrections.push_back({id, correction_m, sd_m});
+  }
+  for (std::size_t i = 0; i < found.refined.lamps.size(); ++i) {
+    result.map.lamps[i].position_m = found.refined.lamps[i].position_m;
+  }
+}
+
+}  // namespace
+
+TiltCalibration estimate_tilt_from_lamps(std::span<const Frame> frames, const LampMap& map,
+                                         const Camera& camera,
+                                         const TiltCalibrationOptions& options) {
+  TiltCalibration result;
+  result.map = map;
+  const auto captures = select_captures(frames, map, options.motions, result);
+  AdjustmentInput input{{}, map, {}};
+  input.calibration.camera = camera;
+  input.frees_map_shape = options.refine_map;
+  input.captures_are_checked = true;
+  input.weighs_in_undistorted_image = true;
+  const AdjustmentResult found = adjust_iteratively(captures, input, result);
+  result.captures = found.captures;
+  result.captures_rejected = static_cast<int>(captures.size()) - found.captures;
+  result.detections = found.detections;
+  result.detections_rejected -= found.detections;
+  if (!result.undetermined.empty()) return result;
+  if (all_have_sigma(frames)) result.noise_scale = found.noise_scale;
+  result.center = found.center;
+  result.residual_px = found.residual_px;
+  if (options.refine_map) store_lamps(result, found);
+  result.undetermined = explain_uncertainty(result, camera.focal_px(), options);
+  return result;
+}
+
+}  // namespace vlp

@@ -1,0 +1,533 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "positioning/correlated_errors.h"
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <algorithm>
+#include <bitset>
+#include <cmath>
+#include <utility>
+
+#include "geometry/plane.h"
+#include "geometry/statistical_bounds.h"
+#include "geometry/symmetric.h"
+#include "rig/calibration_error.h"
+#include "rig/find_lamp.h"
+
+namespace vlp {
+namespace {
+
+/// Returns the derivatives of the rotation by the two coordinates of an error.
+template <typename With>
+void add_turns(std::vector<Eigen::Matrix3d>& turns, const Calibration& calibration,
+               Correction correction, With with_error) {
+  constexpr double step = 1e-5;  // central differences have errors of second order: 1e-10
+  for (int axis = 0; axis < 2; ++axis) {
+    const Eigen::Vector2d error = step * Eigen::Vector2d::Unit(axis);
+    const Calibration less = with_error(calibration, -error), more = with_error(calibration, error);
+    turns.emplace_back((level_from_camera(more, correction) - level_from_camera(less, correction)) /
+                       (2 * step));
+  }
+}
+
+/// Returns the reduction of a covariance if the errors of these rows become known:
+///   S_:P S_PP^-1 S_P:
+/// Directions in which S_PP has only rounding errors contribute zero.
+Eigen::MatrixXd known_by(const Eigen::MatrixXd& covariance, Eigen::Index first, Eigen::Index size) {
+  if (size == 0) return Eigen::MatrixXd::Zero(covariance.rows(), covariance.cols());
+  if (first + size == covariance.rows()) return covariance;  // the last rows own the remainder
+  const Eigen::MatrixXd columns = covariance.middleCols(first, size);
+  const Eigen::VectorXd sd = columns.middleRows(first, size).diagonal().cwiseMax(0).cwiseSqrt();
+  const Eigen::VectorXd inverse_sd =
+      (sd.array() > 0).select(sd.cwiseInverse(), Eigen::VectorXd::Zero(size));
+  const Eigen::MatrixXd scaled = columns * inverse_sd.asDiagonal();
+  const auto eigen = decompose_symmetric(
+      Eigen::MatrixXd(inverse_sd.asDiagonal() * scaled.middleRows(first, size)));
+  constexpr double rounding = 1e-12;
+  const Eigen::ArrayXd values = eigen.values;
+  const Eigen::VectorXd whitening =
+      (values > rounding * static_cast<double>(size))
+          .select(values.max(1e-300).rsqrt(), Eigen::ArrayXd::Zero(size));
+  Eigen::MatrixXd root = scaled * eigen.vectors;
+  root *= whitening.asDiagonal();
+  Eigen::MatrixXd known = root * root.transpose();
+  known.middleRows(first, size) = columns.transpose();
+  known.middleCols(first, size) = columns;
+  return known;
+}
+
+/// Converts a covariance in px^2 to units of the normalized plane.
+Eigen::Matrix2d normalized(const std::optional<Matrix2>& covariance_px,
+                           const Eigen::Vector2d& focal_px) {
+  if (!covariance_px) return Eigen::Matrix2d::Zero();
+  const Eigen::Vector2d inverse = focal_px.cwiseInverse();
+  return inverse.asDiagonal() * *covariance_px * inverse.asDiagonal();
+}
+
+/// Returns true if the lamp of a map has this place, to 1 um.
+bool is_at(const Lamp& lamp, const Eigen::Vector3d& position_m) {
+  constexpr double tolerance_m = 1e-6;
+  return (position_m - lamp.position_m).norm() < tolerance_m;
+}
+
+/// Returns the place of a lamp in an adjustment or a dispersion; nullptr if it is not in it.
+template <typename Place>
+const Place* find_place(const std::vector<Place>& places, int id) {
+  const auto place =
+      std::find_if(places.begin(), places.end(), [&](const Place& one) { return one.id == id; });
+  return place == places.end() ? nullptr : &*place;
+}
+
+}  // namespace
+
+CommonErrors::CommonErrors(std::span<const Lamp> lamps, const Calibration& calibration,
+                           Correction correction)
+    : intrinsics_(count_reported_intrinsics(calibration.camera)),
+      base_from_camera_(level_from_camera(calibration, correction)),
+      camera_from_base_(base_from_camera_.inverse()) {
+  const bool turned = calibration.rotation_center &&
+                      (correction == Correction::rotation || correction == Correction::all);
+  const bool shifted = calibration.dispersion &&
+                       (correction == Correction::dispersion || correction == Correction::all);
+  if (turned) add_turns(turns_, calibration, correction, with_zenith_error);
+  if (shifted) add_turns(turns_, calibration, correction, with_offset_error);
+  offset_ = intrinsics_ + (turned ? 2 : 0);
+  assign_rows(lamps, calibration);
+  set_lens_and_zenith(calibration);
+  set_lamps(lamps, calibration.adjustment);
+  if (turned || shifted) propagate_to_zenith_and_offset(lamps, calibration);
+  stated_ =
+      calibration.adjustment || covariance_.diagonal().maxCoeff() > 0 ||
+      std::ranges::any_of(lamps_, [](const LampErrors& lamp) { return lamp.variance_m2 > 0; });
+}
+
+void CommonErrors::assign_rows(std::span<const Lamp> lamps, const Calibration& calibration) {
+  const auto is_correlated = [&](const Lamp& lamp) {
+    const auto* adjusted =
+        calibration.adjustment ? find_place(calibration.adjustment->lamps, lamp.id) : nullptr;
+    if (adjusted != nullptr && is_at(lamp, adjusted->position_m)) return true;
+    const auto* uncertain =
+        has_offset() ? find_place(calibration.dispersion->by_lamps, lamp.id) : nullptr;
+    return uncertain != nullptr && is_at(lamp, uncertain->position_m);
+  };
+  lamps_.resize(lamps.size());
+  Eigen::Index size = shared();
+  for (std::size_t i = 0; i < lamps.size(); ++i) {
+    if (!is_correlated(lamps[i])) continue;
+    lamps_[i].row = size;
+    size += 3;
+  }
+  covariance_ = Eigen::MatrixXd::Zero(size, size);
+}
+
+Eigen::Matrix3d CommonErrors::covariance_of_lamp(std::size_t lamp) const {
+  const auto& [row, variance_m2] = lamps_[lamp];
+  if (!row) return variance_m2 * Eigen::Matrix3d::Identity();
+  return covariance_.block<3, 3>(*row, *row);
+}
+
+Eigen::Matrix3d CommonErrors::covariance_of_lamps(std::size_t lamp, std::size_t other) const {
+  if (lamp == other) return covariance_of_lamp(lamp);
+  const auto &row = lamps_[lamp].row, &column = lamps_[other].row;
+  if (!row || !column) return Eigen::Matrix3d::Zero();
+  return covariance_.block<3, 3>(*row, *column);
+}
+
+void CommonErrors::set_lens_and_zenith(const Calibration& calibration) {
+  const auto& center = calibration.rotation_center;
+  const auto& dispersion = calibration.dispersion;
+  const auto& adjustment = calibration.adjustment;
+  const auto& report = calibration.intrinsics_report;
+  // A part that was calibrated with the lens compensates its errors in part: without by_intrinsics
+  // these would count twice.
+  const bool lens_counts_once = has_zenith()   ? center->by_intrinsics.has_value()
+                                : has_offset() ? dispersion->by_intrinsics.has_value()
+                                               : true;
+  const bool lens = report && report->covariance && lens_counts_once;
+  const bool zenith_stated = adjustment || (has_zenith() && center->covariance);
+  complete_ = adjustment || (lens && zenith_stated);
+  part_stated_ = {adjustment || lens, zenith_stated,
+                  !has_offset() || dispersion->covariance.has_value(), true};
+  if (lens && !adjustment) {
+    covariance_.topLeftCorner(intrinsics_, intrinsics_) = *report->covariance;
+  }
+  if (has_zenith() && !adjustment) {
+    covariance_.block<2, 2>(intrinsics_, intrinsics_) =
+        normalized(center->covariance, calibration.camera.focal_px());
+  }
+}
+
+void CommonErrors::set_lamps(std::span<const Lamp> lamps,
+                             const std::optional<Adjustment>& adjustment) {
+  // Pairs of a row here and the same row of the adjustment's covariance.
+  std::vector<std::pair<Eigen::Index, Eigen::Index>> adjusted;
+  if (adjustment) {
+    for (Eigen::Index i = 0; i < offset_; ++i) adjusted.emplace_back(i, i);
+  }
+  for (std::size_t i = 0; i < lamps.size(); ++i) {
+    const auto& row = lamps_[i].row;
+    const auto* place = adjustment ? find_place(adjustment->lamps, lamps[i].id) : nullptr;
+    if (place != nullptr && is_at(lamps[i], place->position_m)) {
+      const Eigen::Index from = intrinsics_ + 4 + 3 * (place - adjustment->lamps.data());
+      for (Eigen::Index k = 0; k < 3; ++k) adjusted.emplace_back(*row + k, from + k);
+      continue;
+    }
+    if (place != nullptr) ++lamps_elsewhere_;
+    if (!lamps[i].sd_m) {
+      complete_ = part_stated_.back() = false;
+      continue;
+    }
+    const double variance_m2 = *lamps[i].sd_m * *lamps[i].sd_m;
+    if (row) {
+      covariance_.block<3, 3>(*row, *row) = variance_m2 * Eigen::Matrix3d::Identity();
+    } else {
+      lamps_[i].variance_m2 = variance_m2;
+    }
+  }
+  for (const auto& [row, from_row] : adjusted) {
+    for (const auto& [col, from_col] : adjusted) {
+      covariance_(row, col) = adjustment->covariance(from_row, from_col);
+    }
+  }
+}
+
+void CommonErrors::propagate_to_zenith_and_offset(std::span<const Lamp> lamps,
+                                                  const Calibration& calibration) {
+  const Eigen::Index rows = shared() - intrinsics_;
+  // Derivatives of zenith and offset by independent errors: lens, the zenith's step, the offset's
+  // step, lamps.
+  Eigen::MatrixXd derivatives = Eigen::MatrixXd::Zero(rows, covariance_.cols());
+  derivatives.middleCols(intrinsics_, rows).setIdentity();
+  if (has_zenith() && !calibration.adjustment && calibration.rotation_center->by_intrinsics) {
+    derivatives.topLeftCorner(2, intrinsics_) = *calibration.rotation_center->by_intrinsics;
+  }
+  if (has_offset()) {
+    const Dispersion& dispersion = *calibration.dispersion;
+    covariance_.block<2, 2>(offset_, offset_) =
+        normalized(dispersion.covariance, calibration.camera.focal_px());
+    auto of_offset = derivatives.bottomRows<2>();
+    if (dispersion.by_intrinsics) of_offset.leftCols(intrinsics_) = *dispersion.by_intrinsics;
+    for (const Dispersion::UncertainLamp& uncertain : dispersion.by_lamps) {
+      if (const auto row = find_stated_row(lamps, uncertain)) {
+        of_offset.middleCols<3>(*row) = uncertain.by_position;
+      } else {
+        const Eigen::Matrix<double, 2, 3> move = uncertain.sd_m * uncertain.by_position;
+        covariance_.block<2, 2>(offset_, offset_) += move * move.transpose();
+      }
+    }
+    if (has_zenith()) {
+      // The offset compensates the error of the zenith.
+      const Eigen::Matrix2d by_zenith = dispersion.by_zenith
+                                            ? Eigen::Matrix2d(*dispersion.by_zenith)
+                                            : Eigen::Matrix2d(-Eigen::Matrix2d::Identity());
+      of_offset += by_zenith * Eigen::MatrixXd(derivatives.topRows<2>());
+    }
+  }
+  covariance_.middleRows(intrinsics_, rows) = derivatives * covariance_;
+  covariance_.middleCols(intrinsics_, rows) = covariance_ * derivatives.transpose();
+}
+
+std::optional<Eigen::Index> CommonErrors::find_stated_row(
+    std::span<const Lamp> lamps, const Dispersion::UncertainLamp& uncertain) const {
+  const Lamp* lamp = find_lamp(lamps, uncertain.id);
+  if (lamp == nullptr || !is_at(*lamp, uncertain.position_m)) return std::nullopt;
+  const auto row = lamps_[static_cast<std::size_t>(lamp - lamps.data())].row;
+  const bool is_stated = lamp->sd_m || covariance_.block<3, 3>(*row, *row).trace() > 0;
+  return is_stated ? row : std::nullopt;
+}
+
+CommonErrors CommonErrors::only(CommonErrorSource part) const {
+  const std::array<Eigen::Index, kCommonErrorSources.size() + 1> rows{0, intrinsics_, offset_,
+                                                                      shared(), covariance_.rows()};
+  CommonErrors one = *this;
+  MatrixX remainder = 0.5 * (covariance_ + covariance_.transpose());  // to the last bit
+  for (std::size_t i = 0;; ++i) {
+    one.covariance_ = known_by(remainder, rows[i], rows[i + 1] - rows[i]);
+    if (kCommonErrorSources[i] == part) break;
+    remainder -= one.covariance_;
+  }
+  if (part != CommonErrorSource::lamps) {
+    for (LampErrors& lamp : one.lamps_) lamp.variance_m2 = 0;
+  }
+  one.stated_ =
+      one.covariance_.diagonal().maxCoeff() > 0 ||
+      std::ranges::any_of(one.lamps_, [](const LampErrors& lamp) { return lamp.variance_m2 > 0; });
+  one.complete_ = false;
+  return one;
+}
+
+CommonErrors::RayJacobian CommonErrors::effect_on_ray(const Eigen::Vector3d& ray_in_base,
+                                                      const Lens& lens) const {
+  RayJacobian effect = RayJacobian::Zero(3, shared());
+  const Eigen::Vector3d ray = camera_from_base_ * ray_in_base;
+  if (const auto seen = lens.project_with_jacobians(ray)) {
+    // For a fixed pixel the ray moves within its plane of z.
+    const Eigen::Matrix2d d_ray = -seen->d_pixel_d_point.leftCols<2>().inverse();
+    const Eigen::Matrix<double, 3, 2> d_ray_in_base = base_from_camera_.leftCols<2>() * d_ray;
+    effect.leftCols(intrinsics_).noalias() = d_ray_in_base * seen->d_pixel_d_parameters;
+  }
+  for (std::size_t i = 0; i < turns_.size(); ++i) {
+    effect.col(intrinsics_ + static_cast<Eigen::Index>(i)) = turns_[i] * ray;
+  }
+  return effect;
+}
+
+CommonErrors::Effect CommonErrors::effect_on(const Sighting& sighting, const LevelPose& pose,
+                                             const Lens& lens,
+                                             const Eigen::Matrix3d& level_from_base) const {
+  // Derivative of z by the direction, which has z = 1.
+  Eigen::Matrix<double, 2, 3> d_z;
+  d_z << 1, 0, -sighting.z.x(), 0, 1, -sighting.z.y();
+  const Eigen::Matrix<double, 2, 3> d_z_d_base = d_z * level_from_base;
+  Effect effect;
+  effect.jacobian_wrt_lamp = predict(pose, sighting.lamp_m).d_z_d_state.leftCols<3>();
+  // As effect_on_ray(), the narrow products first.
+  const Eigen::Vector3d ray =
+      camera_from_base_ * (level_from_base.transpose() * sighting.z.homogeneous());
+  effect.jacobian_wrt_shared.resize(2, shared());
+  if (const auto seen = lens.project_with_jacobians(ray)) {
+    const Eigen::Matrix2d d_z_d_pixel = -d_z_d_base * base_from_camera_.leftCols<2>() *
+                                        seen->d_pixel_d_point.leftCols<2>().inverse();
+    effect.jacobian_wrt_shared.leftCols(intrinsics_).noalias() =
+        d_z_d_pixel.lazyProduct(seen->d_pixel_d_parameters);
+  } else {
+    effect.jacobian_wrt_shared.leftCols(intrinsics_).setZero();
+  }
+  for (std::size_t i = 0; i < turns_.size(); ++i) {
+    effect.jacobian_wrt_shared.col(intrinsics_ + static_cast<Eigen::Index>(i)) =
+        d_z_d_base * (turns_[i] * ray);
+  }
+  return effect;
+}
+
+CommonErrors::Gain CommonErrors::compute_gain(std::span<const Sighting> sightings,
+                                              std::span<const std::size_t> lamps,
+                                              const PoseEstimate& camera, const Lens& lens,
+                                              const Eigen::Matrix3d& level_from_base) const {
+  const LevelPose pose(camera.pose);
+  Gain gain(shared());
+  for (std::size_t i = 0; i < sightings.size(); ++i) {
+    const Sighting& sighting = sightings[i];
+    const Effect effect = effect_on(sighting, pose, lens, level_from_base);
+    Eigen::Matrix<double, 4, 2> d_fix_d_z;
+    if (sightings.size() == 1) {
+      // compute_one_lamp_pose(): s = p - H e^{jg} z.
+      d_fix_d_z.setZero();
+      d_fix_d_z.topRows<2>() = -height_above(pose, sighting.lamp_m) * product_matrix(pose.heading);
+    } else {
+      const Eigen::Matrix2d whitening = sighting.d_pixel_d_z / sighting.sigma_px;
+      d_fix_d_z = camera.covariance * predict(pose, sighting.lamp_m).d_z_d_state.transpose() *
+                  (whitening.transpose() * whitening);
+    }
+    gain.jacobian_wrt_shared.noalias() += d_fix_d_z.lazyProduct(effect.jacobian_wrt_shared);
+    gain.add(lamps[i], d_fix_d_z * effect.jacobian_wrt_lamp);
+  }
+  return gain;
+}
+
+CommonErrors::BodyGain CommonErrors::compute_gain(std::span<const BodyObservation> sightings,
+                                                  std::span<const std::size_t> lamps,
+                                                  const Eigen::Vector3d& arm_m, const BodyFix& fix,
+                                                  const Lens& lens,
+                                                  const Eigen::Matrix3d& body_from_base) const {
+  const EvaluatedState body(fix.state);
+  BodyGain whole(shared());
+  for (std::size_t i = 0; i < sightings.size(); ++i) {
+    const BodyObservation& seen = sightings[i];
+    const auto d_q = body.d_lamp_in_body(seen.lamp_m, seen.time_s);
+    const Eigen::Matrix<double, 2, 3> d_pixel =
+        d_whitened_pixel_d_lamp(seen, body.lamp_in_body(seen.lamp_m, seen.time_s) - arm_m);
+    const Eigen::Matrix<double, 2, kBodyStates> d_pixel_d_state = d_pixel.lazyProduct(d_q);
+    const Eigen::Matrix<double, kBodyStates, 2> gain =
+        fix.covariance.lazyProduct(d_pixel_d_state.transpose());
+    const Eigen::Matrix<double, 2, 3> d_pixel_d_ray = seen.whitened_pixel_from_ray * body_from_base;
+    const Eigen::Matrix<double, kBodyStates, 3> by_ray = gain * d_pixel_d_ray;
+    whole.jacobian_wrt_shared.noalias() +=
+        by_ray.lazyProduct(effect_on_ray(body_from_base.transpose() * seen.ray, lens));
+    whole.add(lamps[i], gain * d_pixel_d_state.leftCols<3>());
+  }
+  return whole;
+}
+
+template <int States>
+Eigen::Matrix<double, States, States, Eigen::DontAlign> CommonErrors::compute_covariance(
+    const GainMatrix<States>& gain) const {
+  using SharedGain = typename GainMatrix<States>::SharedGain;
+  using LampGain = typename GainMatrix<States>::LampGain;
+  using Covariance = Eigen::Matrix<double, States, States>;
+  const SharedGain& jacobian_wrt_shared = gain.jacobian_wrt_shared;
+  const auto& jacobian_wrt_lamp = gain.jacobian_wrt_lamp;
+  const Eigen::Index n = shared();
+  const SharedGain with_shared = jacobian_wrt_shared.lazyProduct(covariance_.topLeftCorner(n, n));
+  Covariance sum = with_shared.lazyProduct(jacobian_wrt_shared.transpose());
+  for (std::size_t i = 0; i < gain.size; ++i) {
+    // Half of the lamp's own errors, the shared errors, and those of the lamps before it.
+    LampGain other = 0.5 * jacobian_wrt_lamp[i] * covariance_of_lamp(gain.lamps[i]);
+    if (const auto& row = lamps_[gain.lamps[i]].row) {
+      other += jacobian_wrt_shared.lazyProduct(covariance_.block(0, *row, n, 3));
+    }
+    for (std::size_t j = 0; j < i; ++j) {
+      other += jacobian_wrt_lamp[j] * covariance_of_lamps(gain.lamps[j], gain.lamps[i]);
+    }
+    const Covariance half = other * jacobian_wrt_lamp[i].transpose();
+    sum += half + half.transpose();
+  }
+  return sum;
+}
+
+double CommonErrors::expected_chi_squared(std::span<const Sighting> sightings,
+                                          std::span<const std::size_t> lamps,
+                                          const PoseEstimate& camera, const Matrix4& common,
+                                          const Lens& lens,
+                                          const Eigen::Matrix3d& level_from_base) const {
+  const LevelPose pose(camera.pose);
+  double sum = -(camera.covariance.inverse() * common).trace();
+  for (std::size_t i = 0; i < sightings.size(); ++i) {
+    const Eigen::Matrix2d whitening = sightings[i].d_pixel_d_z / sightings[i].sigma_px;
+    const Effect effect = effect_on(sightings[i], pose, lens, level_from_base);
+    sum += (whitening * compute_covariance(effect, lamps[i]) * whitening.transpose()).trace();
+  }
+  return sum;
+}
+
+double CommonErrors::expected_chi_squared(std::span<const BodyObservation> sightings,
+                                          std::span<const std::size_t> lamps,
+                                          const Eigen::Vector3d& arm_m, const BodyFix& fix,
+                                          const BodyCovariance& common, const Lens& lens,
+                                          const Eigen::Matrix3d& body_from_base) const {
+  const EvaluatedState body(fix.state);
+  Eigen::Matrix<double, kBodyStates, kBodyStates> information;
+  information.setZero();
+  double sum = 0;
+  for (std::size_t i = 0; i < sightings.size(); ++i) {
+    const BodyObservation& seen = sightings[i];
+    const Eigen::Matrix<double, 2, 3> d_pixel =
+        d_whitened_pixel_d_lamp(seen, body.lamp_in_body(seen.lamp_m, seen.time_s) - arm_m);
+    const Eigen::Matrix<double, 2, kBodyStates> by_state =
+        d_pixel.lazyProduct(body.d_lamp_in_body(seen.lamp_m, seen.time_s));
+    const Eigen::Matrix<double, 2, 3> by_ray = seen.whitened_pixel_from_ray * body_from_base;
+    const Effect effect{
+        by_ray.lazyProduct(effect_on_ray(body_from_base.transpose() * seen.ray, lens)),
+        by_state.leftCols<3>()};
+    sum += compute_covariance(effect, lamps[i]).trace();
+    information += by_state.transpose() * by_state;
+  }
+  // States that are not estimated have no variance, and `common` is zero there.
+  Eigen::Matrix<double, kBodyStates, kBodyStates> covariance = fix.covariance;
+  for (int i = 0; i < kBodyStates; ++i) {
+    if (!(covariance(i, i) > 0)) covariance(i, i) = 1;
+  }
+  const Eigen::Matrix<double, kBodyStates, kBodyStates> with_priors =
+      2 * covariance.inverse() - information;
+  return sum - (with_priors * common).trace();
+}
+
+template Matrix4 CommonErrors::compute_covariance(const Gain& gain) const;
+template BodyCovariance CommonErrors::compute_covariance(const BodyGain& gain) const;
+
+Matrix2 CommonErrors::compute_covariance(const Effect& effect, std::size_t lamp) const {
+  const Eigen::Index n = shared();
+  const Effect& e = effect;
+  const Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::ColMajor, 2, 20> with_shared =
+      e.jacobian_wrt_shared.lazyProduct(covariance_.topLeftCorner(n, n));
+  Eigen::Matrix2d sum = with_shared.lazyProduct(e.jacobian_wrt_shared.transpose());
+  Eigen::Matrix2d half = Eigen::Matrix2d::Zero();
+  if (const auto& row = lamps_[lamp].row) {
+    const Eigen::Matrix<double, 2, 3> mixed =
+        e.jacobian_wrt_shared.lazyProduct(covariance_.block(0, *row, n, 3));
+    half = mixed * e.jacobian_wrt_lamp.transpose();
+  }
+  sum += half + half.transpose() +
+         e.jacobian_wrt_lamp * covariance_of_lamp(lamp) * e.jacobian_wrt_lamp.transpose();
+  return sum;
+}
+
+OutlierLamps find_outlier_lamps(std::span<const Sighting> sightings,
+                                std::span<const Matrix2> common, const LeastSquaresFix& fix) {
+  OutlierLamps found;
+  if (sightings.size() < 4) return found;
+  const LevelPose pose(fix.pose);
+  std::bitset<kMaxSightings> rejected;
+  for (std::size_t left = sightings.size(); left >= 3; --left) {
+    Eigen::Matrix4d information = Eigen::Matrix4d::Zero();
+    Eigen::Vector4d gradient = Eigen::Vector4d::Zero();
+    const auto each = [&](auto&& use) {
+      for (std::size_t i = 0; i < sightings.size(); ++i) {
+        if (rejected[i]) continue;
+        const Sighting& one = sightings[i];
+        const Eigen::Matrix2d by_pixel = one.d_pixel_d_z.inverse() * one.sigma_px;
+        const Eigen::Matrix2d covariance = by_pixel * by_pixel.transpose() + common[i];
+        const Prediction prediction = predict(pose, one.lamp_m);
+        use(i, covariance, prediction.d_z_d_state, Eigen::Vector2d(one.z - prediction.z));
+      }
+    };
+    each([&](std::size_t, const Eigen::Matrix2d& covariance, const auto& jacobian,
+             const Eigen::Vector2d& residual) {
+      const Eigen::Matrix<double, 4, 2> weighted = jacobian.transpose() * covariance.inverse();
+      information += weighted * jacobian;
+      gradient += weighted * residual;
+    });
+    const auto state_covariance = invert_positive_definite(information);
+    if (!state_covariance) return {};
+    const Eigen::Vector4d step = *state_covariance * gradient;
+    double chi_squared = 0, worst = 0;
+    std::size_t worst_lamp = 0;
+    each([&](std::size_t i, const Eigen::Matrix2d& covariance, const auto& jacobian,
+             const Eigen::Vector2d& residual) {
+      const Eigen::Vector2d r = residual - jacobian * step;
+      chi_squared += r.dot(covariance.inverse() * r);
+      const Eigen::Matrix2d of_residual =
+          covariance - jacobian * *state_covariance * jacobian.transpose();
+      const double drop = r.dot(of_residual.inverse() * r);
+      if (!(of_residual.determinant() > 0) || drop <= worst) return;
+      worst = drop;
+      worst_lamp = i;
+    });
+    const double freedom = 2 * static_cast<double>(left) - 4;
+    if (chi_squared <= chi_squared_bound(kSigmasOfOneInTenThousand, freedom)) return found;
+    // Three contradicting lamps do not determine which is wrong; nor does a minority.
+    if (!(worst > 0) || left == 3 || 2 * (left - 1) <= sightings.size()) return {};
+    rejected.set(worst_lamp);
+    found.lamps[found.count++] = worst_lamp;
+  }
+  return {};
+}
+
+namespace {
+
+/// Returns true if the calibration reports errors of its lens that `errors` lacks.
+bool lack_lens(const CommonErrors& errors, const Calibration& calibration) {
+  const auto& report = calibration.intrinsics_report;
+  return report && report->covariance && !errors.stated(CommonErrorSource::lens);
+}
+
+}  // namespace
+
+std::optional<Matrix2> compute_zenith_covariance(const Calibration& calibration) {
+  const CommonErrors errors({}, calibration, Correction::all);
+  if (!errors.stated(CommonErrorSource::zenith) || lack_lens(errors, calibration))
+    return std::nullopt;
+  const Eigen::Index zenith = count_reported_intrinsics(calibration.camera);
+  return Matrix2(errors.joint().block<2, 2>(zenith, zenith));
+}
+
+std::optional<Matrix2> compute_offset_covariance(const Calibration& calibration) {
+  const CommonErrors errors({}, calibration, Correction::all);
+  if (!errors.stated(CommonErrorSource::offset) || lack_lens(errors, calibration))
+    return std::nullopt;
+  if (!calibration.adjustment) {
+    const Dispersion& dispersion = *calibration.dispersion;
+    const auto& report = calibration.intrinsics_report;
+    if (report && report->covariance && !dispersion.by_intrinsics) return std::nullopt;
+    const bool turned = calibration.rotation_center.has_value();
+    if (turned && !(errors.stated(CommonErrorSource::zenith) && dispersion.by_zenith))
+      return std::nullopt;
+  }
+  const Eigen::Index offset = errors.joint().rows() - 2;
+  const Eigen::Vector2d focal_px = calibration.camera.focal_px();
+  return Matrix2(focal_px.asDiagonal() * errors.joint().block<2, 2>(offset, offset) *
+                 focal_px.asDiagonal());
+}
+
+}  // namespace vlp

@@ -1,0 +1,218 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "../camera/lens.h"
+#include "../geometry/types.h"
+#include "../rig/calibration.h"
+#include "../rig/lamp_map.h"
+#include "camera_mount.h"
+#include "correction.h"
+#include "fix.h"
+#include "least_squares_fix.h"
+#include "outlier_rejection.h"
+#include "pose_estimation.h"
+
+namespace vlp {
+
+/// Sources of errors common to all fixes of a camera. The lever arm is not one: it does not affect
+/// the position of the camera.
+enum class CommonErrorSource { lens, zenith, offset, lamps };
+inline constexpr std::array kCommonErrorSources{CommonErrorSource::lens, CommonErrorSource::zenith,
+                                                CommonErrorSource::offset,
+                                                CommonErrorSource::lamps};
+
+/// Errors of calibration and lamp map, which are common to all fixes of a camera:
+///   cov = (J' W J)^-1 + G C G',    G = (J' W J)^-1 J' W J_c
+/// with
+///   J_c  derivative of (normalized points z - predictions) by the errors of calibrated quantities
+///   C    joint covariance of these errors
+/// Calibrated quantities: lens, zenith, offset of the dispersion calibration, positions of the
+/// lamps.
+class CommonErrors {
+ public:
+  /// Takes C from the adjustment. Without an adjustment, propagates the errors through the
+  /// sequential steps, with e_lens from the calibration with boards:
+  ///   e_zenith = own + by_intrinsics e_lens
+  ///   e_offset = own + by_intrinsics e_lens + by_zenith e_zenith + by_lamps e_lamps
+  /// by_zenith is -1 if it is not reported. The lens errors count if the first applied step reports
+  /// by_intrinsics, or if no step is applied. The lamp errors are the sd_m of the survey.
+  ///
+  /// @param lamps  the lamps of the map, in the order to which indices refer
+  ///
+  /// A lamp of the adjustment or the dispersion is a lamp of the map if id and position agree, to 1
+  /// um. The errors of other lamps of a dispersion are independent of the map.
+  CommonErrors(std::span<const Lamp> lamps, const Calibration& calibration, Correction correction);
+
+  /// Returns true if any of the errors is known.
+  bool stated() const { return stated_; }
+  /// Returns true if the errors of lens, zenith and every lamp of the map are known. Only then can
+  /// a wrong lamp be identified by them.
+  bool complete() const { return complete_; }
+  /// Returns true if the errors of the part are known, or if the calibration lacks the part.
+  bool stated(CommonErrorSource part) const { return part_stated_[static_cast<std::size_t>(part)]; }
+  /// Returns one part of C, with the others taken as exact. The parts add up to C, and no part
+  /// makes a variance negative.
+  ///
+  /// A part is the reduction of C if its errors become known exactly, given that all earlier parts
+  /// in the order of kCommonErrorSources already are (block Cholesky). For sequential steps a part
+  /// holds the errors of its own step. The part of the lens includes its effects on later steps.
+  /// The part of the lamps excludes errors that an offset found with the same map compensates.
+  CommonErrors only(CommonErrorSource part) const;
+  /// Returns the number of lamps of the adjustment that the map has at another position. Their
+  /// correlation with the calibration is lost.
+  int lamps_elsewhere() const { return lamps_elsewhere_; }
+
+  /// Derivative of the ray of a pixel by the shared errors, along the axes of the base, which are
+  /// those of the level camera.
+  using RayJacobian = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::ColMajor, 3, 20>;
+  RayJacobian effect_on_ray(const Eigen::Vector3d& ray_in_base, const Lens& lens) const;
+
+  /// Derivatives of z of one lamp by the errors: 2 rows each.
+  struct Effect {
+    Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::ColMajor, 2, 20> jacobian_wrt_shared;
+    Eigen::Matrix<double, 2, 3> jacobian_wrt_lamp;
+  };
+  /// Returns the derivatives for an observation by a camera at `pose`. Its rotation
+  /// level_from_camera is level_from_base base_from_camera.
+  Effect effect_on(const Sighting& sighting, const LevelPose& pose, const Lens& lens,
+                   const Eigen::Matrix3d& level_from_base) const;
+
+  /// G: what the errors do to the states of a fix, by the shared ones and by each lamp's own.
+  template <int States>
+  /// G: derivatives of the states of a fix by the shared errors and by the errors of each lamp.
+  struct GainMatrix {
+    using SharedGain = Eigen::Matrix<double, States, Eigen::Dynamic, Eigen::ColMajor, States, 20>;
+    using LampGain = Eigen::Matrix<double, States, 3>;
+
+    SharedGain jacobian_wrt_shared;
+    /// Derivatives by the lamps of the fix, and the indices of these lamps in the map. The first
+    /// `size` elements are valid.
+    std::array<LampGain, kMaxSightings> jacobian_wrt_lamp;
+    std::array<std::size_t, kMaxSightings> lamps;
+    std::size_t size = 0;
+
+    explicit GainMatrix(Eigen::Index shared)
+        : jacobian_wrt_shared(SharedGain::Zero(States, shared)) {}
+    void add(std::size_t lamp, const LampGain& effect) {
+      jacobian_wrt_lamp[size] = effect;
+      lamps[size++] = lamp;
+    }
+  };
+  /// Gains of (X, Y, Z, yaw), and of all states of a body (BodyIndex).
+  using Gain = GainMatrix<4>;
+  using BodyGain = GainMatrix<kBodyStates>;
+  /// Returns the gain of a least-squares fix (estimate_pose_least_squares) with the covariance of
+  /// `camera`. `lamps` are the indices in the map of the observed lamps. For a single lamp, returns
+  /// the gain of compute_one_lamp_pose().
+  Gain compute_gain(std::span<const Sighting> sightings, std::span<const std::size_t> lamps,
+                    const PoseEstimate& camera, const Lens& lens,
+                    const Eigen::Matrix3d& level_from_base) const;
+  /// Returns the gain of a body with the camera at `arm_m`. The gain of the pixels, in standard
+  /// deviations, is that of the least-squares fix (estimate_body).
+  BodyGain compute_gain(std::span<const BodyObservation> sightings,
+                        std::span<const std::size_t> lamps, const Eigen::Vector3d& arm_m,
+                        const BodyFix& fix, const Lens& lens,
+                        const Eigen::Matrix3d& body_from_base) const;
+  /// Computes the expected contribution of the errors to chi-squared, from the common covariance
+  /// `common` = G C G' of the fix:
+  ///   tr(R C R') = tr(W J_c C J_c') - tr(N common),   R = W^1/2 (J_c - J G),   N = J' W J.
+  /// For a body with priors of information P, N + 2 P takes the place of N.
+  double expected_chi_squared(std::span<const Sighting> sightings,
+                              std::span<const std::size_t> lamps, const PoseEstimate& camera,
+                              const Matrix4& common, const Lens& lens,
+                              const Eigen::Matrix3d& level_from_base) const;
+  double expected_chi_squared(std::span<const BodyObservation> sightings,
+                              std::span<const std::size_t> lamps, const Eigen::Vector3d& arm_m,
+                              const BodyFix& fix, const BodyCovariance& common, const Lens& lens,
+                              const Eigen::Matrix3d& body_from_base) const;
+  /// Returns G C G' of a gain.
+  template <int States>
+  Eigen::Matrix<double, States, States, Eigen::DontAlign> compute_covariance(
+      const GainMatrix<States>& gain) const;
+  /// Returns the covariance of z of one observation.
+  Matrix2 compute_covariance(const Effect& effect, std::size_t lamp) const;
+
+  /// Returns the joint covariance: intrinsics, zenith and offset, as far as they exist. Lamps with
+  /// correlated errors follow, in the order of the map.
+  const MatrixX& joint() const { return covariance_; }
+  Eigen::Index intrinsics() const { return intrinsics_; }
+  Eigen::Index shared() const { return intrinsics_ + std::ssize(turns_); }
+
+ private:
+  bool has_zenith() const { return offset_ > intrinsics_; }
+  bool has_offset() const { return shared() > offset_; }
+  /// Errors of a lamp of the map. A large map has few lamps whose errors are correlated with
+  /// others: those of an adjustment or of a dispersion have rows in the joint covariance.
+  struct LampErrors {
+    /// First row of the lamp, if it has rows.
+    std::optional<Eigen::Index> row;
+    /// Variance per axis of a lamp without rows; 0 if unknown.
+    double variance_m2 = 0;
+  };
+  /// Gives rows to the lamps that are correlated with other errors, and sets the size of the joint
+  /// covariance.
+  void assign_rows(std::span<const Lamp> lamps, const Calibration& calibration);
+  /// Returns the covariance of a lamp's position.
+  Eigen::Matrix3d covariance_of_lamp(std::size_t lamp) const;
+  /// Returns the covariance of two lamps of the map.
+  Eigen::Matrix3d covariance_of_lamps(std::size_t lamp, std::size_t other) const;
+  /// Sets which parts are stated, and the covariances of lens and zenith without an adjustment.
+  void set_lens_and_zenith(const Calibration& calibration);
+  /// Sets the covariances of the lamps, and all that an adjustment states.
+  void set_lamps(std::span<const Lamp> lamps, const std::optional<Adjustment>& adjustment);
+  /// Adds the effects of earlier steps to zenith and offset. @pre one of them is applied
+  void propagate_to_zenith_and_offset(std::span<const Lamp> lamps, const Calibration& calibration);
+  /// Returns the first row of a lamp of the dispersion if the map has it at the same place and
+  /// states its error.
+  std::optional<Eigen::Index> find_stated_row(std::span<const Lamp> lamps,
+                                              const Dispersion::UncertainLamp& uncertain) const;
+
+  /// Number of intrinsics, and index of the first row of the offset.
+  Eigen::Index intrinsics_, offset_ = 0;
+  Eigen::Matrix3d base_from_camera_, camera_from_base_;
+  /// Derivatives of base_from_camera by the coordinates of zenith and offset.
+  std::vector<Eigen::Matrix3d> turns_;
+  MatrixX covariance_;
+  std::vector<LampErrors> lamps_;
+  bool stated_ = false, complete_ = false;
+  std::array<bool, kCommonErrorSources.size()> part_stated_ = {};
+  int lamps_elsewhere_ = 0;
+};
+
+/// Lamps that are rejected, as indices in the frame: none, one or several.
+struct OutlierLamps {
+  std::array<std::size_t, kMaxSightings> lamps;
+  std::size_t count = 0;
+};
+/// Finds the lamps that contradict the others by more than noise and common errors explain. Assumes
+/// that the errors of different lamps are independent.
+///
+/// While chi-squared exceeds its 1e-4 bound, rejects the lamp whose removal reduces chi-squared
+/// most. Returns none if chi-squared exceeds the bound with only three lamps left, or without a
+/// majority.
+///
+/// @param common  covariance of z of each observation from the common errors
+OutlierLamps find_outlier_lamps(std::span<const Sighting> sightings,
+                                std::span<const Matrix2> common, const LeastSquaresFix& fix);
+
+/// Computes the covariance of the zenith's normalized point from all its sources: its captures and
+/// the lens, or the adjustment if there is one. Returns std::nullopt if a source is not reported,
+/// or if the derivative by the lens is unknown.
+/// @pre there is a rotation center
+std::optional<Matrix2> compute_zenith_covariance(const Calibration& calibration);
+
+/// Computes the covariance of the dispersion's offset in px^2 from all its sources: its captures,
+/// the zenith, and the lens, which affects both. Returns std::nullopt as
+/// compute_zenith_covariance().
+/// @pre there is a dispersion
+std::optional<Matrix2> compute_offset_covariance(const Calibration& calibration);
+
+}  // namespace vlp

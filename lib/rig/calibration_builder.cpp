@@ -1,0 +1,59 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "rig/calibration_builder.h"
+
+#include <utility>
+
+namespace vlp {
+namespace {
+
+void remove_history(Calibration& calibration, const std::string& part) {
+  std::erase_if(calibration.history, [&](const HistoryEntry& entry) { return entry.part == part; });
+}
+
+void add_history(Calibration& calibration, const std::string& part, HistoryEntry entry) {
+  remove_history(calibration, part);
+  entry.part = part;
+  calibration.history.push_back(std::move(entry));
+}
+
+}  // namespace
+
+Calibration with_camera(Camera camera, std::optional<IntrinsicsReport> report, HistoryEntry entry) {
+  Calibration calibration;
+  calibration.camera = std::move(camera);
+  calibration.intrinsics_report = std::move(report);
+  add_history(calibration, "camera", std::move(entry));
+  return calibration;
+}
+
+Calibration with_rotation_center(Calibration calibration, const RotationCenter& rotation_center,
+                                 HistoryEntry entry) {
+  calibration.dispersion.reset();
+  remove_history(calibration, "dispersion");
+  calibration.adjustment.reset();
+  remove_history(calibration, "adjustment");
+  calibration.rotation_center = rotation_center;
+  add_history(calibration, "rotation_center", std::move(entry));
+  return calibration;
+}
+
+Calibration with_adjustment(Calibration calibration, const RotationCenter& rotation_center,
+                            Adjustment adjustment, HistoryEntry entry) {
+  calibration.dispersion.reset();
+  remove_history(calibration, "dispersion");
+  remove_history(calibration, "rotation_center");
+  calibration.rotation_center = rotation_center;
+  calibration.adjustment = std::move(adjustment);
+  add_history(calibration, "adjustment", std::move(entry));
+  return calibration;
+}
+
+Calibration with_dispersion(Calibration calibration, const Dispersion& dispersion,
+                            HistoryEntry entry) {
+  calibration.dispersion = dispersion;
+  add_history(calibration, "dispersion", std::move(entry));
+  return calibration;
+}
+
+}  // namespace vlp

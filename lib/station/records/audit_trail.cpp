@@ -1,0 +1,242 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/records/audit_trail.h"
+
+#include <fmt/format.h>
+#include <soci/soci.h>
+
+#include <algorithm>
+#include <map>
+#include <tuple>
+#include <utility>
+
+#include "captures/digest.h"
+#include "station/records/run_storage.h"
+
+namespace vlp {
+namespace {
+
+/// Concatenation of texts with their lengths, which makes it unambiguous.
+class DigestInput {
+ public:
+  void add(std::string_view text) { text_ += fmt::format("{} {}\n", text.size(), text); }
+  /// Adds a number with all bits, in the same digits for every program.
+  void add(double number) { add(fmt::format("{:.17g}", number)); }
+  std::string sha256() const { return sha256_of_text(text_); }
+
+ private:
+  std::string text_;
+};
+
+/// Computes the digest of a run without its events, which have their own entries. Skips empty
+/// texts, so that texts added by later versions of the tables do not change it.
+std::string compute_digest(const RunRecord& run) {
+  DigestInput content;
+  for (const RunField& field : run_fields()) {
+    if ((run.*field.text).empty()) continue;
+    content.add(field.name);
+    content.add(run.*field.text);
+  }
+  for (const CheckedMetric& metric : run.metrics) {
+    content.add("figure");
+    content.add(metric.name);
+    content.add(metric.unit);
+    content.add(metric.direction == Direction::at_least ? "at least" : "at most");
+    if (metric.value) content.add(*metric.value);
+    if (metric.limit) {
+      content.add("gate");
+      content.add(*metric.limit);
+    }
+    if (!metric.guard) continue;
+    content.add("guard");
+    content.add(metric.guard->standard_uncertainty);
+    content.add(metric.guard->k);
+  }
+  // Databases sort names differently.
+  auto images = run.images;
+  std::sort(images.begin(), images.end(), [](const auto& a, const auto& b) {
+    return std::tie(a.step, a.name) < std::tie(b.step, b.name);
+  });
+  for (const auto& [step, name, sha256, refused] : images) {
+    content.add("image");
+    for (const std::string* text : {&step, &name, &sha256, &refused}) content.add(*text);
+  }
+  return content.sha256();
+}
+
+std::string compute_digest(const std::string& run, const RunEvent& event) {
+  DigestInput content;
+  for (const std::string* text : {&run, &event.event, &event.what, &event.who, &event.text}) {
+    content.add(*text);
+  }
+  return content.sha256();
+}
+
+struct Entry {
+  long long number = 0;
+  /// `event` is empty for the entry of a run.
+  std::string run, event, content, digest;
+};
+
+std::string compute_digest(const Entry& entry, const std::string& before) {
+  DigestInput digest;
+  digest.add(std::to_string(entry.number));
+  for (const std::string* text : {&entry.run, &entry.event, &entry.content, &before}) {
+    digest.add(*text);
+  }
+  return digest.sha256();
+}
+
+std::vector<Entry> load_entries(soci::session& sql) {
+  Entry entry;
+  std::vector<Entry> entries;
+  soci::statement all =
+      (sql.prepare << "SELECT number, run, event, content, digest FROM trail ORDER BY number",
+       soci::into(entry.number), soci::into(entry.run), soci::into(entry.event),
+       soci::into(entry.content), soci::into(entry.digest));
+  all.execute();
+  while (all.fetch()) entries.push_back(entry);
+  return entries;
+}
+
+std::vector<std::string> load_run_ids(soci::session& sql) {
+  std::string run;
+  std::vector<std::string> runs;
+  soci::statement all =
+      (sql.prepare << "SELECT run FROM runs ORDER BY ended_utc, run", soci::into(run));
+  all.execute();
+  while (all.fetch()) runs.push_back(run);
+  return runs;
+}
+
+std::string describe_item(const std::string& run, const std::string& event) {
+  return event.empty() ? "run " + run : fmt::format("event {} of run {}", event, run);
+}
+
+/// Checks the digests and numbers of the entries.
+void check_chain(const std::vector<Entry>& entries, std::vector<std::string>& problems) {
+  long long next = 1;
+  // Stored and recomputed digest of the previous entry: a single change is then reported once.
+  std::string before, should_be;
+  for (const Entry& entry : entries) {
+    const bool gap = entry.number != next;
+    if (gap) {
+      problems.push_back(
+          entry.number - next == 1
+              ? fmt::format("entry {} of the trail was removed", next)
+              : fmt::format("entries {} to {} of the trail were removed", next, entry.number - 1));
+    }
+    const std::string digest = compute_digest(entry, before);
+    if (!gap && digest != entry.digest && compute_digest(entry, should_be) != entry.digest) {
+      problems.push_back(fmt::format("entry {} of the trail, of {}, was changed", entry.number,
+                                     describe_item(entry.run, entry.event)));
+    }
+    before = entry.digest;
+    should_be = digest;
+    next = entry.number + 1;
+  }
+}
+
+/// Contents of the entries by run and event. Checked ones are removed.
+class Contents {
+ public:
+  Contents(const std::vector<Entry>& entries, std::vector<std::string>& problems)
+      : problems_(problems) {
+    for (const Entry& entry : entries) {
+      if (entries_.emplace(std::pair(entry.run, entry.event), entry.content).second) continue;
+      problems_.push_back(fmt::format("entry {} of the trail was added: {} has one already",
+                                      entry.number, describe_item(entry.run, entry.event)));
+    }
+  }
+  void check(const std::string& run, const std::string& event, const std::string& content) {
+    const auto entry = entries_.find({run, event});
+    if (entry == entries_.end()) {
+      problems_.push_back(describe_item(run, event) +
+                          " has no entry in the trail: it was added by hand");
+      return;
+    }
+    if (entry->second != content) problems_.push_back(describe_item(run, event) + " was changed");
+    entries_.erase(entry);
+  }
+  /// Reports the remaining contents, which were not found.
+  void end() {
+    for (const auto& [name, content] : entries_) {
+      problems_.push_back(describe_item(name.first, name.second) + " was removed");
+    }
+  }
+
+ private:
+  std::map<std::pair<std::string, std::string>, std::string> entries_;
+  std::vector<std::string>& problems_;
+};
+
+}  // namespace
+
+void lock_trail(soci::session& sql) { sql << "UPDATE vlp_schema SET version = version"; }
+
+TrailContent make_run_content(soci::session& sql, const std::string& run) {
+  // As read from the database, which can store a number differently than given.
+  return {run, "", compute_digest(load_run(sql, run).value())};
+}
+
+TrailContent make_event_content(const std::string& run, const RunEvent& event) {
+  return {run, event.event, compute_digest(run, event)};
+}
+
+void append_to_trail(soci::session& sql, const std::vector<TrailContent>& contents) {
+  if (contents.empty()) return;
+  lock_trail(sql);
+  Entry last;
+  sql << "SELECT number, digest FROM trail ORDER BY number DESC LIMIT 1", soci::into(last.number),
+      soci::into(last.digest);
+  for (const auto& [run, event, content] : contents) {
+    Entry entry{last.number + 1, run, event, content, ""};
+    entry.digest = compute_digest(entry, last.digest);
+    sql << "INSERT INTO trail (number, run, event, content, digest) VALUES (:number, :run, :event, "
+           ":content, :digest)",
+        soci::use(entry.number), soci::use(entry.run), soci::use(entry.event),
+        soci::use(entry.content), soci::use(entry.digest);
+    last = entry;
+  }
+}
+
+void append_all_runs(soci::session& sql) {
+  std::vector<TrailContent> contents;
+  for (const std::string& run : load_run_ids(sql)) {
+    contents.push_back(make_run_content(sql, run));
+    const RunRecord kept = load_run(sql, run).value();
+    for (const RunEvent& event : kept.events) contents.push_back(make_event_content(run, event));
+  }
+  append_to_trail(sql, contents);
+}
+
+TrailCheck check_trail(soci::session& sql, const std::string& expected_digest,
+                       const std::function<void()>& on_progress) {
+  TrailCheck check;
+  const auto entries = load_entries(sql);
+  check.entries = entries.size();
+  if (!entries.empty()) check.last_digest = entries.back().digest;
+  check_chain(entries, check.problems);
+  on_progress();
+  Contents contents(entries, check.problems);
+  for (const std::string& name : load_run_ids(sql)) {
+    const RunRecord run = load_run(sql, name).value();
+    ++check.runs;
+    contents.check(name, "", compute_digest(run));
+    for (const RunEvent& event : run.events) {
+      contents.check(name, event.event, compute_digest(name, event));
+    }
+    on_progress();
+  }
+  contents.end();
+  const bool is_in_trail = std::any_of(entries.begin(), entries.end(), [&](const Entry& entry) {
+    return entry.digest == expected_digest;
+  });
+  if (!expected_digest.empty() && !is_in_trail) {
+    check.problems.push_back("the entry that was noted, " + expected_digest +
+                             ", is not in the trail: its end was removed, or all of it is another");
+  }
+  return check;
+}
+
+}  // namespace vlp

@@ -1,0 +1,139 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/records/golden_unit_schedule.h"
+
+#include <fcntl.h>
+#include <fmt/core.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <sstream>
+#include <system_error>
+
+#include "captures/digest.h"
+#include "captures/shared_folder.h"
+#include "rig/input_error.h"
+#include "station/records/measuring_digest.h"
+#include "station/station_folders.h"
+
+namespace vlp {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kUnitLine = "unit\n";
+
+constexpr std::size_t kMaxBytes = 1 << 24;
+
+std::string make_note_name(const StationConfig& config) {
+  constexpr std::size_t digits = 16;
+  return ".golden-" + sha256_of_text(config.station).substr(0, digits);
+}
+
+/// Returns the message about an incomplete note.
+std::string describe_damaged_note(const std::string& why) {
+  return fmt::format("what the golden unit said is not known ({}): 'vlp-station verify' is due",
+                     why);
+}
+
+/// Deletes the note, so that an earlier PASS is not valid after a run that could not be noted.
+void delete_note(const StationConfig& config) {
+  std::error_code ignored;
+  fs::remove(config.spool / make_note_name(config), ignored);
+}
+
+/// Adds a line to the note if it exists. Throws InputError if it cannot be written.
+void append(const SharedFolder& spool, const std::string& note, std::string_view line) {
+  const int file = spool.open(note, O_WRONLY | O_APPEND);
+  if (file < 0 && errno == ENOENT) return;
+  const bool is_written =
+      file >= 0 && ::write(file, line.data(), line.size()) == static_cast<ssize_t>(line.size());
+  if (file >= 0) ::close(file);
+  if (!is_written) throw InputError(spool.path() / note, "cannot be written");
+}
+
+}  // namespace
+
+std::string golden_problem(const StationConfig& config, GoldenCheckTime at) {
+  constexpr const char* verify = "'vlp-station verify' is due";
+  if (!config.verify_due) return "";
+  const fs::path file = config.spool / make_note_name(config);
+  std::error_code none;
+  if (fs::symlink_status(file, none).type() == fs::file_type::not_found) {
+    return fmt::format("the golden unit was not measured here yet: {}", verify);
+  }
+  std::string text;
+  try {
+    text = SharedFolder(config.spool).read(make_note_name(config), kMaxBytes).value_or("");
+  } catch (const InputError& error) {
+    return describe_damaged_note(error.what());
+  }
+  if (!text.ends_with('\n'))
+    return describe_damaged_note(file.string() + ": is the file cut short?");
+  std::istringstream words(text.substr(0, text.find('\n')));
+  std::string run, verdict, ended_utc, measured_with;
+  words >> run >> verdict >> ended_utc >> measured_with;
+  const bool failed = verdict == to_string(Verdict::fail);
+  if ((!failed && verdict != to_string(Verdict::pass)) || ended_utc.empty()) {
+    return describe_damaged_note(file.string() + " is damaged");
+  }
+  if (failed) {
+    return fmt::format("the golden unit failed (run {}): mend the station, then {}", run, verify);
+  }
+  if (measured_with.empty()) {  // note of an older program
+    return fmt::format("with which lamp map the golden unit was measured is not known (run {}): {}",
+                       run, verify);
+  }
+  if (measured_with != measuring_digest(config)) {
+    return fmt::format(
+        "what measures in station.yaml or a file that it names was changed since the golden unit "
+        "was measured (run {}): {}",
+        run, verify);
+  }
+  if (at == GoldenCheckTime::verdict) return "";
+  constexpr double second_per_hour = 3600;
+  const double age_h = seconds_since(ended_utc) / second_per_hour;
+  const auto& due = *config.verify_due;
+  if (due.hours && !(age_h >= 0 && age_h <= *due.hours)) {
+    return fmt::format("the golden unit was measured {} (run {}), not within {:g} h: {}", ended_utc,
+                       run, *due.hours, verify);
+  }
+  const auto units = std::count(text.begin(), text.end(), '\n') - 1;
+  if (due.units && units >= *due.units) {
+    return fmt::format("{} units since the golden unit was measured (run {}): {}", units, run,
+                       verify);
+  }
+  return "";
+}
+
+void update_golden_note(const StationConfig& config, const RunRecord& record) {
+  if (!config.verify_due || record.invalid()) return;
+  make_folder(config.spool);
+  const SharedFolder spool(config.spool);
+  const std::string note = make_note_name(config);
+  try {
+    if (record.kind == "golden") {
+      spool.replace(note, fmt::format("{} {} {} {}\n", record.run, record.verdict, record.ended_utc,
+                                      measuring_digest(config)));
+    } else {
+      append(spool, note, kUnitLine);  // never measured: nothing to count from
+    }
+  } catch (const InputError&) {
+    delete_note(config);
+    throw;
+  }
+}
+
+bool invalidate_golden_note(const StationConfig& config, const std::string& run) {
+  try {
+    const auto note = SharedFolder(config.spool).read(make_note_name(config), kMaxBytes);
+    if (!note || note->substr(0, note->find(' ')) != run) return false;
+  } catch (const InputError&) {  // no spool, or no valid note (golden_problem())
+    return false;
+  }
+  delete_note(config);
+  return true;
+}
+
+}  // namespace vlp

@@ -1,0 +1,124 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/statistics/run_metrics.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+namespace vlp {
+
+std::vector<MetricKind> list_run_metrics() {
+  auto kinds = unit_metrics();
+  const auto fix_metrics = metric_kinds({MetricSource::evaluation});
+  kinds.insert(kinds.end(), fix_metrics.begin(), fix_metrics.end());
+  return kinds;
+}
+
+MetricKind find_run_metric(const std::string& name) {
+  const auto kinds = list_run_metrics();
+  const auto kind = std::find_if(kinds.begin(), kinds.end(),
+                                 [&](const MetricKind& any) { return any.name == name; });
+  if (kind != kinds.end()) return *kind;
+  std::string names;
+  for (const MetricKind& any : kinds) names.append(names.empty() ? "" : ", ").append(any.name);
+  throw std::invalid_argument("there is no figure " + name + "; there are: " + names);
+}
+
+std::vector<TrendPoint> load_judged_values(Records& records, const std::string& metric,
+                                           RunFilter filter) {
+  if (!filter.verdict.empty()) return records.trend(metric, filter);
+  const int last = std::exchange(filter.last, 0);
+  auto points = records.trend(metric, filter);
+  std::erase_if(
+      points, [](const TrendPoint& point) { return point.verdict == to_string(Verdict::invalid); });
+  return keep_last(std::move(points), last);
+}
+
+void check_one_station(const std::vector<TrendPoint>& points) {
+  for (const TrendPoint& point : points) {
+    if (point.station == points.front().station) continue;
+    throw std::invalid_argument(
+        fmt::format("there are runs of {} and of {}: say of which with "
+                    "--of-station, or of all with --of-station any",
+                    points.front().station, point.station));
+  }
+}
+
+std::optional<double> find_gate(const std::string& metric, const StationConfig* station,
+                                Records& records, const std::vector<TrendPoint>& points) {
+  if (station != nullptr) {
+    for (const Gate& gate : station->gates) {
+      if (gate.metric == metric) return gate.limit;
+    }
+    return std::nullopt;
+  }
+  const auto last = points.empty() ? std::nullopt : records.find(points.back().run);
+  if (!last) return std::nullopt;
+  for (const CheckedMetric& any : last->metrics) {
+    if (any.name == metric) return any.limit;
+  }
+  return std::nullopt;
+}
+
+ToleranceLimits make_limits(const MetricKind& kind, std::optional<double> gate) {
+  if (kind.direction == Direction::at_least) return {gate, std::nullopt};
+  return {std::nullopt, gate};
+}
+
+std::vector<StudyValue> select_study_values(const std::vector<TrendPoint>& points,
+                                            const std::vector<std::string>& units) {
+  std::map<std::string, std::size_t> runs;
+  for (const TrendPoint& point : points) ++runs[point.camera];
+  std::string unknown;
+  for (const std::string& unit : units) {
+    if (!runs.contains(unit)) unknown.append(unknown.empty() ? "" : ", ").append(unit);
+  }
+  if (!unknown.empty()) {
+    throw std::invalid_argument("no judged run that has the figure is of: " + unknown);
+  }
+  std::vector<StudyValue> values;
+  for (const TrendPoint& point : points) {
+    const bool named = std::count(units.begin(), units.end(), point.camera) > 0;
+    if (named || (units.empty() && runs[point.camera] > 1)) {
+      values.push_back({point.camera, point.station, point.value});
+    }
+  }
+  return values;
+}
+
+void check_repetitions(Records& records, const std::vector<TrendPoint>& points,
+                       const std::vector<StudyValue>& values) {
+  std::map<std::string, std::vector<RunRecord>> runs_of_unit;
+  for (const StudyValue& value : values) runs_of_unit[value.unit];
+  for (const TrendPoint& point : points) {
+    const auto runs = runs_of_unit.find(point.camera);
+    if (runs == runs_of_unit.end()) continue;
+    auto run = records.find(point.run);
+    if (!run) continue;
+    for (const RunRecord& earlier : runs->second) {
+      if (!repeats_images(*run, earlier) && !repeats_images(earlier, *run)) continue;
+      throw std::invalid_argument(
+          fmt::format("runs {} and {} of camera {} have the same images, which is no repetition: "
+                      "take new images, or void one of the two",
+                      earlier.run, run->run, point.camera));
+    }
+    runs->second.push_back(std::move(*run));
+  }
+}
+
+std::vector<ReferenceValue> select_reference_values(
+    const std::vector<TrendPoint>& points, const std::map<std::string, double>& references) {
+  std::vector<std::string> units;
+  units.reserve(references.size());
+  for (const auto& [unit, reference] : references) units.push_back(unit);
+  std::vector<ReferenceValue> values;
+  for (const auto& [unit, station, value] : select_study_values(points, units)) {
+    values.push_back({unit, references.at(unit), value});
+  }
+  return values;
+}
+
+}  // namespace vlp

@@ -1,0 +1,122 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// Tags shrunk by a tone curve.
+#include "calibration/intrinsics/edge_displacement.h"
+
+#include <gtest/gtest.h>
+
+#include "calibration/intrinsics/board_check.h"
+#include "calibration/intrinsics/projection_difference.h"
+#include "calibration/intrinsics/synthetic_views.h"
+#include "calibration/intrinsics/wide_views.h"
+
+namespace vlp {
+namespace {
+
+/// Board of separate tags, with gaps as wide as a tag or narrower.
+class EstimateEdgeShifts : public testing::TestWithParam<double> {
+ protected:
+  Board board() const {
+    Board board = synthetic_board(false);
+    board.tag_spacing = GetParam();
+    return board;
+  }
+  std::vector<BoardView> shrunk_views(int count, double noise_px, double shift_px) const {
+    const SyntheticViews views{board(), synthetic_lens()};
+    const BoardLattice lattice(views.board);
+    Random random(31);
+    std::vector<BoardView> seen;
+    while (static_cast<int>(seen.size()) < count) {
+      BoardDetection view = views.random_view(random, noise_px);
+      if (!lattice.sufficient(view)) continue;
+      for (TagDetection& tag : view.tags) tag = shrunk(tag, shift_px);
+      seen.push_back({"", views.imager_px, view});
+    }
+    return seen;
+  }
+  IntrinsicsInput make_input(const std::vector<BoardView>& seen) const {
+    IntrinsicsInput input{BoardLattice(board()), {}, {800, 600}, LensModel::opencv8};
+    for (const BoardView& view : seen) input.views.push_back(input.lattice.corners(view.seen));
+    return input;
+  }
+};
+
+TEST_P(EstimateEdgeShifts, ReturnsShiftOfEachView) {
+  const auto input = make_input(shrunk_views(6, 0, 0.3));
+  const auto shifts = estimate_edge_shifts(input.views, synthetic_lens());
+  ASSERT_EQ(shifts.size(), 6U);
+  for (const EdgeShift& shift : shifts) EXPECT_NEAR(shift.at(shift.middle), 0.3, 0.005);
+  const auto none = estimate_edge_shifts(make_input(shrunk_views(6, 0, 0)).views, synthetic_lens());
+  ASSERT_EQ(none.size(), 6U);
+  for (const EdgeShift& shift : none) EXPECT_NEAR(shift.at(shift.middle), 0, 1e-6);
+}
+
+TEST_P(EstimateEdgeShifts, CorrectsLensOfSolve) {
+  const auto input = make_input(shrunk_views(16, 0.03, 0.35));
+  const IntrinsicsSolution solution = solve_intrinsics(input);
+  ASSERT_TRUE(solution.ok());
+  ASSERT_EQ(solution.edge_shifts_px.size(), 16U);
+  for (const double shift_px : solution.edge_shifts_px) EXPECT_NEAR(shift_px, 0.35, 0.03);
+  EXPECT_NEAR(solution.rms_px, 0.03, 0.004);
+  const auto difference =
+      compute_projection_difference(synthetic_lens(), solution.lens(), {800, 600}, even);
+  ASSERT_TRUE(difference);
+  EXPECT_LT(difference->mean_px, 0.03);
+}
+
+TEST_P(EstimateEdgeShifts, DistinguishesVaryingShiftFromWarp) {
+  auto seen = shrunk_views(16, 0.03, 0);
+  for (BoardView& view : seen) {
+    for (TagDetection& tag : view.seen.tags) {
+      tag = shrunk(tag, 0.3 + 0.1 * (tag.corners_px[0].x() - 400) / 400);
+    }
+  }
+  const IntrinsicsSolution solution = solve_intrinsics(make_input(seen));
+  ASSERT_TRUE(solution.ok());
+  EXPECT_FALSE(solution.solved_for.warp);
+  EXPECT_NEAR(solution.rms_px, 0.03, 0.004);
+  const auto difference =
+      compute_projection_difference(synthetic_lens(), solution.lens(), {800, 600}, even);
+  ASSERT_TRUE(difference);
+  EXPECT_LT(difference->mean_px, 0.03);
+}
+
+TEST_P(EstimateEdgeShifts, KeepsSpacingAcceptedByCheckBoard) {
+  const auto seen = shrunk_views(10, 0.03, 0.4);
+  EXPECT_EQ(check_board(board(), seen, {}).problem, "");
+  EXPECT_EQ(check_board(board(), seen, synthetic_lens()).problem, "");
+  Board other = board();
+  other.tag_spacing += 0.06;
+  EXPECT_NE(check_board(other, seen, synthetic_lens()).problem, "");
+}
+
+INSTANTIATE_TEST_SUITE_P(Spacings, EstimateEdgeShifts, testing::Values(1.0, 0.4),
+                         [](const auto& gap) { return gap.param == 1 ? "OneTag" : "Narrow"; });
+
+/// A warped board that is assumed flat looks as if edges shifted inwards here and outwards there.
+TEST(EdgeShift, DoesNotAbsorbBoardWarp) {
+  constexpr double noise_px = 0.017;
+  Random random(12);
+  const WideBoards boards{0.1, 0.2};
+  const auto input = wide_input(false, 40, random, noise_px, {6e-4, 9e-4}, boards);
+  const IntrinsicsSolution solution = solve_intrinsics(input);
+  ASSERT_TRUE(solution.ok());
+  EXPECT_TRUE(solution.solved_for.warp);
+  EXPECT_NEAR(solution.rms_px, 0.0165, 0.0005);  // 0.0176 with such shifts left in
+  const auto difference =
+      compute_projection_difference(wide_lens(), solution.lens(), kWideImager, even);
+  ASSERT_TRUE(difference);
+  EXPECT_LT(difference->rms_px, 0.006);  // 0.0144
+}
+
+TEST(EdgeShift, IsZeroForTouchingSquares) {
+  const SyntheticViews views{synthetic_board(true), synthetic_lens()};
+  Random random(3);
+  const auto input = views.input(4, random, 0.1);
+  const auto shifts = estimate_edge_shifts(input.views, views.lens);
+  ASSERT_EQ(shifts.size(), 4U);
+  for (const EdgeShift& shift : shifts) EXPECT_TRUE(shift.coefficients.isZero(0));
+}
+
+}  // namespace
+}  // namespace vlp

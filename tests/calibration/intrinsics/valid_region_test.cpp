@@ -1,0 +1,54 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/intrinsics/valid_region.h"
+
+#include <gtest/gtest.h>
+
+#include "geometry/polygon.h"
+
+namespace vlp {
+namespace {
+
+constexpr std::array kImager{801, 601};
+constexpr double kMargin = 40;  // 4 % of 1000 px
+
+TEST(KnownRegion, IsConvexHullWithMargin) {
+  const ImageRegion region = compute_known_region(
+      {{200, 100}, {600, 100}, {400, 250}, {600, 500}, {200, 500}}, kImager, LensModel::opencv8);
+  EXPECT_EQ(region.size(), 4U);
+  EXPECT_NEAR(compute_image_fraction(region, kImager),
+              (400 + 2 * kMargin) * (400 + 2 * kMargin) / (800 * 600), 1e-12);
+  EXPECT_TRUE(polygon_contains(region, {161, 61}));
+  EXPECT_TRUE(polygon_contains(region, {160, 300}));
+  EXPECT_FALSE(polygon_contains(region, {159, 300}));
+  EXPECT_FALSE(polygon_contains(region, {400, 541}));
+}
+
+TEST(KnownRegion, IsClippedToImage) {
+  const ImageRegion region =
+      compute_known_region({{5, 5}, {790, 5}, {790, 590}, {5, 590}}, kImager, LensModel::opencv8);
+  EXPECT_NEAR(compute_image_fraction(region, kImager), 1, 1e-12);
+  for (const Eigen::Vector2d& corner : region) {
+    EXPECT_TRUE(corner.x() == 0 || corner.x() == 800);
+    EXPECT_TRUE(corner.y() == 0 || corner.y() == 600);
+  }
+  EXPECT_TRUE(polygon_contains(region, {800, 600}));
+}
+
+TEST(KnownRegion, FollowsSlantedHull) {
+  const ImageRegion region = compute_known_region({{100, 100}, {700, 500}, {690, 510}, {90, 110}},
+                                                  kImager, LensModel::opencv8);
+  EXPECT_TRUE(polygon_contains(region, {400, 300}));
+  EXPECT_FALSE(polygon_contains(region, {700, 100}));
+  EXPECT_LT(compute_image_fraction(region, kImager), 0.3);
+}
+
+TEST(KnownRegion, IsEmptyForCollinearCorners) {
+  EXPECT_TRUE(compute_known_region({}, kImager, LensModel::opencv8).empty());
+  EXPECT_TRUE(
+      compute_known_region({{1, 1}, {2, 2}, {3, 3}, {9, 9}}, kImager, LensModel::opencv8).empty());
+  EXPECT_EQ(compute_image_fraction({}, kImager), 0);
+}
+
+}  // namespace
+}  // namespace vlp

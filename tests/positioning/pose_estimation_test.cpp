@@ -1,0 +1,408 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// Bodies that move, rotate and are tilted. Without noise the fix equals the truth for all
+/// combinations of estimated states; with noise the scatter matches the reported covariance.
+#include "positioning/pose_estimation.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+
+#include "positioning/three_lamp_poses.h"
+#include "support/body_rig.h"
+#include "support/matchers.h"
+
+namespace vlp {
+namespace {
+
+constexpr double kExactBody = 1e-9;
+/// Standard deviation with negligible weight.
+constexpr double kUnknown = 1e3;
+constexpr double kTinyNoise_px = 1e-3;
+
+struct Estimated {
+  bool velocity, yaw_rate, lean;
+};
+constexpr std::array<Estimated, 8> kCombinations{{{false, false, false},
+                                                  {true, false, false},
+                                                  {false, true, false},
+                                                  {true, true, false},
+                                                  {false, false, true},
+                                                  {true, false, true},
+                                                  {false, true, true},
+                                                  {true, true, true}}};
+
+std::string name_of_combination(const testing::TestParamInfo<Estimated>& info) {
+  const std::string name = std::string(info.param.velocity ? "Velocity" : "") +
+                           (info.param.yaw_rate ? "YawRate" : "") + (info.param.lean ? "Lean" : "");
+  return name.empty() ? "Given" : name;
+}
+
+BodyState random_state(Random& random, double lean_rad) {
+  BodyState state;
+  for (int i = 0; i < 3; ++i) state.pose.position_m[i] = random.uniform(-0.3, 0.3);
+  state.pose.yaw_rad = random.uniform(-3.1, 3.1);
+  state.motion.velocity_m_per_s.x() = random.uniform(-2, 2);
+  state.motion.velocity_m_per_s.y() = random.uniform(-2, 2);
+  state.motion.yaw_rate_rad_per_s = random.uniform(-1.6, 1.6);
+  state.motion.inclination.roll_rad = random.uniform(-lean_rad, lean_rad);
+  state.motion.inclination.pitch_rad = random.uniform(-lean_rad, lean_rad);
+  return state;
+}
+
+/// States that are not estimated are exact; estimated states are unknown.
+Sensors sensors_for(const BodyState& state, const Estimated& estimated) {
+  Sensors sensors;
+  KnownMotion motion;
+  if (estimated.velocity) {
+    motion.velocity_sd_m_per_s = kUnknown;
+  } else {
+    motion.velocity_m_per_s = state.motion.velocity_m_per_s;
+  }
+  if (estimated.yaw_rate) {
+    motion.yaw_rate_sd_rad_per_s = kUnknown;
+  } else {
+    motion.yaw_rate_rad_per_s = state.motion.yaw_rate_rad_per_s;
+  }
+  if (estimated.lean) {
+    sensors.inclination_sigma_rad = kUnknown;
+  } else {
+    sensors.inclination = state.motion.inclination;
+  }
+  sensors.motion = motion;
+  return sensors;
+}
+
+void expect_state(const Fix& fix, const BodyState& state, double tolerance) {
+  ASSERT_TRUE(fix.ok()) << to_string(fix.status);
+  EXPECT_THAT(fix.estimate.pose.position_m, IsNear(state.pose.position_m, tolerance));
+  EXPECT_NEAR(wrap_rad(fix.estimate.pose.yaw_rad - state.pose.yaw_rad), 0, tolerance);
+  ASSERT_TRUE(fix.body.has_value());
+  const Eigen::Vector2d velocity =
+      Eigen::Rotation2Dd(state.pose.yaw_rad) * state.motion.velocity_m_per_s;
+  // A hundredth of a second lies between the first row and the last.
+  EXPECT_THAT(fix.body->velocity_m_per_s, IsNear(velocity, 100 * tolerance));
+  EXPECT_NEAR(fix.body->yaw_rate_rad_per_s, state.motion.yaw_rate_rad_per_s, 100 * tolerance);
+  const Inclination& lean = state.motion.inclination;
+  EXPECT_NEAR(wrap_rad(fix.body->inclination.roll_rad - lean.roll_rad), 0, tolerance);
+  EXPECT_NEAR(wrap_rad(fix.body->inclination.pitch_rad - lean.pitch_rad), 0, tolerance);
+}
+
+class PositionerNoiselessBody : public testing::TestWithParam<Estimated> {
+ protected:
+  Random random{41};
+
+  void expect_exact(BodyRig rig, std::size_t lamps, bool one_height, double min_rad) {
+    rig.map = draw_lamps_in_view(rig, lamps, one_height, min_rad, random);
+    const auto detections = seen_from(rig, kTinyNoise_px);
+    if (detections.size() < lamps) return;
+    const Fix fix = rig.positioner().locate(detections, sensors_for(rig.body, GetParam()));
+    expect_state(fix, rig.body, kExactBody);
+    ++fixes;
+  }
+  int fixes = 0;
+};
+
+TEST_P(PositionerNoiselessBody, MatchesTruthForLampsAtOneHeight) {
+  for (int i = 0; i < 60; ++i) {
+    expect_exact({{}, rolling_calibration(), random_state(random, 0.1), {}}, 7, true, 0.4);
+  }
+  EXPECT_GT(fixes, 40);
+}
+
+TEST_P(PositionerNoiselessBody, MatchesTruthForLampsAtManyHeights) {
+  for (int i = 0; i < 60; ++i) {
+    expect_exact({{}, rolling_calibration(), random_state(random, 0.1), {}}, 7, false, 0.4);
+  }
+  EXPECT_GT(fixes, 40);
+}
+
+TEST_P(PositionerNoiselessBody, MatchesTruthWithColumnReadoutAndCalibratedTilt) {
+  for (int i = 0; i < 40; ++i) {
+    BodyRig rig{{}, rolling_calibration(), random_state(random, 0.1), {}};
+    rig.calibration.camera.readout = Readout::columns;
+    rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.05, 0.1 * i);
+    expect_exact(rig, 7, i % 2 == 0, 0.4);
+  }
+  EXPECT_GT(fixes, 25);
+}
+
+TEST_P(PositionerNoiselessBody, MatchesTruthOfRobot) {
+  for (int i = 0; i < 40; ++i) {
+    BodyRig rig{{}, rolling_calibration(), random_state(random, 0.1), {}};
+    rig.mount = CameraMount{{0.3, -0.1, 0.2}, 0.1 * i};
+    expect_exact(rig, 7, i % 2 == 0, 0.4);
+  }
+  EXPECT_GT(fixes, 25);
+}
+
+TEST_P(PositionerNoiselessBody, MatchesTruthForTiltUpTo80Degrees) {
+  for (int i = 0; i < 80; ++i) {
+    BodyRig rig{{}, rolling_calibration(), random_state(random, 0), {}};
+    rig.body.motion.inclination.roll_rad = rad_from_deg(random.uniform(-80, 80));
+    if (i % 2)
+      std::swap(rig.body.motion.inclination.roll_rad, rig.body.motion.inclination.pitch_rad);
+    expect_exact(rig, 7, i % 4 < 2, 0.25);
+  }
+  EXPECT_GT(fixes, 40);
+}
+
+/// A correct prior does not change the fix, even if the lamps hardly determine the state.
+TEST_P(PositionerNoiselessBody, MatchesTruthWhenPriorMeanIsTrue) {
+  for (int i = 0; i < 60; ++i) {
+    BodyRig rig{{}, rolling_calibration(), random_state(random, 0.1), {}};
+    const std::size_t lamps = 2 + random.index(3);
+    rig.map = draw_lamps_in_view(rig, lamps, true, 0.4, random);
+    const auto detections = seen_from(rig, 0.1);
+    if (detections.size() < lamps) continue;
+    Sensors sensors;
+    const BodyMotion& motion = rig.body.motion;
+    sensors.motion = {motion.velocity_m_per_s, motion.yaw_rate_rad_per_s,
+                      GetParam().velocity ? 0.5 : 0, GetParam().yaw_rate ? 0.3 : 0};
+    sensors.inclination = motion.inclination;
+    sensors.inclination_sigma_rad = GetParam().lean ? 0.02 : 0;
+    expect_state(rig.positioner().locate(detections, sensors), rig.body, kExactBody);
+    ++fixes;
+  }
+  EXPECT_GT(fixes, 40);
+}
+
+INSTANTIATE_TEST_SUITE_P(Estimates, PositionerNoiselessBody, testing::ValuesIn(kCombinations),
+                         name_of_combination);
+
+TEST(EvaluatedState, DerivativesMatchFiniteDifferences) {
+  // Central differences: step^2 and rounding / step, times a second at most.
+  constexpr double step = 1e-6, tolerance = 1e-8;
+  Random random(5);
+  for (int i = 0; i < 20; ++i) {
+    const BodyState state = random_state(random, 1.4);
+    const Eigen::Vector3d lamp_m(1.1, 0.4, 2.5);
+    const double time_s = random.uniform(-0.2, 0.2);
+    const auto derivative = EvaluatedState(state).d_lamp_in_body(lamp_m, time_s);
+    for (int index = 0; index < kBodyStates; ++index) {
+      const auto q = [&](double change) {
+        BodyState at = state;
+        BodyMotion& motion = at.motion;
+        if (index < 3) at.pose.position_m[index] += change;
+        if (index == kBodyYaw) at.pose.yaw_rad += change;
+        if (index == kBodyVelocity) motion.velocity_m_per_s.x() += change;
+        if (index == kBodyVelocity + 1) motion.velocity_m_per_s.y() += change;
+        if (index == kBodyYawRate) motion.yaw_rate_rad_per_s += change;
+        if (index == kBodyRoll) motion.inclination.roll_rad += change;
+        if (index == kBodyPitch) motion.inclination.pitch_rad += change;
+        return EvaluatedState(at).lamp_in_body(lamp_m, time_s);
+      };
+      const Eigen::Vector3d difference = (q(step) - q(-step)) / (2 * step);
+      EXPECT_THAT(Eigen::Vector3d(derivative.col(index)), IsNear(difference, tolerance)) << index;
+    }
+  }
+}
+
+TEST(WhitenedPixelFromRay, MatchesLens) {
+  const Camera camera = synthetic_camera();
+  const Lens lens(camera.lens_model, camera.intrinsics);
+  constexpr double step_px = 1e-3, sigma_px = 0.25;
+  for (const Eigen::Vector2d& pixel : {Eigen::Vector2d(100, 500), Eigen::Vector2d(420, 290)}) {
+    const auto ray = lens.unproject(pixel);
+    ASSERT_TRUE(ray);
+    const auto matrix = whitened_pixel_from_ray(ray->direction, ray->d_direction_d_pixel, sigma_px);
+    ASSERT_TRUE(matrix);
+    const Eigen::Vector3d unit_ray = ray->direction.normalized();
+    EXPECT_THAT(Eigen::Vector2d(*matrix * unit_ray), IsNear(Eigen::Vector2d(0, 0), 1e-9));
+    for (const Eigen::Vector2d& move : {Eigen::Vector2d(step_px, 0), Eigen::Vector2d(0, step_px)}) {
+      const Eigen::Vector3d moved = lens.unproject(pixel + move).value().direction;
+      const Eigen::Vector2d found = *matrix * moved / unit_ray.dot(moved) * sigma_px;
+      EXPECT_THAT(found, IsNear(move, 1e-7));
+    }
+  }
+}
+
+TEST(ComputeThreeLampPoses, ContainsTruth) {
+  Random random(6);
+  int exact = 0;
+  constexpr int draws = 5000;
+  for (int i = 0; i < draws; ++i) {
+    std::array<Eigen::Vector3d, 3> lamps_m, rays;
+    const BodyState state = random_state(random, 1.2);
+    const Eigen::Isometry3d camera_from_world = world_from_body(state, 0).inverse();
+    for (std::size_t k = 0; k < 3; ++k) {
+      lamps_m[k].x() = random.uniform(-2, 2);
+      lamps_m[k].y() = random.uniform(-2, 2);
+      lamps_m[k].z() = i % 2 ? 2 : random.uniform(1.7, 2.3);
+      rays[k] = (camera_from_world * lamps_m[k]).normalized();
+    }
+    const ThreeLampPoses found = compute_three_lamp_poses(lamps_m, rays);
+    double nearest = 1;
+    for (int k = 0; k < found.count; ++k) {
+      const FreePose& pose = found.poses[static_cast<std::size_t>(k)];
+      nearest = std::min(nearest, (pose.position_m - state.pose.position_m).norm() +
+                                      (pose.camera_from_world - camera_from_world.linear()).norm());
+    }
+    exact += nearest < 1e-7;
+  }
+  // A few draws have two nearly equal solutions.
+  EXPECT_GE(exact, draws - 5);
+}
+
+TEST(ComputeThreeLampPoses, ReturnsNoneForCollinearLamps) {
+  const std::array<Eigen::Vector3d, 3> lamps_m{
+      Eigen::Vector3d(-1, 0.2, 2), {0, 0.2, 2}, {1, 0.2, 2}};
+  std::array<Eigen::Vector3d, 3> rays;
+  for (std::size_t i = 0; i < 3; ++i) rays[i] = lamps_m[i].normalized();
+  EXPECT_EQ(compute_three_lamp_poses(lamps_m, rays).count, 0);
+}
+
+/// A lamp with equal distances and angles to both others: one of the conics is a pair of lines.
+TEST(ComputeThreeLampPoses, ContainsTruthForSymmetricLamps) {
+  for (const double up_m : {-2.0, -1.5}) {
+    for (const double aside_m : {0.0, 0.3}) {
+      const Eigen::Vector3d camera_m(0, aside_m, up_m);
+      const std::array<Eigen::Vector3d, 3> lamps_m{
+          Eigen::Vector3d(-0.5, -0.5, 0), {0.5, -0.5, 0}, {0, 0.6, 0}};
+      std::array<Eigen::Vector3d, 3> rays;
+      for (std::size_t i = 0; i < 3; ++i) rays[i] = (lamps_m[i] - camera_m).normalized();
+      const ThreeLampPoses found = compute_three_lamp_poses(lamps_m, rays);
+      double nearest_m = 1;
+      for (int i = 0; i < found.count; ++i) {
+        const FreePose& pose = found.poses[static_cast<std::size_t>(i)];
+        nearest_m = std::min(nearest_m, (pose.position_m - camera_m).norm());
+      }
+      EXPECT_LT(nearest_m, 1e-6) << camera_m.transpose();
+    }
+  }
+}
+
+/// Compares the scatter of the states over many draws with the reported covariance.
+class BodyScatter {
+ public:
+  using Vector = Eigen::Matrix<double, kBodyStates, 1>;
+
+  static Vector to_vector(const Fix& fix) {
+    const BodyEstimate& body = fix.body.value();
+    Vector all;
+    all << fix.estimate.pose.position_m, fix.estimate.pose.yaw_rad, body.velocity_m_per_s,
+        body.yaw_rate_rad_per_s, body.inclination.roll_rad, body.inclination.pitch_rad;
+    return all;
+  }
+
+  void add(const Vector& error) {
+    sum_ += error;
+    squares_ += error * error.transpose();
+    ++count_;
+  }
+  /// Checks the ratio of found to reported standard deviation of each estimated state.
+  void expect(const BodyCovariance& stated, double tolerance) const {
+    const Vector mean = sum_ / count_;
+    const BodyCovariance found = squares_ / count_ - mean * mean.transpose();
+    for (int i = 0; i < kBodyStates; ++i) {
+      if (stated(i, i) == 0) {
+        EXPECT_EQ(found(i, i), 0) << i;
+        continue;
+      }
+      EXPECT_NEAR(std::sqrt(found(i, i) / stated(i, i)), 1, tolerance) << i;
+      EXPECT_LT(std::abs(mean[i]), 5 * std::sqrt(stated(i, i) / count_)) << i;
+      for (int k = 0; k < i; ++k) {
+        if (stated(k, k) == 0) continue;
+        const double scale = std::sqrt(stated(i, i) * stated(k, k));
+        EXPECT_NEAR(found(i, k) / scale, stated(i, k) / scale, 2 * tolerance) << i << " " << k;
+      }
+    }
+  }
+
+ private:
+  Vector sum_ = Vector::Zero();
+  BodyCovariance squares_ = BodyCovariance::Zero();
+  double count_ = 0;
+};
+
+/// 4,000 draws determine a standard deviation to 1.1 %.
+constexpr int kBodyDraws = 4000;
+constexpr double kBodyScatterTolerance = 0.05;
+
+class BodyFixCovariance : public testing::TestWithParam<Estimated> {
+ protected:
+  BodyRig rig{synthetic_lamps(), rolling_calibration(), {}, {}};
+
+  void SetUp() override {
+    rig.body = {{{0.1, -0.05, 0.05}, 0.7}, {{0.8, -0.5}, 0.6, {0.03, -0.05}}};
+  }
+};
+
+TEST_P(BodyFixCovariance, MatchesScatterWithLampsAlone) {
+  const auto exact = seen_from(rig, 0.05);
+  ASSERT_EQ(exact.size(), 8);
+  const Positioner positioner = rig.positioner();
+  const Sensors sensors = sensors_for(rig.body, GetParam());
+  const Fix stated = positioner.locate(exact, sensors);
+  ASSERT_TRUE(stated.ok()) << to_string(stated.status);
+  ASSERT_TRUE(stated.body);
+  const auto truth = BodyScatter::to_vector(stated);
+  BodyScatter scatter;
+  Random random(51);
+  for (int i = 0; i < kBodyDraws; ++i) {
+    const Fix fix = positioner.locate(with_noise(exact, random), sensors);
+    ASSERT_TRUE(fix.ok()) << to_string(fix.status);
+    scatter.add(BodyScatter::to_vector(fix) - truth);
+  }
+  scatter.expect(stated.body->covariance, kBodyScatterTolerance);
+}
+
+/// Odometry and inclination sensor with errors of the reported size.
+TEST_P(BodyFixCovariance, MatchesScatterWithLampsAndSensors) {
+  rig.mount = CameraMount{{0.2, -0.1, 0.3}, 0.5};
+  auto exact = seen_from(rig, 0.05);
+  ASSERT_GE(exact.size(), 4);
+  exact.resize(4);
+  const Positioner positioner = rig.positioner();
+  const BodyMotion& motion = rig.body.motion;
+  Sensors sensors;
+  sensors.motion = {motion.velocity_m_per_s, motion.yaw_rate_rad_per_s,
+                    GetParam().velocity ? 0.05 : 0, GetParam().yaw_rate ? 0.02 : 0};
+  sensors.inclination = motion.inclination;
+  sensors.inclination_sigma_rad = GetParam().lean ? 0.003 : 0;
+  const Fix stated = positioner.locate(exact, sensors);
+  ASSERT_TRUE(stated.ok()) << to_string(stated.status);
+  ASSERT_TRUE(stated.body);
+  const auto truth = BodyScatter::to_vector(stated);
+  BodyScatter scatter;
+  Random random(52);
+  for (int i = 0; i < kBodyDraws; ++i) {
+    Sensors read = sensors;
+    for (int k = 0; k < 2; ++k) {
+      read.motion->velocity_m_per_s[k] += sensors.motion->velocity_sd_m_per_s * random.normal();
+    }
+    read.motion->yaw_rate_rad_per_s += sensors.motion->yaw_rate_sd_rad_per_s * random.normal();
+    read.inclination->roll_rad += sensors.inclination_sigma_rad * random.normal();
+    read.inclination->pitch_rad += sensors.inclination_sigma_rad * random.normal();
+    const Fix fix = positioner.locate(with_noise(exact, random), read);
+    ASSERT_TRUE(fix.ok()) << to_string(fix.status);
+    scatter.add(BodyScatter::to_vector(fix) - truth);
+  }
+  scatter.expect(stated.body->covariance, kBodyScatterTolerance);
+}
+
+INSTANTIATE_TEST_SUITE_P(Estimates, BodyFixCovariance, testing::ValuesIn(kCombinations),
+                         name_of_combination);
+
+TEST(BodyFix, RedundancyMatchesMeanOfPixelResiduals) {
+  BodyRig rig{synthetic_lamps(), rolling_calibration(), {}, {}};
+  rig.body = {{{0.1, -0.05, 0.05}, 0.7}, {{0.8, -0.5}, 0.6, {0.03, -0.05}}};
+  const auto exact = seen_from(rig, 0.05);
+  Sensors sensors;
+  sensors.motion = KnownMotion::up_to(2, 2);
+  sensors.inclination_sigma_rad = 1;
+  const Positioner positioner = rig.positioner();
+  Random random(53);
+  double sum = 0, redundancy = 0;
+  for (int i = 0; i < kBodyDraws; ++i) {
+    const Fix fix = positioner.locate(with_noise(exact, random), sensors);
+    ASSERT_TRUE(fix.ok());
+    sum += 8 * std::pow(fix.residual_px / 0.05, 2);
+    redundancy += fix.redundancy;
+  }
+  EXPECT_NEAR(redundancy / kBodyDraws, 7, 0.1);  // 16 pixels, 9 states
+  EXPECT_NEAR(sum / redundancy, 1, 0.04);
+}
+
+}  // namespace
+}  // namespace vlp

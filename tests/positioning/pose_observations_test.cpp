@@ -1,0 +1,233 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+/// Fixes that are rejected for bodies that may move or be tilted, and wrong identities of lamps.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "support/body_rig.h"
+#include "support/matchers.h"
+
+namespace vlp {
+namespace {
+
+constexpr double kBodyNoise_px = 0.1;
+/// Standard deviation of roll and pitch of a hand-held camera.
+constexpr double kAny_rad = 1.6;
+
+class PositionerLocateBody : public testing::Test {
+ protected:
+  BodyRig rig{synthetic_lamps(),
+              rolling_calibration(),
+              {{{0.1, -0.05, 0}, 0.4}, {{0.7, -0.4}, 0.5, {0, 0}}},
+              {}};
+  Random random{61};
+
+  static Sensors driving() {
+    Sensors sensors;
+    sensors.motion = KnownMotion::up_to(2, 3);
+    return sensors;
+  }
+  static Sensors leaning() {
+    Sensors sensors;
+    sensors.inclination_sigma_rad = kAny_rad;
+    return sensors;
+  }
+  static Sensors held() {
+    Sensors sensors = driving();
+    sensors.inclination_sigma_rad = kAny_rad;
+    return sensors;
+  }
+  void lean() { rig.body.motion.inclination = {0.06, -0.08}; }
+  void stand() { rig.body.motion = {{0, 0}, 0, rig.body.motion.inclination}; }
+
+  std::vector<Detection> seen() { return with_noise(seen_from(rig, kBodyNoise_px), random); }
+  Fix locate(const std::vector<Detection>& detections, const Sensors& sensors) const {
+    return rig.positioner().locate(detections, sensors);
+  }
+  /// Expects errors below five reported standard deviations.
+  void expect_truth(const Fix& fix) const {
+    ASSERT_TRUE(fix.ok()) << to_string(fix.status);
+    for (int i = 0; i < 3; ++i) {
+      EXPECT_NEAR(fix.estimate.pose.position_m[i], rig.body.pose.position_m[i],
+                  5 * std::sqrt(fix.estimate.covariance(i, i)));
+    }
+  }
+};
+
+TEST_F(PositionerLocateBody, MatchesStandingFixExactlyWithoutMotion) {
+  stand();
+  Sensors standing;
+  standing.motion = KnownMotion();
+  const auto detections = seen();
+  const Fix with = locate(detections, standing), without = locate(detections, {});
+  ASSERT_TRUE(with.ok());
+  EXPECT_EQ(with.estimate.pose.position_m, without.estimate.pose.position_m);
+  EXPECT_EQ(with.estimate.covariance, without.estimate.covariance);
+  EXPECT_FALSE(with.body.has_value());
+}
+
+TEST_F(PositionerLocateBody, ReturnsRowTimeUnknownWithoutRowTime) {
+  auto detections = seen();
+  rig.calibration.camera.row_time_s.reset();
+  EXPECT_EQ(locate(detections, driving()).status, FixStatus::row_time_unknown);
+  rig.calibration.camera.row_time_s = 3e-5;
+  rig.calibration.camera.readout.reset();
+  EXPECT_EQ(locate(detections, driving()).status, FixStatus::row_time_unknown);
+  EXPECT_TRUE(locate(detections, leaning()).ok());
+}
+
+TEST_F(PositionerLocateBody, ReturnsTimeOfSensors) {
+  Sensors sensors = driving();
+  sensors.time_s = 17.25;
+  EXPECT_EQ(locate(seen(), sensors).time_s, 17.25);
+  sensors.motion.reset();
+  stand();
+  EXPECT_EQ(locate(seen(), sensors).time_s, 17.25);
+}
+
+TEST_F(PositionerLocateBody, ReturnsNotFiniteForInvalidSensors) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (int which = 0; which < 6; ++which) {
+    Sensors sensors = driving();
+    if (which == 0) sensors.motion->velocity_m_per_s.y() = nan;
+    if (which == 1) sensors.motion->velocity_sd_m_per_s = -1;
+    if (which == 2) sensors.motion->yaw_rate_sd_rad_per_s = nan;
+    if (which == 3) sensors.inclination_sigma_rad = -0.1;
+    if (which == 4) sensors.height = KnownHeight{0, 0};
+    if (which == 5) sensors.height = KnownHeight{nan, 1};
+    EXPECT_EQ(locate(seen(), sensors).status, FixStatus::not_finite) << which;
+  }
+}
+
+/// Two lamps do not determine roll and pitch. The covariance includes the unknown velocity.
+TEST_F(PositionerLocateBody, ReturnsUndeterminedForTwoLampsWithFreeTilt) {
+  auto detections = seen();
+  detections.resize(2);
+  EXPECT_EQ(locate(detections, leaning()).status, FixStatus::undetermined);
+  EXPECT_EQ(locate(detections, held()).status, FixStatus::undetermined);
+  const Fix fix = locate(detections, driving());
+  expect_truth(fix);
+  EXPECT_GT(std::sqrt(fix.estimate.covariance(2, 2)), 0.003);
+}
+
+TEST_F(PositionerLocateBody, ReturnsUndeterminedForCollinearLampsWithFreeTilt) {
+  rig.map = make_lamp_map({{-0.7, 0.1, 1.6}, {0, 0.1, 1.6}, {0.7, 0.1, 1.6}});
+  stand();
+  EXPECT_EQ(locate(seen(), leaning()).status, FixStatus::undetermined);
+  Sensors nearly_level;
+  nearly_level.inclination_sigma_rad = 0.01;
+  expect_truth(locate(seen(), nearly_level));
+}
+
+/// Three lamps fit several poses of a camera with unknown tilt; a known height selects one.
+TEST_F(PositionerLocateBody, ResolvesAmbiguityOfThreeLampsByHeight) {
+  int ambiguous = 0, num_resolved = 0;
+  for (int i = 0; i < 200; ++i) {
+    rig.body.pose.position_m = {random.uniform(-0.3, 0.3), random.uniform(-0.3, 0.3), 0};
+    rig.body.motion = {{0, 0}, 0, {random.uniform(-0.5, 0.5), 0.2}};
+    auto detections = seen();
+    if (detections.size() < 3) continue;
+    detections.resize(3);
+    const Fix alone = locate(detections, leaning());
+    if (alone.ok()) expect_truth(alone);
+    ambiguous += alone.status == FixStatus::ambiguous;
+    Sensors with_height = leaning();
+    with_height.height = KnownHeight{0, 0.02};
+    const Fix fix = locate(detections, with_height);
+    if (!fix.ok()) continue;
+    expect_truth(fix);
+    num_resolved += alone.status == FixStatus::ambiguous;
+  }
+  EXPECT_GT(ambiguous, 30);
+  EXPECT_GT(num_resolved, ambiguous / 2);
+}
+
+TEST_F(PositionerLocateBody, RejectsMisidentifiedLamp) {
+  for (const bool leans : {false, true}) {
+    if (leans) lean();
+    for (std::size_t wrong = 0; wrong < 5; ++wrong) {
+      auto detections = seen();
+      ASSERT_EQ(detections.size(), 8);
+      detections.resize(leans ? 7 : 5);
+      const auto is_seen = [&](int id) {
+        return std::any_of(detections.begin(), detections.end(),
+                           [&](const Detection& detection) { return detection.lamp == id; });
+      };
+      int id = 8;
+      while (is_seen(id)) --id;
+      detections[wrong].lamp = id;
+      const Fix fix = locate(detections, leans ? held() : driving());
+      SCOPED_TRACE(testing::Message() << wrong << " is taken for " << id << ", lean " << leans);
+      expect_truth(fix);
+      EXPECT_EQ(fix.rejected_ids[0], id);
+    }
+  }
+}
+
+TEST_F(PositionerLocateBody, ReturnsNoFixWhenAllLampsContradict) {
+  for (const Sensors& sensors : {driving(), leaning(), held()}) {
+    auto detections = seen();
+    ASSERT_EQ(detections.size(), 8);
+    for (Detection& detection : detections) detection.lamp = 1 + (detection.lamp * 3) % 8;
+    EXPECT_FALSE(locate(detections, sensors).ok());
+  }
+}
+
+TEST_F(PositionerLocateBody, DetectsMirroredMap) {
+  const auto mirrored = [](LampMap map) {
+    for (Lamp& lamp : map.lamps) lamp.position_m.y() *= -1;
+    return map;
+  };
+  const auto drive = seen();
+  lean();
+  const auto in_hand = seen();
+  rig.map = mirrored(rig.map);
+  EXPECT_EQ(locate(drive, driving()).status, FixStatus::mirrored_map);
+  EXPECT_EQ(locate(in_hand, held()).status, FixStatus::mirrored_map);
+  EXPECT_EQ(locate(in_hand, leaning()).status, FixStatus::mirrored_map);
+}
+
+/// A lamp 36 mm away from its position in the map.
+TEST_F(PositionerLocateBody, RejectsMovedLamp) {
+  for (const bool leans : {false, true}) {
+    if (leans) lean();
+    const LampMap map = rig.map;
+    rig.map.lamps[2].position_m += Eigen::Vector3d(0.03, -0.02, 0);
+    const auto detections = seen();
+    rig.map = map;
+    const Fix fix = locate(detections, leans ? held() : driving());
+    expect_truth(fix);
+    EXPECT_EQ(fix.rejected_ids[0], 3);
+  }
+}
+
+/// A velocity above the maximum indicates another error.
+TEST_F(PositionerLocateBody, ReturnsInconsistentForImpossibleMotion) {
+  rig.body.motion.velocity_m_per_s = {3, 0};
+  Sensors slow;
+  slow.motion = KnownMotion::up_to(0.2, 3);
+  EXPECT_EQ(locate(seen(), slow).status, FixStatus::inconsistent);
+}
+
+/// A tilted camera with a level prior is inconsistent; with free roll and pitch it is located.
+TEST_F(PositionerLocateBody, ReturnsInconsistentForUnmodeledTilt) {
+  rig.body.motion = {{0, 0}, 0, {0.7, -0.5}};
+  rig.map = draw_lamps_in_view(rig, 6, true, 0.3, random);
+  EXPECT_EQ(locate(seen(), {}).status, FixStatus::inconsistent);
+  EXPECT_NE(describe(FixStatus::inconsistent).find("lean"), std::string_view::npos);
+  expect_truth(locate(seen(), leaning()));
+}
+
+TEST_F(PositionerLocateBody, MatchesTruthInNationalCoordinates) {
+  const Eigen::Vector3d origin_m(4.5e5, 5e6, 120);
+  for (Lamp& lamp : rig.map.lamps) lamp.position_m += origin_m;
+  rig.body.pose.position_m += origin_m;
+  lean();
+  Sensors sensors = held();
+  sensors.height = KnownHeight{origin_m.z(), 0.1};
+  expect_truth(locate(seen(), sensors));
+}
+
+}  // namespace
+}  // namespace vlp

@@ -1,0 +1,74 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "rig/calibration_builder.h"
+
+#include <gmock/gmock.h>
+
+#include "rig/samples.h"
+
+namespace vlp {
+namespace {
+
+HistoryEntry entry_of(const std::string& program) { return {"", program, "1.2.3", "", {}}; }
+
+/// Returns sample_calibration() with the rotation center in the history, too.
+Calibration whole_calibration() {
+  Calibration calibration = sample_calibration();
+  calibration.history.insert(calibration.history.begin() + 1,
+                             {"rotation_center", "vlp-rotation", "0.1.0", "", {}});
+  return calibration;
+}
+
+TEST(WithCamera, RemovesOtherParts) {
+  const Calibration sample = sample_calibration();
+  Calibration expected = sample;
+  expected.rotation_center.reset();
+  expected.dispersion.reset();
+  expected.history = {{"camera", "vlp-intrinsics", "1.2.3", "", {}}};
+  expect_same(with_camera(sample.camera, sample.intrinsics_report, entry_of("vlp-intrinsics")),
+              expected);
+}
+
+TEST(WithRotationCenter, AddsPartToCamera) {
+  Calibration before = whole_calibration();
+  const RotationCenter center = *before.rotation_center;
+  before.rotation_center.reset();
+  before.dispersion.reset();
+  before.history.resize(1);
+  Calibration expected = before;
+  expected.rotation_center = center;
+  expected.history.push_back({"rotation_center", "vlp-rotation", "1.2.3", "", {}});
+  expect_same(with_rotation_center(before, center, entry_of("vlp-rotation")), expected);
+}
+
+TEST(WithRotationCenter, ReplacesOldPartAndRemovesDispersion) {
+  RotationCenter center = *sample_calibration().rotation_center;
+  center.center_px = {1, 2};
+  Calibration expected = whole_calibration();
+  expected.rotation_center = center;
+  expected.dispersion.reset();
+  expected.history.resize(1);
+  expected.history.push_back({"rotation_center", "vlp-rotation", "1.2.3", "", {}});
+  expect_same(with_rotation_center(whole_calibration(), center, entry_of("vlp-rotation")),
+              expected);
+}
+
+TEST(WithDispersion, KeepsEarlierPartsAndReplacesOldPart) {
+  const Dispersion dispersion{{3, 4}, 0.5, {6, 7}, 8, {}};
+  Calibration expected = whole_calibration();
+  expected.dispersion = dispersion;
+  expected.history[2] = {"dispersion", "vlp-dispersion", "1.2.3", "", {}};
+  expect_same(with_dispersion(whole_calibration(), dispersion, entry_of("vlp-dispersion")),
+              expected);
+}
+
+TEST(WithDispersion, ResultCanBeWrittenAndRead) {
+  const TemporaryFolder folder;
+  const Calibration given = with_rotation_center(
+      whole_calibration(), *sample_calibration().rotation_center, entry_of("vlp-rotation"));
+  write_calibration(folder / "calibration.yaml", given);
+  expect_same(read_calibration(folder / "calibration.yaml"), given);
+}
+
+}  // namespace
+}  // namespace vlp

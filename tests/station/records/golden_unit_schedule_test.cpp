@@ -1,0 +1,208 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "station/records/golden_unit_schedule.h"
+
+#include <gmock/gmock.h>
+#include <sys/resource.h>
+
+#include <csignal>
+
+#include "rig/input_error.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+using testing::HasSubstr;
+using testing::StartsWith;
+
+/// Full disk: no file can be written.
+class FullDisk {
+ public:
+  FullDisk() {
+    ::getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit none{0, before_.rlim_max};
+    ::setrlimit(RLIMIT_FSIZE, &none);
+  }
+  ~FullDisk() {
+    ::setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, handler_);
+  }
+  FullDisk(const FullDisk&) = delete;
+  FullDisk& operator=(const FullDisk&) = delete;
+
+ private:
+  rlimit before_{};
+  void (*handler_)(int) = std::signal(SIGXFSZ, SIG_IGN);
+};
+
+class GoldenProblem : public testing::Test {
+ protected:
+  GoldenProblem() {
+    config.station = "a/station";
+    config.spool = folder / "spool";
+    config.type.imager_px = {800, 600};
+    config.type.lens_model = LensModel::opencv8;
+    config.type.intrinsics = {520, 520, 399.5, 299.5, 0, 0, 0, 0, 0, 0, 0, 0};
+    config.verify_due = VerificationInterval{24, 2};
+  }
+  void note(const std::string& kind, const std::string& verdict,
+            const std::string& ended_utc = now_utc()) const {
+    RunRecord run;
+    run.run = "RUN";
+    run.kind = kind;
+    run.verdict = verdict;
+    run.ended_utc = ended_utc;
+    update_golden_note(config, run);
+  }
+  std::string problem() const { return golden_problem(config); }
+
+  TemporaryFolder folder;
+  StationConfig config{};
+};
+
+TEST_F(GoldenProblem, ReportsUnmeasuredGoldenUnit) {
+  note("unit", "PASS");
+  EXPECT_THAT(problem(), StartsWith("the golden unit was not measured here yet: "));
+  note("golden", "INVALID");
+  EXPECT_THAT(problem(), HasSubstr("not measured"));
+  note("golden", "PASS");
+  EXPECT_EQ(problem(), "");
+  config.station = "another";
+  EXPECT_THAT(problem(), HasSubstr("not measured"));
+}
+
+TEST_F(GoldenProblem, ReportsExpiredNumberOfUnits) {
+  note("golden", "PASS");
+  note("unit", "FAIL");
+  note("unit", "INVALID");
+  EXPECT_EQ(problem(), "");
+  note("unit", "PASS");
+  EXPECT_THAT(problem(), StartsWith("2 units since the golden unit was measured (run RUN)"));
+  note("golden", "INVALID");
+  EXPECT_THAT(problem(), StartsWith("2 units since"));
+  note("golden", "PASS");
+  EXPECT_EQ(problem(), "");
+}
+
+TEST_F(GoldenProblem, ReportsExpiredHours) {
+  note("golden", "PASS", "2026-01-01T00:00:00Z");
+  EXPECT_THAT(problem(), HasSubstr("measured 2026-01-01T00:00:00Z (run RUN), not within 24 h"));
+  note("golden", "PASS", "9999-01-01T00:00:00Z");  // with a clock that was set back later
+  EXPECT_THAT(problem(), HasSubstr("not within 24 h"));
+  config.verify_due->hours.reset();
+  EXPECT_EQ(problem(), "");
+}
+
+/// The unit was started before the limits expired.
+TEST_F(GoldenProblem, IgnoresLimitsExpiredBeforeVerdict) {
+  const auto at_verdict = [&] { return golden_problem(config, GoldenCheckTime::verdict); };
+  EXPECT_THAT(at_verdict(), HasSubstr("not measured"));
+  note("golden", "PASS", "2026-01-01T00:00:00Z");
+  EXPECT_THAT(problem(), HasSubstr("not within 24 h"));
+  EXPECT_EQ(at_verdict(), "");
+  note("golden", "PASS");
+  note("unit", "PASS");
+  note("unit", "PASS");
+  EXPECT_THAT(problem(), StartsWith("2 units since"));
+  EXPECT_EQ(at_verdict(), "");
+  config.lamps.lamps.push_back({1, {0, 0, 2}, make_disc(0.18), 1600, 0.5});
+  EXPECT_THAT(at_verdict(), StartsWith("what measures in station.yaml"));
+  note("golden", "FAIL");
+  EXPECT_THAT(at_verdict(), StartsWith("the golden unit failed"));
+}
+
+TEST_F(GoldenProblem, ReportsFailedGoldenUnit) {
+  note("golden", "PASS");
+  note("golden", "FAIL");
+  EXPECT_THAT(problem(), StartsWith("the golden unit failed (run RUN): mend the station"));
+  note("golden", "INVALID");
+  EXPECT_THAT(problem(), StartsWith("the golden unit failed"));
+}
+
+/// A golden run with another lamp map does not qualify the station.
+TEST_F(GoldenProblem, ReportsChangedMeasuringSetup) {
+  note("golden", "PASS");
+  ASSERT_EQ(problem(), "");
+  config.sha256 = "of other comments";
+  EXPECT_EQ(problem(), "");
+  config.lamps.lamps.push_back({1, {0, 0, 2}, make_disc(0.18), 1600, 0.5});
+  EXPECT_EQ(problem(),
+            "what measures in station.yaml or a file that it names was changed since the golden "
+            "unit was measured (run RUN): 'vlp-station verify' is due");
+  note("unit", "FAIL");
+  EXPECT_THAT(problem(), StartsWith("what measures in station.yaml"));
+  config.lamps.lamps.clear();
+  EXPECT_EQ(problem(), "") << "as it was again";
+  config.lamps.lamps.push_back({1, {0, 0, 2}, make_disc(0.18), 1600, 0.5});
+  note("golden", "PASS");
+  EXPECT_EQ(problem(), "");
+}
+
+/// An earlier PASS is not valid after a run that could not be noted.
+TEST_F(GoldenProblem, ReportsMissingNoteAfterWriteError) {
+  for (const std::string kind : {"golden", "unit"}) {
+    note("golden", "PASS");
+    ASSERT_EQ(problem(), "");
+    {
+      const FullDisk full;
+      EXPECT_THROW(note(kind, "FAIL"), InputError) << kind;
+    }
+    EXPECT_THAT(problem(), HasSubstr("not measured here yet")) << kind;
+  }
+}
+
+TEST_F(GoldenProblem, ReportsDamagedNote) {
+  note("golden", "PASS");
+  ASSERT_EQ(problem(), "");
+  const auto file = std::filesystem::directory_iterator(config.spool)->path();
+  const std::string name = "spool/" + file.filename().string();
+  for (const std::string text :
+       {"", "RUN", "RUN PASS\n", "RUN PASS 2026-01-01T00:00:00Z", "RUN PASS "}) {
+    folder.file(name, text);
+    EXPECT_THAT(problem(), StartsWith("what the golden unit said is not known")) << text;
+  }
+  folder.file(name, "RUN PASS " + now_utc() + "\n");  // note of an older program
+  EXPECT_EQ(problem(),
+            "with which lamp map the golden unit was measured is not known (run RUN): 'vlp-station "
+            "verify' is due");
+  folder.file(name, "RUN PASS " + now_utc() + " aa\nunit\nun");
+  EXPECT_THAT(problem(), HasSubstr("is the file cut short?"));
+  std::filesystem::remove(file);
+  std::filesystem::create_directory(file);
+  EXPECT_THAT(problem(), HasSubstr("what the golden unit said is not known"));
+}
+
+TEST_F(GoldenProblem, RejectsSymbolicLinkAsNote) {
+  note("golden", "PASS");
+  const auto file = std::filesystem::directory_iterator(config.spool)->path();
+  std::filesystem::remove(file);
+  const auto mine = folder.file("mine.txt", "mine\n");
+  std::filesystem::create_symlink(mine, file);
+  EXPECT_THAT(problem(), HasSubstr("is a symbolic link"));
+  EXPECT_THROW(note("unit", "PASS"), InputError);
+  std::filesystem::create_symlink(mine, file);
+  EXPECT_FALSE(invalidate_golden_note(config, "RUN"));
+  note("golden", "PASS");
+  EXPECT_EQ(problem(), "");
+  EXPECT_EQ(TemporaryFolder::read_content(mine), "mine\n");
+}
+
+TEST_F(GoldenProblem, ReportsUnmeasuredGoldenUnitAfterVoiding) {
+  note("golden", "PASS");
+  invalidate_golden_note(config, "another");
+  EXPECT_EQ(problem(), "");
+  invalidate_golden_note(config, "RUN");
+  EXPECT_THAT(problem(), HasSubstr("not measured here yet"));
+  invalidate_golden_note(config, "RUN");
+}
+
+TEST_F(GoldenProblem, ReturnsEmptyWithoutVerifyDue) {
+  config.verify_due.reset();
+  note("golden", "FAIL");
+  EXPECT_EQ(problem(), "");
+  EXPECT_FALSE(std::filesystem::exists(config.spool));
+}
+
+}  // namespace
+}  // namespace vlp
