@@ -134,7 +134,7 @@ int main(int argc, char** argv) {
   app.add_option("--lamps", options.images.lamps, "Lamp map, lamps.yaml, with its sd_m")
       ->required();
   app.add_option("--calibration", options.images.calibration,
-                 "Calibration of the camera; a rotation centre in it is where the search starts")
+                 "Calibration of the camera; a rotation center in it is where the search starts")
       ->required();
   app.add_option("-o,--output", options.images.output,
                  "Where to write the calibration with its adjustment")

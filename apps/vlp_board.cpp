@@ -27,14 +27,14 @@ struct Options {
   bool kalibr = false, chessboard = false, charuco = false;
 };
 
-constexpr double kMillimetresPerMetre = 1000;
+constexpr double kMillimetersPerMeter = 1000;
 
 Board board_of_squares(const Options& options) {
   constexpr int cols = 10, rows = 7;
   Board board{"", options.cols.value_or(cols),   options.rows.value_or(rows), 0, 1, 1, false,
               0,  {false, BoardCorner::top_left}};
   board.kind = options.charuco ? BoardKind::charuco : BoardKind::chessboard;
-  board.square_size_m = options.square_mm.value_or(0) / kMillimetresPerMetre;
+  board.square_size_m = options.square_mm.value_or(0) / kMillimetersPerMeter;
   if (!options.charuco) return board;
   board.family = options.dictionary;
   board.first_id = options.first_id;
@@ -49,7 +49,7 @@ Board make_board(const Options& options) {
   return {options.family,
           options.cols.value_or(cols),
           options.rows.value_or(rows),
-          options.tag_mm.value_or(0) / kMillimetresPerMetre,
+          options.tag_mm.value_or(0) / kMillimetersPerMeter,
           options.spacing.value_or(options.kalibr ? kalibr : lattice),
           options.kalibr ? 2 : 1,
           options.kalibr,
@@ -89,11 +89,11 @@ void run(const Options& options) {
   write_board(yaml, board);
   if (board.has_squares()) {
     fmt::print("{}: {} x {} squares of {:g} mm, on {}\n", options.output, board.cols, board.rows,
-               board.square_size_m * kMillimetresPerMetre, paper.name);
+               board.square_size_m * kMillimetersPerMeter, paper.name);
   } else {
     fmt::print("{}: {} x {} tags of {:g} mm, gap {:g} mm, on {}\n", options.output, board.cols,
-               board.rows, board.tag_size_m * kMillimetresPerMetre,
-               board.tag_size_m * board.tag_spacing * kMillimetresPerMetre, paper.name);
+               board.rows, board.tag_size_m * kMillimetersPerMeter,
+               board.tag_size_m * board.tag_spacing * kMillimetersPerMeter, paper.name);
   }
   fmt::print("{}: for vlp-intrinsics; measure the ruler on the print first\n", yaml);
 }

@@ -90,7 +90,7 @@ int main(int argc, char** argv) {
       ->required();
   app.add_option("--calibration", options.calibration,
                  "Calibration: the camera with its row time, and its tilt when known; without it "
-                 "centres are those of ellipses in the image");
+                 "centers are those of ellipses in the image");
   app.add_option("--row-time-s", options.frontend.row_time_s,
                  "Row time of a camera without a calibration")
       ->check(vlp::finite_positive())

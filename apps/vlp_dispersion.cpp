@@ -101,7 +101,7 @@ void run(const CLI::App& app, Options options) {
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "What a camera's fixes at a known station still lack: an offset of the image centre, told\n"
+      "What a camera's fixes at a known station still lack: an offset of the image center, told\n"
       "apart from errors of lamp map and station by captures at different yaws.\n\n"
       "Example, from the project's folder:\n"
       "  build/bin/vlp-dispersion datasets/example/station.csv \\\n"
@@ -129,7 +129,7 @@ int main(int argc, char** argv) {
       ->excludes(station);
   app.add_option(
          "--method", options.method,
-         "camera (default): captures at different yaws; paper: the circle's centre, captures "
+         "camera (default): captures at different yaws; paper: the circle's center, captures "
          "at one yaw, lamp map and station supposed right")
       ->check(CLI::IsMember({"camera", "paper"}))
       ->option_text("camera|paper");

@@ -62,7 +62,7 @@ void check_line(const std::string& option, const std::array<double, 4>& line_m) 
   }
   for (const double value_m : line_m) {
     if (std::abs(value_m) > kMaxCoordinate_m) {
-      throw std::invalid_argument(option + ": should be within 1,000 km, in metres");
+      throw std::invalid_argument(option + ": should be within 1,000 km, in meters");
     }
   }
 }

@@ -145,7 +145,7 @@ void add_options(CLI::App& app, Options& options) {
       ->required()
       ->check(finite_positive());
   auto* center = app.add_option("--center-px", options.center_px,
-                                "... of the image centre, per axis (default 0)")
+                                "... of the image center, per axis (default 0)")
                      ->check(finite_not_negative());
   auto* tilt = app.add_option("--tilt-deg", options.tilt_deg,
                               "... of the camera's tilt, per axis (default 0)")
@@ -187,7 +187,7 @@ void add_options(CLI::App& app, Options& options) {
 int main(int argc, char** argv) {
   CLI::App app(
       "The theoretical limit of positioning over a floor, and the error budget: what pixel noise,\n"
-      "image centre, tilt and lamp map each do to a fix; or, with --stated, what a calibration "
+      "image center, tilt and lamp map each do to a fix; or, with --stated, what a calibration "
       "and\n"
       "its lamp map say of their own errors, and so what to improve first. With that pixel noise\n"
       "no method reaches better from one image of a level camera.\n\n"

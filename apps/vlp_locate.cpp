@@ -157,7 +157,7 @@ void add_sensor_options(CLI::App& app, Options& options) {
       ->check(finite_not_negative());
   app.add_option(
          "--camera-on-robot", options.camera_on_robot,
-         "The camera's place and yaw on the robot: the fixes are then of the robot's centre")
+         "The camera's place and yaw on the robot: the fixes are then of the robot's center")
       ->check(finite())
       ->option_text("X_M Y_M Z_M YAW_DEG");
   CLI::Option* const one_lamp =

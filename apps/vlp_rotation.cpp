@@ -39,7 +39,7 @@ void run(const CLI::App& app, const Options& options) {
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Finds the rotation centre of a camera, and so its tilt, from captures while it turns on "
+      "Finds the rotation center of a camera, and so its tilt, from captures while it turns on "
       "the\n"
       "spot about a vertical axis: at least three over 90 degrees, better twelve over a full "
       "turn,\n"
@@ -56,12 +56,12 @@ int main(int argc, char** argv) {
   vlp::add_capture_options(
       app, options.images,
       {"detections.csv: image, lamp, u_px, v_px [, sigma_px]; or a folder of images",
-       "Calibration of the camera; a rotation centre in it is replaced",
-       "Where to write the calibration with its rotation centre"});
+       "Calibration of the camera; a rotation center in it is replaced",
+       "Where to write the calibration with its rotation center"});
   app.add_option(
          "--method", options.method,
          "axis (default): the direction about which all lamp rays turn, exact with tilt and "
-         "lens; joint: one centre in the undistorted image for all lamps; circle: the mean "
+         "lens; joint: one center in the undistorted image for all lamps; circle: the mean "
          "of a circle per lamp; lamps: level the camera from captures taken anywhere, while "
          "driving, that see three lamps or more")
       ->check(CLI::IsMember({"axis", "joint", "circle", "lamps"}))
@@ -81,6 +81,6 @@ int main(int argc, char** argv) {
       "each image (default: as captures.csv says, or else it stands)");
   vlp::add_yaw_rate_sd_option(app, options.level.yaw_rate_sd_deg_per_s);
   app.add_option("--plot", options.plot,
-                 "Where to draw lamps, circles, rotation centre and principal point, .png or .svg");
+                 "Where to draw lamps, circles, rotation center and principal point, .png or .svg");
   return vlp::run_app(app, argc, argv, [&] { vlp::run(app, options); });
 }

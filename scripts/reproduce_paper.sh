@@ -4,7 +4,7 @@
 #
 # The table of Chen and Guan, "High Accuracy VLP based on Image Sensor using Error Calibration
 # Method", on rendered images of a rig like theirs, with their numbers beside ours: horizontal errors
-# of 432 stationary fixes without calibration, with the rotation centre, and with the dispersion on
+# of 432 stationary fixes without calibration, with the rotation center, and with the dispersion on
 # top of it; by the paper's own methods, and by the exact ones. The lens is taken as known. A fix is of
 # the first two, or three, of the lamps in its image, or of all; the last row is of a lamp map that is
 # refined from the rotation captures. Below the table a line per difference says what it comes from,
@@ -41,7 +41,7 @@ vlp simulate "$scene/scene.yaml" --only "$(IFS=,; echo "${folders[*]}")" -o "$ou
 # Of the true calibration the camera alone.
 awk '/^[a-z]/ { part = $1 } part != "rotation_center:"' "$out/true_calibration.yaml" \
   >"$out/camera.yaml"
-# Centres as far off as those of bounding boxes, 1.7 px rms: normal noise of 1.2 px per axis.
+# Centers as far off as those of bounding boxes, 1.7 px rms: normal noise of 1.2 px per axis.
 blurred() {  # DETECTIONS
   awk -F, -v OFS=, 'function uniform() {
                       state = (state * 16807) % 2147483647
@@ -93,7 +93,7 @@ locate() {  # DETECTIONS CALIBRATION CORRECTION [LAMPS]
 # Every capture has to have a fix, before all else.
 locate "$out/check.csv" "$out/camera.yaml" none >/dev/null
 
-# Rotation centre and dispersion by some methods, to $out/$1.yaml.
+# Rotation center and dispersion by some methods, to $out/$1.yaml.
 calibrate() {  # NAME LAMPS ROTATION-METHOD DISPERSION-METHOD DISPERSION-CAPTURES [KIND]
   vlp rotation "$out/rotation${6:-}.csv" --lamps "$out/lamps.yaml" \
     --calibration "$out/camera.yaml" --method "$3" -o "$out/$1-rotated.yaml"
@@ -123,7 +123,7 @@ for lamps in 2 3; do
 done
 calibrate exact "" axis camera dispersion
 vlp rotation "$out/rotation.csv" --method lamps --lamps "$out/lamps.yaml" \
-  --calibration "$out/camera.yaml" --refine-map "$out/refined-lamps.yaml" -o "$out/levelled.yaml"
+  --calibration "$out/camera.yaml" --refine-map "$out/refined-lamps.yaml" -o "$out/leveled.yaml"
 
 captures=$(($(wc -l <"$out/check/truth.csv") - 1))
 echo "Horizontal errors of $captures fixes in mm: mean, 90 %, largest"
@@ -140,7 +140,7 @@ measured "             exact methods" exact-3 -3
 exact_3=$dispersion turned_3=$rotation
 measured "all lamps    exact methods" exact ""
 exact_all=$dispersion
-refined=$(locate "$out/check" "$out/levelled.yaml" rotation "$out/refined-lamps.yaml")
+refined=$(locate "$out/check" "$out/leveled.yaml" rotation "$out/refined-lamps.yaml")
 row "             refined map" "" "$refined" "-"
 blurred_2=$(mean_of "$(locate "$out/check-blurred-2.csv" "$out/blurred-2.yaml" all)")
 blurred_3=$(mean_of "$(locate "$out/check-blurred-3.csv" "$out/blurred-3.yaml" all)")
@@ -174,12 +174,12 @@ awk -v height="$(awk -v a="$lamps_height" -v b="$height" 'BEGIN { print a - b }'
     printf "none        ours %s, theirs 19.9 and 21.4: our camera leans by %.2f degrees, which is " \
            "%.1f\n            at %.2f m under the lamps; theirs would be a lean of %.2f degrees.\n",
            none, lean * degrees, 1e3 * height * lean, height, atan2(0.0199, height) * degrees
-    printf "rotation    ours %s, theirs 15.4 and 10.8: the centre of our circles is %.2f px off, " \
+    printf "rotation    ours %s, theirs 15.4 and 10.8: the center of our circles is %.2f px off, " \
            "%.1f\n            at that height, since the camera sits %.1f beside its axis of rotation " \
            "and what it sees\n            of a turn are ellipses. The exact method knows both: " \
            "%s.\n", rotation, off, 1e3 * height * off / focal,
            1e3 * length_of(arm_x, arm_y), turned
-    printf "dispersion  ours %s, theirs 8.2 and 8.8: we find lamps by their outlines. With centres " \
+    printf "dispersion  ours %s, theirs 8.2 and 8.8: we find lamps by their outlines. With centers " \
            "as far\n            off as those of bounding boxes, 1.7 px rms, it is %s. A shift is right " \
            "at the\n            place, height and yaw of the station alone; the exact methods leave " \
            "%s of\n            two, three and all lamps.\n", dispersion, blurred, exact

@@ -139,7 +139,7 @@ double CsvTable::coordinate_m(std::size_t row, Column column) const {
   if (std::abs(value_m) > kMaxCoordinate_m) {
     throw error(
         row, column,
-        "should be within 1,000 km, in metres, not '" + std::string(text(row, column)) + "'");
+        "should be within 1,000 km, in meters, not '" + std::string(text(row, column)) + "'");
   }
   return value_m;
 }

@@ -20,7 +20,7 @@ constexpr std::array kMetricKinds{
                "difference of the focal length from the nominal one",
                "wrong lens: another focal length than the type's"},
     MetricKind{"center_px", "px", MetricSource::station,
-               "distance of the image centre from the nominal one", "the lens is decentred"},
+               "distance of the image center from the nominal one", "the lens is decentered"},
     MetricKind{"nominal_px", "px", MetricSource::station,
                "worst difference of the projection from the nominal one, but for a turn",
                "the lens is not of the type"},
@@ -30,7 +30,7 @@ constexpr std::array kMetricKinds{
     MetricKind{"mtf50_asymmetry", "", MetricSource::lens,
                "difference of the MTF50 between directions from the image's middle, over the mean; "
                "needs AprilTags without corner squares",
-               "the focal plane is tilted: the lens is tilted or decentred"},
+               "the focal plane is tilted: the lens is tilted or decentered"},
     MetricKind{"mtf50", "cycles/px", MetricSource::lens,
                "mean over the image of the spatial frequency at which lens and pixel pass half of "
                "the contrast; needs AprilTags without corner squares",
@@ -79,11 +79,11 @@ constexpr std::array kMetricKinds{
     MetricKind{"rotation_px", "px", MetricSource::rotation,
                "residuals of the turn on the spot, rms", "the lamps do not turn about one axis"},
     MetricKind{"rotation_spread_px", "px", MetricSource::rotation,
-               "spread of the centres of the lamps' circles, of the level camera",
-               "the circles of the turn have no common centre"},
+               "spread of the centers of the lamps' circles, of the level camera",
+               "the circles of the turn have no common center"},
     MetricKind{
-        "rotation_sd_px", "px", MetricSource::rotation, "standard deviation of the rotation centre",
-        "the rotation centre is not known well enough", Direction::at_most, kMaxLimit, false},
+        "rotation_sd_px", "px", MetricSource::rotation, "standard deviation of the rotation center",
+        "the rotation center is not known well enough", Direction::at_most, kMaxLimit, false},
     MetricKind{"tilt_deg", "deg", MetricSource::rotation,
                "angle between the camera and the axis of rotation", "the camera leans on its mount",
                Direction::at_most, 90},

@@ -37,7 +37,7 @@ struct MetricKind {
   MetricSource source;
   /// Description, and what the metric requires.
   const char* meaning;
-  /// Probable cause of a failed gate, for humans: "the lens is decentred".
+  /// Probable cause of a failed gate, for humans: "the lens is decentered".
   const char* cause;
   Direction direction = Direction::at_most;
   /// Largest valid limit: 1 for a fraction.

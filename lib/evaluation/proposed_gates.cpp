@@ -65,16 +65,16 @@ std::vector<Gate> propose_gates(const EvaluationInput& input, const Evaluation& 
     gates.push_back(
         {name, compute_limit(scale * value, {scale * interval.low, scale * interval.high})});
   };
-  constexpr double millimetres = 1e3, degrees = 180 / std::numbers::pi;
+  constexpr double millimeters = 1e3, degrees = 180 / std::numbers::pi;
   const ErrorIntervals& horizontal_m = *evaluation.intervals_m;
-  add("mean_mm", evaluation.horizontal_m.mean, horizontal_m.mean, millimetres);
+  add("mean_mm", evaluation.horizontal_m.mean, horizontal_m.mean, millimeters);
   if (const auto& p90_m = horizontal_m.p90) {
-    add("p90_mm", evaluation.horizontal_m.p90, *p90_m, millimetres);
+    add("p90_mm", evaluation.horizontal_m.p90, *p90_m, millimeters);
   }
   const std::vector<FixError> errors = compute_errors(input, input.fixes).errors;
   const auto height_m = compute_intervals(
       errors, [](const FixError& error) { return error.height_m; }, input.threads);
-  if (height_m) add("height_rms_mm", evaluation.height_m->sizes.rms, height_m->rms, millimetres);
+  if (height_m) add("height_rms_mm", evaluation.height_m->sizes.rms, height_m->rms, millimeters);
   const auto yaw_rad = compute_intervals(
       errors, [](const FixError& error) { return error.yaw_rad; }, input.threads);
   if (yaw_rad) add("yaw_rms_deg", evaluation.yaw_rad->sizes.rms, yaw_rad->rms, degrees);

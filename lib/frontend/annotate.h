@@ -13,7 +13,7 @@ namespace vlp {
 
 /// Renders the detected lights into a brightened color copy of an image, for visual inspection.
 /// Draws outline points, center, kind and reason of each light. Lamps are green, truncated lights
-/// yellow, unknown ones red, unmodulated ones blue, and lights without outline grey.
+/// yellow, unknown ones red, unmodulated ones blue, and lights without outline gray.
 ///
 /// @param image  one channel of 8 or 16 bits
 cv::Mat render_annotated(const cv::Mat& image, const std::vector<Light>& lights, Readout readout);

@@ -233,7 +233,7 @@ void remove_blunders(const BoardLattice& lattice, BoardView& view,
   const auto corners = collect_corners(view.seen);
   const Eigen::Vector2d first = corners[blunders.front()].pixel;
   warnings.push_back(fmt::format(
-      "{}: {} of its {} corners are not where their neighbours predict them, the first at "
+      "{}: {} of its {} corners are not where their neighbors predict them, the first at "
       "({:.1f}, {:.1f}); left out",
       view.image, blunders.size(), corners.size(), first.x(), first.y()));
   for (auto i = blunders.rbegin(); i != blunders.rend(); ++i) {

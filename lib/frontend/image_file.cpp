@@ -18,7 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Returns true if a JPEG is truncated: no end marker (FF D9) follows its scan. A truncated JPEG is
-/// decoded without an error, with grey pixels after the end of the data.
+/// decoded without an error, with gray pixels after the end of the data.
 bool is_cut_jpeg(const std::string& bytes) {
   constexpr std::size_t marker = 2;
   if (!bytes.starts_with("\xff\xd8")) return false;

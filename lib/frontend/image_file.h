@@ -13,7 +13,7 @@ namespace vlp {
 void check_size(const std::filesystem::path& file, std::int64_t width, std::int64_t height,
                 double max_mpx);
 
-/// Reads an image as grey levels of 8 or 16 bits and converts color. The format is recognized by
+/// Reads an image as gray levels of 8 or 16 bits and converts color. The format is recognized by
 /// the content: PNG, JPEG, BMP, TIFF, PBM, PGM or PPM. An orientation tag in the file is ignored,
 /// because the readout direction does not rotate with it.
 ///

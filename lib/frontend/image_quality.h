@@ -10,7 +10,7 @@ namespace vlp {
 struct ImageBlur {
   /// Sigma of the blur of the sharpest edges; infinite for an image without contrast. A step of
   /// height A with blur s has a maximum gradient of A / (s sqrt(2 pi)) per pixel. A is the range of
-  /// the grey levels (1 % to 99 %), the maximum gradient their 99.9 % quantile. The variances of
+  /// the gray levels (1 % to 99 %), the maximum gradient their 99.9 % quantile. The variances of
   /// smoothing and difference are subtracted.
   double sigma_px;
   /// Level that 1 % of the pixels exceed, as a fraction of the full scale.

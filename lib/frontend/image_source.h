@@ -34,7 +34,7 @@ struct SourceImage {
   /// Index of the image in its source.
   std::size_t index = 0;
 
-  /// Returns the grey levels.
+  /// Returns the gray levels.
   /// @throws InputError as read_image()
   cv::Mat read(const FrontendOptions& options) const {
     return frame.empty() ? read_image(file, options.max_mpx) : frame;

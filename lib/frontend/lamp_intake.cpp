@@ -43,7 +43,7 @@ bool is_overexposed(const Light& light, const cv::Mat& image) {
   return light.kind == LightKind::unknown && white_fraction(image, {low, high}) > kMaxWhiteFraction;
 }
 
-/// Returns true if the range of the grey levels is small (image uniformly dark or white), so that
+/// Returns true if the range of the gray levels is small (image uniformly dark or white), so that
 /// the signal may be noise. Takes a small part of the time of measure_signal().
 bool is_flat(const cv::Mat& image) {
   constexpr double max_range = 0.25;  // of the full scale

@@ -23,7 +23,7 @@ std::optional<std::string> parse_video_name(const std::string& name);
 
 /// Decoded frame of a video.
 struct VideoFrame {
-  /// Grey levels of 8 bits.
+  /// Gray levels of 8 bits.
   cv::Mat1b image;
   std::size_t number;
   /// Time since the start of the video, from the time stamp of the frame.

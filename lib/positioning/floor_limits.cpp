@@ -101,7 +101,7 @@ FloorLimits compute_floor_limits(const LampMap& map, const Camera& camera, const
   const Lens lens(camera.lens_model, camera.intrinsics);
   const auto row_clock = make_row_clock(camera);
   FloorLimits limits{image_sources(prior), places_on(grid, z_m, yaw_rad)};
-  for (const auto& source : {Source{"centre", "center"}, {"tilt", "tilt"}, kLampMap}) {
+  for (const auto& source : {Source{"center", "center"}, {"tilt", "tilt"}, kLampMap}) {
     limits.sources.push_back(source);
   }
   for (FloorLimits::Place& place : limits.places) {

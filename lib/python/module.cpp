@@ -624,8 +624,8 @@ PYBIND11_MODULE(vlp, m) {
   m.doc() =
       "Positions from modulated ceiling lamps: lens, lamp map, calibration, lamps in images, "
       "fixes.\n\n"
-      "Metres, radians, seconds, pixels; the world has z up, yaw is counter-clockwise seen from\n"
-      "above, the centre of an image's top left pixel is (0, 0). Nothing is None, or NaN in "
+      "Meters, radians, seconds, pixels; the world has z up, yaw is counter-clockwise seen from\n"
+      "above, the center of an image's top left pixel is (0, 0). Nothing is None, or NaN in "
       "arrays.";
   m.attr("__version__") = VLP_VERSION;
   py::register_exception<InputError>(m, "InputError", PyExc_ValueError).doc() =

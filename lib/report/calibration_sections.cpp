@@ -83,7 +83,7 @@ std::string rotation_table(const RotationCenter& center) {
   const double tilt_rad = std::atan2(up.head<2>().norm(), up.z());
   HtmlTable table{"",
                   {},
-                  {{"rotation centre in the undistorted image",
+                  {{"rotation center in the undistorted image",
                     format_pair(center.center_px, "px") + format_sds(center.covariance, 1, "px")},
                    {"tilt of the camera", significant(deg_from_rad(tilt_rad), 4) + " degrees"},
                    {"correction", center.model == RotationModel::tilt ? "tilt" : "shift"}}};
@@ -102,7 +102,7 @@ std::string dispersion_table(const Dispersion& dispersion, const Eigen::Vector2d
        {},
        {{"captures at the station", std::to_string(dispersion.captures)},
         {"radius of the circle before", mm(dispersion.radius_m) + " mm"},
-        {"its centre from the station",
+        {"its center from the station",
          mm(dispersion.center_m.x()) + ", " + mm(dispersion.center_m.y()) + " mm"},
         {"offset taken off the image",
          format_pair(dispersion.offset_px, "px") +

@@ -143,7 +143,7 @@ std::string report_html(const Report& report) {
           html_section("Gates", gates_table(report)) +
           html_section("Figures", format_statistics(report)) +
           html_section("Camera", camera + pictures(ReportPart::camera)) +
-          html_section("Rotation centre", rotation + pictures(ReportPart::rotation)) +
+          html_section("Rotation center", rotation + pictures(ReportPart::rotation)) +
           html_section("Dispersion", dispersion + pictures(ReportPart::dispersion)) +
           html_section("Distribution of the errors", pictures(ReportPart::distribution)) +
           html_section("Moving tracks", pictures(ReportPart::tracks)) +

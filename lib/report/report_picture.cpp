@@ -25,7 +25,7 @@ constexpr std::array<Kind, 8> kKinds = {
     {{"intrinsics", ReportPart::camera,
       "Coverage: the corners of all views should reach the edges of the image. Residuals: short "
       "and "
-      "without a pattern; long arrows that point the same way mean a lens that is not modelled "
+      "without a pattern; long arrows that point the same way mean a lens that is not modeled "
       "well. "
       "Uncertainty: how far the projection can be trusted, by one standard deviation. "
       "Sharpness, with AprilTags: even, or falling equally towards all edges; a fall to one side "
@@ -34,10 +34,10 @@ constexpr std::array<Kind, 8> kKinds = {
       "standard deviation of the projection, and the MTF50 where it was measured."},
      {"rotation", ReportPart::rotation,
       "Left: the lamps while the camera turns on the spot; each goes round an ellipse. Right, "
-      "enlarged: the centres of the ellipses, by lamp, with the rotation centre and the principal "
-      "point. Centres far apart are a sign of tilt.",
+      "enlarged: the centers of the ellipses, by lamp, with the rotation center and the principal "
+      "point. Centers far apart are a sign of tilt.",
       "Traces of the lamps in the undistorted image with fitted ellipses, and beside them the "
-      "centres of the ellipses, the rotation centre and the principal point."},
+      "centers of the ellipses, the rotation center and the principal point."},
      {"dispersion", ReportPart::dispersion,
       "Fixes at a known station minus the station, before and after the dispersion calibration, "
       "each "
@@ -55,12 +55,12 @@ constexpr std::array<Kind, 8> kKinds = {
       "What the uncertainty of the fixes comes from, as they state it: noise, which averages out, "
       "below, and what calibration and lamp map leave, which does not, above it. The largest part "
       "is to be improved first. It is divided as for a level camera whose fixes are its own place: "
-      "fixes with an estimated lean are left out, and of a robot's centre it does not hold.",
+      "fixes with an estimated lean are left out, and of a robot's center it does not hold.",
       "Stacked horizontal variances of the fixes by their sources."},
      {"track", ReportPart::tracks,
       "Above: the commanded line and the fixes on the floor. Below: how far they are to the left "
       "of "
-      "the commanded line, in millimetres; what scatters about the fitted line is jitter.",
+      "the commanded line, in millimeters; what scatters about the fitted line is jitter.",
       "Commanded line, fixes and the line fitted to them, on the floor and across the line."},
      {"limits", ReportPart::other,
       "What accuracy the room and the camera allow over the floor, by one standard deviation.",

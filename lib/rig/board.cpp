@@ -88,7 +88,7 @@ Board read_squares(YamlMap& map, BoardKind kind) {
   if (const auto top_left = map.optional("top_left")) {
     board.top_left_white = top_left->text() == "white";
     if (!board.top_left_white && top_left->text() != "black") {
-      throw top_left->unknown("the colours of a square are: black, white");
+      throw top_left->unknown("the colors of a square are: black, white");
     }
   }
   return board;

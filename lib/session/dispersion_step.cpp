@@ -50,10 +50,10 @@ Fix locate_capture(const Positioner& positioner, const ReferencePointCapture& ca
 /// their places.
 std::vector<ReferencePointCapture> move_places_to_camera(const KnownPlaces& places,
                                                          const LampMap& lamps,
-                                                         const Calibration& levelled) {
+                                                         const Calibration& leveled) {
   std::vector<ReferencePointCapture> captures = places.captures;
-  const Positioner positioner(lamps, levelled);
-  const Eigen::Vector2d& arm_m = *levelled.rotation_center->lever_arm_m;
+  const Positioner positioner(lamps, leveled);
+  const Eigen::Vector2d& arm_m = *leveled.rotation_center->lever_arm_m;
   for (std::size_t i = 0; i < captures.size(); ++i) {
     if (places.of[i] != PlaceOf::axis) continue;
     const Fix fix = locate_capture(positioner, captures[i]);
@@ -66,8 +66,8 @@ std::vector<ReferencePointCapture> move_places_to_camera(const KnownPlaces& plac
 
 /// Returns the mean height of the first lamp of the map above the cameras, m; 0 without a fix.
 double compute_mean_height_m(const KnownPlaces& places, const LampMap& lamps,
-                             const Calibration& levelled) {
-  const Positioner positioner(lamps, levelled);
+                             const Calibration& leveled) {
+  const Positioner positioner(lamps, leveled);
   double height_m = 0;
   int fixes = 0;
   for (const ReferencePointCapture& capture : places.captures) {
@@ -81,13 +81,13 @@ double compute_mean_height_m(const KnownPlaces& places, const LampMap& lamps,
 
 /// Warns of an offset that equals the lever arm. An offset d acts as a camera displaced by H d / f.
 void warn_of_lever_arm(DispersionResult& result, const KnownPlaces& places, const LampMap& lamps,
-                       const Calibration& levelled) {
-  const auto& center = levelled.rotation_center;
+                       const Calibration& leveled) {
+  const auto& center = leveled.rotation_center;
   if (!center || !center->lever_arm_m) return;
   const Eigen::Vector2d& arm_m = *center->lever_arm_m;
-  const double height_m = compute_mean_height_m(places, lamps, levelled);
+  const double height_m = compute_mean_height_m(places, lamps, leveled);
   if (!(height_m > 0)) return;
-  const Eigen::Vector2d focal_px = levelled.camera.focal_px();
+  const Eigen::Vector2d focal_px = leveled.camera.focal_px();
   const Eigen::Vector2d displacement_m =
       height_m * result.fit.dispersion.offset_px.cwiseQuotient(focal_px);
   constexpr double max_relative_difference = 0.2, min_m = 1e-3;
@@ -179,9 +179,9 @@ DispersionResult solve_dispersion(const LampCaptures& input, const KnownPlaces& 
                                   DispersionMethod method, DispersionCircle circle,
                                   HistoryEntry entry) {
   DispersionResult result;
-  Calibration levelled = input.calibration;
-  levelled.dispersion.reset();
-  check_map(input, levelled, result);
+  Calibration leveled = input.calibration;
+  leveled.dispersion.reset();
+  check_map(input, leveled, result);
   if (!result.ok()) return result;
   const bool of_axis =
       std::find(places.of.begin(), places.of.end(), PlaceOf::axis) != places.of.end();
@@ -198,7 +198,7 @@ DispersionResult solve_dispersion(const LampCaptures& input, const KnownPlaces& 
     without.dispersion.reset();
     return move_places_to_camera(places, input.lamps, without);
   };
-  const std::vector<ReferencePointCapture> captures = captures_for(levelled);
+  const std::vector<ReferencePointCapture> captures = captures_for(leveled);
   result.fit = fit_dispersion(captures, input.lamps, input.calibration, method, circle);
   const DispersionFit& fit = result.fit;
   std::string why(describe(fit.status));
@@ -211,23 +211,23 @@ DispersionResult solve_dispersion(const LampCaptures& input, const KnownPlaces& 
     const bool is_of_captures = fit.status == DispersionStatus::too_few_captures ||
                                 fit.status == DispersionStatus::one_yaw ||
                                 fit.status == DispersionStatus::many_yaws;
-    if (!is_far && !is_of_captures) explain_failure_by_map(input, levelled, result);
+    if (!is_far && !is_of_captures) explain_failure_by_map(input, leveled, result);
     return result;
   }
   if (!input.calibration.rotation_center) {
     result.warnings.emplace_back("the calibration has no rotation_center: run vlp-rotation first");
   }
   warn_of_few_captures(result, method);
-  if (!of_axis) warn_of_lever_arm(result, places, input.lamps, levelled);
-  constexpr double millimetres = 1e3;
-  result.metrics = {{"dispersion_mm", millimetres * fit.dispersion.radius_m},
+  if (!of_axis) warn_of_lever_arm(result, places, input.lamps, leveled);
+  constexpr double millimeters = 1e3;
+  result.metrics = {{"dispersion_mm", millimeters * fit.dispersion.radius_m},
                     {"dispersion_offset_px", fit.dispersion.offset_px.norm()}};
   if (const auto& world_m = fit.world_offset_m) {
-    result.metrics.push_back({"world_mm", millimetres * world_m->norm()});
+    result.metrics.push_back({"world_mm", millimeters * world_m->norm()});
   }
   if (of_axis) {
     add_lever_arm_covariance(result.fit.dispersion, input,
-                             compute_mean_height_m(places, input.lamps, levelled));
+                             compute_mean_height_m(places, input.lamps, leveled));
   }
   propagate_uncertainty(result, captures_for, input, method, circle);
   result.calibration = with_dispersion(input.calibration, fit.dispersion, std::move(entry));

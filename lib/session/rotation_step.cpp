@@ -120,14 +120,14 @@ void add_warnings(RotationResult& result) {
         format_height_m(heights.front().z_m)));
   } else if (!result.fit.center.lever_arm_m) {
     result.warnings.push_back(fmt::format(
-        "this method takes the lever arm as zero, and the centre is a mean over {} heights: axis "
+        "this method takes the lever arm as zero, and the center is a mean over {} heights: axis "
         "estimates both",
         heights.size()));
   }
   if (!result.fit.center.covariance) {
     result.warnings.emplace_back(
         "three captures of a height leave no residuals, and the "
-        "centre has no standard deviation: add captures, four or more at each height");
+        "center has no standard deviation: add captures, four or more at each height");
   }
   constexpr double max_noise_ratio = 3;
   const auto& median_sigma_px = result.spot.median_sigma_px;
@@ -241,7 +241,7 @@ RotationResult solve_rotation(const LampCaptures& input, RotationMethod method,
   }
   if (!result.fit.converged) {
     result.fail(StepFailure::undetermined,
-                "no rotation centre fits the captures: take them on one spot at each height, over "
+                "no rotation center fits the captures: take them on one spot at each height, over "
                 "more of the turn, with more of the lamps in view, and see that lens and lamp map "
                 "are right");
     explain_failure_by_map(input, extract_camera(input.calibration), result);
@@ -258,8 +258,8 @@ RotationResult solve_rotation(const LampCaptures& input, RotationMethod method,
   return result;
 }
 
-LevellingResult solve_levelling(const LampCaptures& input, bool refine_map, HistoryEntry entry) {
-  LevellingResult result;
+LevelingResult solve_leveling(const LampCaptures& input, bool refine_map, HistoryEntry entry) {
+  LevelingResult result;
   const Calibration alone = extract_camera(input.calibration);
   check_map(input, alone, result);
   if (!result.ok()) return result;
@@ -269,35 +269,35 @@ LevellingResult solve_levelling(const LampCaptures& input, bool refine_map, Hist
   if (std::any_of(input.motions.begin(), input.motions.end(), moves)) {
     check_row_time(input.calibration.camera);
   }
-  const auto levelled = [&](const Camera& camera) {
+  const auto leveled = [&](const Camera& camera) {
     return estimate_tilt_from_lamps(input.frames, input.lamps, camera, options);
   };
-  TiltCalibration& levelling = result.levelling;
-  levelling = levelled(input.calibration.camera);
-  if (!levelling.undetermined.empty()) {
-    result.fail(StepFailure::undetermined, levelling.undetermined);
+  TiltCalibration& leveling = result.leveling;
+  leveling = leveled(input.calibration.camera);
+  if (!leveling.undetermined.empty()) {
+    result.fail(StepFailure::undetermined, leveling.undetermined);
     explain_failure_by_map(input, alone, result);
     return result;
   }
-  if (levelling.captures_rejected > levelling.captures) {
+  if (leveling.captures_rejected > leveling.captures) {
     result.fail(StepFailure::wrong_map, describe(MapError{MapErrorKind::other_room}),
                 input.lamps_file);
     return result;
   }
   const auto center_for = [&](const Camera& camera) {
-    const TiltCalibration other = levelled(camera);
+    const TiltCalibration other = leveled(camera);
     return other.undetermined.empty() ? std::optional(other.center) : std::nullopt;
   };
-  propagate_lens_errors(levelling.center, input, center_for, result);
-  result.metrics = {{"tilt_deg", deg_from_rad(compute_tilt(levelling.center).angle_rad)}};
+  propagate_lens_errors(leveling.center, input, center_for, result);
+  result.metrics = {{"tilt_deg", deg_from_rad(compute_tilt(leveling.center).angle_rad)}};
   constexpr double max_noise_scale = 3;
-  if (levelling.noise_scale > max_noise_scale) {
+  if (leveling.noise_scale > max_noise_scale) {
     result.warnings.push_back(fmt::format(
         "the residuals are {:.1f} times what sigma_px lets expect: lamp map or lens are a little "
         "wrong, and the tilt, too, may be wrong by more than its sd{}",
-        levelling.noise_scale, refine_map ? "" : "; --refine-map may help"));
+        leveling.noise_scale, refine_map ? "" : "; --refine-map may help"));
   }
-  result.calibration = with_rotation_center(input.calibration, levelling.center, std::move(entry));
+  result.calibration = with_rotation_center(input.calibration, leveling.center, std::move(entry));
   return result;
 }
 

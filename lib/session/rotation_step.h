@@ -42,14 +42,14 @@ struct RotationResult : StepResult {
 /// wrong_map, undetermined.
 RotationResult solve_rotation(const LampCaptures& input, RotationMethod method, HistoryEntry entry);
 
-/// Result of solve_levelling().
-struct LevellingResult : StepResult {
-  TiltCalibration levelling;
+/// Result of solve_leveling().
+struct LevelingResult : StepResult {
+  TiltCalibration leveling;
 };
 
-/// Estimates the tilt from captures taken anywhere (calibration/levelling), and the lamp map if
+/// Estimates the tilt from captures taken anywhere (calibration/leveling), and the lamp map if
 /// `refine_map` is set. Metrics: tilt_deg. Failures: wrong_map, undetermined. Throws
 /// std::invalid_argument if the camera moves and its calibration lacks row_time_s or readout.
-LevellingResult solve_levelling(const LampCaptures& input, bool refine_map, HistoryEntry entry);
+LevelingResult solve_leveling(const LampCaptures& input, bool refine_map, HistoryEntry entry);
 
 }  // namespace vlp

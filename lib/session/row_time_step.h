@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "frontend/labelled_lights.h"
+#include "frontend/labeled_lights.h"
 #include "frontend/lamp_intake.h"
 #include "frontend/options.h"
 #include "lamps/signal/row_time.h"

@@ -18,11 +18,11 @@ namespace vlp {
 namespace {
 
 /// Returns true if each lamp has enough lights; otherwise fails the step.
-bool has_examples(std::span<const LabelledLight> lights, const LampMap& lamps,
+bool has_examples(std::span<const LabeledLight> lights, const LampMap& lamps,
                   TrainStepResult& result) {
   std::map<int, int> counts;
   for (const Lamp& lamp : lamps.lamps) counts[lamp.id] = 0;
-  for (const LabelledLight& light : lights) {
+  for (const LabeledLight& light : lights) {
     const auto lamp = counts.find(light.lamp);
     if (lamp == counts.end()) {
       throw std::invalid_argument(fmt::format(
@@ -38,7 +38,7 @@ bool has_examples(std::span<const LabelledLight> lights, const LampMap& lamps,
   }
   if (!few.empty()) {
     result.fail(StepFailure::undetermined,
-                fmt::format("too few labelled lights of lamps {}: add captures in which they are "
+                fmt::format("too few labeled lights of lamps {}: add captures in which they are "
                             "wholly in view, {} or more of each",
                             few, kMinExamples));
   } else if (counts.size() < 2) {
@@ -77,7 +77,7 @@ void warn_of_inseparable(const LampClassifier& classifier, TrainStepResult& resu
   }
 }
 
-/// Warns if the labelled lamps contradict the row time of the calibration.
+/// Warns if the labeled lamps contradict the row time of the calibration.
 void warn_of_row_time(const DetectedLights& seen, const std::vector<std::vector<Frame>>& labels,
                       const LampMap& lamps, TrainStepResult& result) {
   if (!seen.camera.row_time_s) return;
@@ -97,20 +97,20 @@ TrainStepResult train_lamp_classifier(const DetectedLights& seen,
                                       const LampMap& lamps,
                                       const std::filesystem::path& first_folder) {
   TrainStepResult result;
-  LabelledLights& labelled = result.labelled;
+  LabeledLights& labeled = result.labeled;
   for (std::size_t i = 0; i < labels.size(); ++i) {
-    add_labelled(seen.folders[i].images, labels[i], labelled);
+    add_labeled(seen.folders[i].images, labels[i], labeled);
   }
-  if (labelled.labels == 0) {
+  if (labeled.labels == 0) {
     throw InputError(first_folder,
                      "the table names none of the images that can be used: image names have to be "
                      "equal, with their endings");
   }
-  if (!has_examples(labelled.lights, lamps, result)) return result;
-  result.classifier = train_classifier(labelled.lights);
+  if (!has_examples(labeled.lights, lamps, result)) return result;
+  result.classifier = train_classifier(labeled.lights);
   result.classifier.row_time_s = seen.camera.row_time_s;
   if (!has_kept_examples(result.classifier, result)) return result;
-  result.confusion = cross_validate(labelled.lights, train_classifier);
+  result.confusion = cross_validate(labeled.lights, train_classifier);
   warn_of_inseparable(result.classifier, result);
   warn_of_row_time(seen, labels, lamps, result);
   return result;

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "frontend/labelled_lights.h"
+#include "frontend/labeled_lights.h"
 #include "lamps/signal/confusion.h"
 #include "session/row_time_step.h"
 
@@ -13,7 +13,7 @@ namespace vlp {
 
 /// Result of train_lamp_classifier().
 struct TrainStepResult : StepResult {
-  LabelledLights labelled;
+  LabeledLights labeled;
   LampClassifier classifier;
   /// Cross-validated confusion matrix: answers of classifiers to lights held out of their training.
   Confusion confusion;

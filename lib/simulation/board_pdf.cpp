@@ -15,7 +15,7 @@
 namespace vlp {
 namespace {
 
-constexpr double kPointsPerMetre = 72 / 0.0254;
+constexpr double kPointsPerMeter = 72 / 0.0254;
 /// Margins: most printers leave 5 mm blank. The footer below the board holds ruler and parameters.
 constexpr double kMargin_m = 0.008, kFooter_m = 0.022;
 
@@ -150,14 +150,14 @@ std::string render_board_pdf(const Board& board, const PageSize& paper) {
   std::string bytes;
   {
     const Surface surface(
-        cairo_pdf_surface_create_for_stream(append, &bytes, sheet_m->x() * kPointsPerMetre,
-                                            sheet_m->y() * kPointsPerMetre),
+        cairo_pdf_surface_create_for_stream(append, &bytes, sheet_m->x() * kPointsPerMeter,
+                                            sheet_m->y() * kPointsPerMeter),
         cairo_surface_destroy);
     // Fixed date: the bytes must not depend on the time of day.
     cairo_pdf_surface_set_metadata(surface.get(), CAIRO_PDF_METADATA_CREATE_DATE,
                                    "2000-01-01T00:00:00Z");
     const Context context(cairo_create(surface.get()), cairo_destroy);
-    cairo_scale(context.get(), kPointsPerMetre, kPointsPerMetre);
+    cairo_scale(context.get(), kPointsPerMeter, kPointsPerMeter);
     cairo_save(context.get());
     const Eigen::Vector2d room_m = *sheet_m - Eigen::Vector2d(0, kFooter_m);
     const Eigen::Vector2d begin_m = (room_m - tag_field_m(board)) / 2;

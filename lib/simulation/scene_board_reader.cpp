@@ -20,10 +20,10 @@ SceneBoard read_scene_board(YamlMap map) {
   board.margin_m = map.required("margin_m").number_within(0, 2, "m");
   const YamlValue warp = map.required("warp_m");
   board.warp_m = Eigen::Vector2d(warp.numbers(2).data());
-  constexpr double micrometres = 1e6;  // unit of the bound in messages
+  constexpr double micrometers = 1e6;  // unit of the bound in messages
   const double tenth_m =
       0.1 * compute_tag_pitch_m(board.print) * std::min(board.print.cols, board.print.rows);
-  const double max_warp_m = std::round(micrometres * tenth_m) / micrometres;
+  const double max_warp_m = std::round(micrometers * tenth_m) / micrometers;
   for (const YamlValue& part : warp.list()) part.number_within(-max_warp_m, max_warp_m, "m");
   board.white_e_per_s = read_radiance(map, "white_e_per_s");
   board.black_e_per_s = read_radiance(map, "black_e_per_s");

@@ -36,7 +36,7 @@ Recess read_recess(YamlMap map, const Glow& rim) {
   read_power("rim_power", 0, recess.rim_power);
   read_power("beam_power", 0, recess.beam_power);
   if (const auto slope = map.optional("far_side_slope")) {
-    recess.far_side_slope = slope->number_within(0.01, 100, "(metres sideways for each metre up)");
+    recess.far_side_slope = slope->number_within(0.01, 100, "(meters sideways for each meter up)");
   }
   map.finish();
   return recess;
@@ -90,7 +90,7 @@ void read_profile(YamlMap& map, Glow& glow) {
     glow.recess = read_recess(recess->map(), glow);
   } else {
     glow.edge_share =
-        map.required("edge_share").number_within(0, 2, "(of the radiance at the centre)");
+        map.required("edge_share").number_within(0, 2, "(of the radiance at the center)");
     if (const auto chips = map.optional("chips")) glow.chips = read_chips(chips->map(), glow);
     if (const auto chips = map.optional("random_chips")) {
       if (glow.chips) throw chips->error("stands beside chips: a disc has one of them");

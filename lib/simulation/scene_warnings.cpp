@@ -33,11 +33,11 @@ void add_brightness(const Scene& scene, const CaptureSet& set, const std::string
   const double low = compute_level(scene, set, dark_e_per_s);
   if (high - low < too_dark * white) {
     warnings.push_back(set.folder + ": " + bright + " is only " + whole(high - low) + " of " +
-                       whole(white) + " grey levels above " + dark + fit);
+                       whole(white) + " gray levels above " + dark + fit);
   }
   if (low > too_bright * white) {
     warnings.push_back(set.folder + ": " + dark + " is at " + whole(low) + " of " + whole(white) +
-                       " grey levels" + fit);
+                       " gray levels" + fit);
   }
 }
 

@@ -6,7 +6,7 @@ Sessions are paired by camera and session. One that had a result and has none no
 inputs; figures are compared where the inputs are the same. Sessions of a camera share its
 lens, so cameras are what the interval counts: the mean over cameras of the change of mean_mm, with its
 95 % interval by Student's distribution, of 20 cameras or more. A session whose figure changes by no more
-than a micrometre is the same.
+than a micrometer is the same.
 
 The gates of counts limit how many items a list may have: vanished sessions, lost results, changed cameras, moved lamps.
 A vanished session has a folder in RESULTS or a row in the earlier results, and no folder in the archive. A lost result

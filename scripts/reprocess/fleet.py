@@ -16,17 +16,17 @@ date. The kind is decided if one likelihood is MIN_ODDS times the other, a poste
 drifts are equally frequent. Otherwise it is "undecided", and the change and its date are those of the step.
 
 Stated standard deviations leave out what differs between sessions and not within one (the lens, the map). What
-neighbouring sessions of the whole fleet differ by more than is stated has a standard deviation between sessions of
+neighboring sessions of the whole fleet differ by more than is stated has a standard deviation between sessions of
 its own, tau, for each figure: the variance of a session is sd^2 + tau^2. A factor on the stated ones would take
 those that state little for too certain. tau is of the smaller 95 % of the differences, so that the few cameras and
 lamps that changed do not hide themselves, and makes deviates smaller by 20 / n for being known from n of them: of
 deviates z that are divided by a factor with a relative variance v, exp(z^4 v / 2) times as many are beyond z as of
 the true one, which z^2 v / 2 of it makes good, with z = 4.5. v = 2 / n is not derived but chosen on the safe side,
-since a few are left out and neighbours go together: of all of n independent ones it would be 1 / (2 n). Of too few
+since a few are left out and neighbors go together: of all of n independent ones it would be 1 / (2 n). Of too few
 differences nothing is tested.
 
 A camera whose sessions scatter more than those of the fleet has a tau of its own (own_between_sessions()). The test
-compares the squares of the differences between neighbouring sessions, over all its figures, with those that the tau
+compares the squares of the differences between neighboring sessions, over all its figures, with those that the tau
 of the fleet explains; the largest OWN_REJECTED of a series are left out, so that a change is not taken for scatter. The
 own tau has the same safety factor for few differences. Cameras of fewer than MIN_OWN_SESSIONS sessions have the tau of
 the fleet, and one that scatters more is called.
@@ -59,7 +59,7 @@ VARIANCE_OF_KEPT = 0.7588  # of a normal deviate within 1.96: 1 - 2 * 1.96 phi(1
 OWN_P = 0.01  # chance that a camera is given a tau of its own without need, which costs sensitivity only
 MIN_OWN_SESSIONS = 8
 OWN_REJECTED = 2  # largest differences of a series: a step has one, a session with an error two
-OWN_VARIANCE_FACTOR = 1.6  # of the sum of squares: neighbouring differences share a session (simulated, 8 to 50)
+OWN_VARIANCE_FACTOR = 1.6  # of the sum of squares: neighboring differences share a session (simulated, 8 to 50)
 LEAST_SD_MM = 1e-3
 WITH_LEVER_ARM = ("zenith", "rotation_center", "dispersion_offset")
 FEWEST_LAMPS = 4  # of three a lamp that moved cannot be told
@@ -114,7 +114,7 @@ def own_between_sessions(figures, between):
     the kinds with a larger tau than the fleet's; {} for other cameras. figures: those of camera_series()."""
     groups, total, expected, count = defaultdict(list), 0.0, defaultdict(float), 0
     for figure, (_, series) in figures.items():
-        tau, differences = between.get(kind_of(figure)), neighbours(series)
+        tau, differences = between.get(kind_of(figure)), neighbors(series)
         if tau is None or len(series) < MIN_OWN_SESSIONS:
             continue
         kept = len(differences) - OWN_REJECTED
@@ -138,8 +138,8 @@ def widened(series, tau):
     return [(value, math.hypot(sd, tau)) for value, sd in series]
 
 
-def neighbours(series):
-    """series: (value, sd). Of neighbours the square of their difference and its stated variance."""
+def neighbors(series):
+    """series: (value, sd). Of neighbors the square of their difference and its stated variance."""
     return [((b - a) ** 2, s**2 + t**2) for (a, s), (b, t) in zip(series, series[1:])]
 
 
@@ -331,7 +331,7 @@ class Room:
         return [widened(x, tau), widened([(one[1].imag, one[3]) for one in series], tau)]
 
     def differences(self):
-        return [one for lamp in self.series for series in self.along(lamp) for one in neighbours(series)]
+        return [one for lamp in self.series for series in self.along(lamp) for one in neighbors(series)]
 
     def tests(self):
         return sum(len(series) - 1 for series in self.series.values())
@@ -400,7 +400,7 @@ def fleet_of(rows, lamp_rows):
     ]
     between = {}
     for name in TWO:
-        of_name = [one for kind, _, series in of_figures if kind == name for one in neighbours(series)]
+        of_name = [one for kind, _, series in of_figures if kind == name for one in neighbors(series)]
         between[name] = between_sessions(of_name)
     pairs = sum(max(0, len(room.sessions) - 1) for room in rooms)  # the lamps of a session go together
     enough = 2 * pairs >= FEWEST_DIFFERENCES

@@ -280,9 +280,9 @@ Trial try_lamps(const Cell& cell, Random& random) {
   for (int k = 0; k < cell.captures; ++k) {
     input.frames.push_back({std::to_string(k), room.draw_detections(room.draw_pose(k))});
   }
-  const LevellingResult result = solve_levelling(input, false, {});
+  const LevelingResult result = solve_leveling(input, false, {});
   Trial trial = make_trial(result);
-  if (trial.has_result) add_center_errors(trial, result.levelling.center, room.center());
+  if (trial.has_result) add_center_errors(trial, result.leveling.center, room.center());
   return trial;
 }
 

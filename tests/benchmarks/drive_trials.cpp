@@ -234,7 +234,7 @@ class Trials {
                                  "two, two frames"};
       const std::string speed = fmt::format("{:4.2f} m/s", speed_m_per_s);
       fmt::print(
-          "{:.0f} us  {}  {} centres of lamps wholly in view: {:.4f} px, 2-D rms; mean along "
+          "{:.0f} us  {}  {} centers of lamps wholly in view: {:.4f} px, 2-D rms; mean along "
           "{:+.4f}, across {:+.4f}, scatter {:.4f} per axis\n",
           1e6 * *scene_.camera.row_time_s, speed, centers.count,
           std::sqrt(centers.squares / centers.count), centers.mean().x(), centers.mean().y(),

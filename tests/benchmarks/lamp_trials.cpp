@@ -57,7 +57,7 @@ cv::Mat render_image(const Scene& scene, const FrameRenderer& renderer, const La
 
 /// Lamp in a shot.
 struct Extent {
-  double radius_px;  ///< largest distance of the rim or sides from the centre
+  double radius_px;  ///< largest distance of the rim or sides from the center
   double periods;    ///< periods of its stripes across the part that is bright
 };
 
@@ -213,7 +213,7 @@ class Score {
     double squares = 0;
     for (const double error_px : sorted) squares += error_px * error_px;
     const auto count = static_cast<double>(sorted.size());
-    fmt::print("  centres: rms {:.3f}, median {:.3f}, worst {:.3f} px; chi-squared {:.2f}\n",
+    fmt::print("  centers: rms {:.3f}, median {:.3f}, worst {:.3f} px; chi-squared {:.2f}\n",
                std::sqrt(squares / count), sorted[sorted.size() / 2], sorted.back(),
                chi_square_ / count);
   }

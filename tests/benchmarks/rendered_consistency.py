@@ -10,8 +10,8 @@ For each scene and unit: a lamp map with survey errors of its own, images of the
 of a known place, of five known places of the axis with twelve captures each, all with a seed of their own.
 Then fixes of other places, calibrated in three ways:
 
-  steps     lens, rotation centre, offset one after the other, with the map as surveyed (vlp-calibrate); it does
-            not know what a wrong map does to rotation centre and offset, so nothing is asked of it
+  steps     lens, rotation center, offset one after the other, with the map as surveyed (vlp-calibrate); it does
+            not know what a wrong map does to rotation center and offset, so nothing is asked of it
   adjusted  turn and known place adjusted together with the map (vlp-adjust --refine-map)
   places    the five places so
 

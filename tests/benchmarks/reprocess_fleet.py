@@ -8,7 +8,7 @@
 20 cameras with 10 sessions each, evenly over a year, in two rooms by turns: units and rooms of datasets/archive, with a
 map of each room that stays as it was surveyed, and 28 images of the board and 24 of the turn, for 20 and 12, which show
 a tilt of 0.02 degrees in 4 of 5 such fleets only. The focal length of one camera drifts by 0.1 % over the year, the tilt of
-another by 0.02 degrees, the image centre of a third by 0.3 px; a lamp is moved by 1 mm on a day, in the other room one
+another by 0.02 degrees, the image center of a third by 0.3 px; a lamp is moved by 1 mm on a day, in the other room one
 by 5 mm. --quiet-year: nothing of it happens. Rendered, calibrated by reprocess.sh, and printed: which cameras and lamps
 it calls, when and by how much, and for each figure how far it is from the truth in units of what its session states.
 What stands in FOLDER already is not made again, so that it goes on where it was interrupted; --only-figures renders and
@@ -207,7 +207,7 @@ def verdict(year, results):
         print(f"{what:58} {words:44} {'as it was' if met else 'NOT AS IT WAS'}")
 
     quiet = year.quiet
-    expected = {} if quiet else {name_of(FOCAL[0]): "focal", name_of(TILT[0]): "tilt", name_of(CENTER[0]): "centre"}
+    expected = {} if quiet else {name_of(FOCAL[0]): "focal", name_of(TILT[0]): "tilt", name_of(CENTER[0]): "center"}
     called = {alarm["camera"]: alarm["changes"] for alarm in found["cameras"]}
     for camera, what in expected.items():
         changes = called.get(camera, [])

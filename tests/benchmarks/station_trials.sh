@@ -85,7 +85,7 @@ good() {
 faulty() {
   scene_of "$1" 514.8 525.2 $((14 + $1 % 16)) 0.7
   render --only boards
-  tried decentred "$1" 'the lens is decentred'
+  tried decentered "$1" 'the lens is decentered'
   scene_of "$1" 514.8 525.2 5 2.$((2 + $1 % 8))
   render --only boards
   tried blurred "$1" 'the lens is blurred'
@@ -169,7 +169,7 @@ kinds() {
   # The camera.
   scene_of "$seed" 514.8 525.2 18 0.7
   render --only boards
-  tried decentred "$seed" 'the lens is decentred'
+  tried decentered "$seed" 'the lens is decentered'
   scene_of "$seed" 514.8 525.2 5 2.5
   render --only boards
   tried blurred "$seed" 'the lens is blurred'

@@ -105,7 +105,7 @@ TEST(DistortionValidRadius, MatchesClosedFormForSingleCoefficient) {
   // r / (1 + k r^2) turns round at k r^2 = 1 and has a pole at k r^2 = -1.
   EXPECT_NEAR(only(5, 0.25).valid_radius(), 2, tolerance);
   EXPECT_NEAR(only(5, -0.25).valid_radius(), 2, tolerance);
-  // Outwards against the decentring the point moves by 1 - 6 r |p|, against the prism by
+  // Outwards against the decentering the point moves by 1 - 6 r |p|, against the prism by
   // 1 - 2 r s1 - 4 r^3 s2.
   EXPECT_NEAR(only(2, 0.05).valid_radius(), 1 / 0.3, tolerance);
   EXPECT_NEAR(only(3, -0.05).valid_radius(), 1 / 0.3, tolerance);

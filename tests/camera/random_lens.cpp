@@ -15,7 +15,7 @@ namespace {
 const double kTan60 = std::sqrt(3);
 
 /// Bounds of the twelve distortion coefficients: wide-angle barrel to pincushion, with prisms and
-/// decentring larger than those of a real lens.
+/// decentering larger than those of a real lens.
 constexpr double kBounds[][2] = {{-0.35, 0.2},  {-0.1, 0.2},   {-2e-3, 2e-3}, {-2e-3, 2e-3},
                                  {-0.02, 0.03}, {-0.05, 0.4},  {-0.05, 0.15}, {-0.01, 0.02},
                                  {-2e-3, 2e-3}, {-5e-4, 5e-4}, {-2e-3, 2e-3}, {-5e-4, 5e-4}};

@@ -92,7 +92,7 @@ TEST(ReadFixes, ReportsLineOfInvalidRow) {
   EXPECT_THAT(refusal("a,ok,0,NaN,0,0,,,,\n"), HasSubstr("fixes.csv:2: y_m"));
   EXPECT_EQ(refusal("a,ok,-1e6,1e6,0,0,,,,\n"), "");
   EXPECT_THAT(refusal("a,ok,0,0,0,0,,,,\nb,ok,0,-1e308,0,0,,,,\n"),
-              HasSubstr("fixes.csv:3: y_m: should be within 1,000 km, in metres, not '-1e308'"));
+              HasSubstr("fixes.csv:3: y_m: should be within 1,000 km, in meters, not '-1e308'"));
   EXPECT_THAT(refusal("a,ok,1000001,0,0,0,,,,\n"), HasSubstr("fixes.csv:2: x_m"));
   EXPECT_THAT(refusal("a,ok,0,0,1e7,0,,,,\n"), HasSubstr("fixes.csv:2: z_m"));
   EXPECT_THAT(refusal("a,ok,0,0,0,0,1,1,1,-1\n"), HasSubstr("fixes.csv:2: sd_yaw_rad"));

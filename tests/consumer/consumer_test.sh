@@ -89,14 +89,14 @@ same_fix() {  # COMPILER OPTIONS...
     exit 1
   fi
 }
-for optimise in -O0 "-O3 -march=native"; do
+for optimize in -O0 "-O3 -march=native"; do
   # shellcheck disable=SC2086 # several words each
   for compiler in cc clang; do
-    same_fix $compiler -std=c99 -Wall -Wextra -Wpedantic -Werror $optimise -x c "$same.c"
-    same_fix ${compiler/cc/c}++ -std=c++17 -Wall -Wextra -Werror $optimise -x c++ "$same.c"
+    same_fix $compiler -std=c99 -Wall -Wextra -Wpedantic -Werror $optimize -x c "$same.c"
+    same_fix ${compiler/cc/c}++ -std=c++17 -Wall -Wextra -Werror $optimize -x c++ "$same.c"
   done
   # shellcheck disable=SC2086 # several words each
-  same_fix c++ -std=c++20 $eigen $optimise -x c++ "$same.cpp"
+  same_fix c++ -std=c++20 $eigen $optimize -x c++ "$same.cpp"
 done
 # shellcheck disable=SC2086 # several words each
 same_fix clang++ -std=c++20 $eigen -O3 -march=native -x c++ "$same.cpp"

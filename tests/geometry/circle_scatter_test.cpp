@@ -20,7 +20,7 @@ constexpr std::size_t kPoints = 10;  // few: dividing by n - 3 differs clearly f
 
 struct Scatter {
   Vector2d mean_error = Vector2d::Zero();
-  Matrix2d covariance = Matrix2d::Zero();           // of the centres found
+  Matrix2d covariance = Matrix2d::Zero();           // of the centers found
   Matrix2d reported_covariance = Matrix2d::Zero();  // their mean
   double mahalanobis_squared = 0;                   // mean of e^T C^-1 e, with the C reported
 };

@@ -108,7 +108,7 @@ TEST(LevelFromInclination, ReturnsRotation) {
 }
 
 TEST(LevelFromWorld, TransformsPointToLevelFrame) {
-  // One metre along world y from the camera, which is turned by a quarter from x to y: the
+  // One meter along world y from the camera, which is turned by a quarter from x to y: the
   // point is on its x axis.
   const Vector3d x_in_level = level_from_world({{2, 3, 0.5}, pi / 2}, {2, 4, 2.5});
   EXPECT_THAT(x_in_level, IsNear(Vector3d(1, 0, 2), 1e-15));

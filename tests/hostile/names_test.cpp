@@ -229,7 +229,7 @@ TEST_F(HostileNames, SharedFolderFollowsNoLinkOutOfIt) {
   fs::create_directories(folder / "outside");
   const fs::path canary = folder.file("outside/canary", "mine");
   const SharedFolder shared(folder / "shared");
-  constexpr int every = 100;  // each is synchronised to disk
+  constexpr int every = 100;  // each is synchronized to disk
   int files = 0, folders = 0;
   for (int i = 0; i < kNames / every; ++i) {
     const std::string name = random_name(random);
@@ -261,7 +261,7 @@ TEST_F(HostileNames, SharedFolderFollowsNoLinkOutOfIt) {
 
 TEST_F(HostileNames, ReadRunReturnsWrittenNames) {
   int refused = 0;
-  constexpr int every = 20;  // parsing takes long without optimisation
+  constexpr int every = 20;  // parsing takes long without optimization
   for (int i = 0; i < kNames; ++i) {
     const std::string name = random_name(random);
     const std::string text = format_run({run_with(name, i), name});

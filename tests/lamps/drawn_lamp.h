@@ -94,7 +94,7 @@ struct DrawnLamp {
   }
 };
 
-/// Renders lamps on a dark image with normal noise of `noise_of_255` of 255 grey levels.
+/// Renders lamps on a dark image with normal noise of `noise_of_255` of 255 gray levels.
 inline cv::Mat render_lamps(const std::vector<DrawnLamp>& lamps, const cv::Size& size, int depth,
                             double noise_of_255 = 0, std::uint64_t seed = 1) {
   const double white = depth == CV_8U ? 255 : 65535;

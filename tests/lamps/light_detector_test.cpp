@@ -180,7 +180,7 @@ TEST(LightDetector, IgnoresMapFrequenciesWithClassifier) {
     }
     return render_lamps(lamps, size, CV_8U, 0.5);
   };
-  std::vector<LabelledLight> training;
+  std::vector<LabeledLight> training;
   const LightDetector by_map(map, drawn_camera(size));
   for (std::size_t i = 0; i < 10; ++i) {
     for (const Light& light : by_map.detect(image_view(draw(double(i) / 10)))) {

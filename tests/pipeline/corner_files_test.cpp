@@ -83,7 +83,7 @@ TEST_F(VlpIntrinsicsCornerFiles, TolerateOutlier) {
     const auto result = calibrate(table.string(), board.string(), kSize);
     EXPECT_LE(result.exit_code, 1) << result.errors;
     EXPECT_THAT(result.errors, HasSubstr("view3.png: 1 of its "));
-    EXPECT_THAT(result.errors, HasSubstr("corners are not where their neighbours predict them"));
+    EXPECT_THAT(result.errors, HasSubstr("corners are not where their neighbors predict them"));
     EXPECT_THAT(result.output, HasSubstr("views         10 used, 0 dropped"));
     return read_lens("camera.yaml");
   };

@@ -37,7 +37,7 @@ class VlpDetect : public testing::Test {
   const TemporaryFolder folder;
 };
 
-/// A row time that leaves lamps identified, and one with which each is taken for its neighbour.
+/// A row time that leaves lamps identified, and one with which each is taken for its neighbor.
 TEST_F(VlpDetect, ReportsBothRowTimesIfGivenOneIsWrong) {
   const std::string images = kRig + "/sample' --lamps " + kRig + "/lamps.yaml";
   const std::string output = " -o " + (folder / "out.csv").string();

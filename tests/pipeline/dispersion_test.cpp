@@ -52,7 +52,7 @@ TEST_F(VlpDispersion, MakesFixesExactAtOtherPositions) {
   ASSERT_EQ(result.exit_code, 0) << result.errors;
   EXPECT_THAT(result.output, HasSubstr("captures    12, 12 used, 0 left out"));
   EXPECT_THAT(result.output, HasSubstr("world       -2.000 1.000 mm"));
-  EXPECT_THAT(result.output, HasSubstr("after       radius 0.000 mm, centre -2.000 1.000 mm"));
+  EXPECT_THAT(result.output, HasSubstr("after       radius 0.000 mm, center -2.000 1.000 mm"));
   const Calibration written = read_calibration(folder / "calibration.yaml");
   EXPECT_EQ(written.rotation_center->zenith_in_camera, believed.rotation_center->zenith_in_camera);
   EXPECT_EQ(written.dispersion->captures, 12);
@@ -159,7 +159,7 @@ TEST(VlpDispersionOfRenderedImages, EqualsTiltOfCamera) {
                                      rendered);
   ASSERT_EQ(simulated.exit_code, 0) << simulated.errors;
   Calibration calibration = read_calibration(rendered + "/true_calibration.yaml");
-  // As if the rotation centre were wrong by 2 and -3 px.
+  // As if the rotation center were wrong by 2 and -3 px.
   RotationCenter& center = *calibration.rotation_center;
   center.zenith_in_camera += Eigen::Vector3d(2 / calibration.camera.focal_px().x(),
                                              -3 / calibration.camera.intrinsics[1], 0);

@@ -59,7 +59,7 @@ std::vector<std::string> read_build_order() {
   return order;
 }
 
-/// Two of a name in one namespace are undefined behaviour where both are linked.
+/// Two of a name in one namespace are undefined behavior where both are linked.
 TEST(Headers, DefineEachTypeNameOnce) {
   const std::regex type("(?:^|\n)(?:struct|class|enum class|enum) (\\w+)[^;{\n]*\\{");
   std::map<std::string, std::set<std::string>> headers;

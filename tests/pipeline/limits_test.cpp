@@ -26,7 +26,7 @@ const std::string kLimits = "vlp-limits --lamps " VLP_SOURCE_DIR
 TEST(VlpLimits, PrintsErrorBudget) {
   const auto result = run_program(kLimits + "--center-px 1 --tilt-deg 0.5 --lamp-map-mm 1");
   ASSERT_EQ(result.exit_code, 0) << result.errors;
-  for (const char* row : {"noise", "centre", "tilt", "lamp map", "together"}) {
+  for (const char* row : {"noise", "center", "tilt", "lamp map", "together"}) {
     EXPECT_THAT(result.output, HasSubstr(std::string("\n") + row));
   }
 }
@@ -145,7 +145,7 @@ TEST_F(VlpLimitsFromCalibration, NamesLargestErrorSource) {
 
 TEST_F(VlpLimitsFromCalibration, IncludeOnlyLensWithoutRotationCenter) {
   calibration.rotation_center.reset();
-  calibration.history.clear();  // it names the centre
+  calibration.history.clear();  // it names the center
   calibration.intrinsics_report = IntrinsicsReport{10, 1000, 0, 0.1, {}, {}};
   calibration.intrinsics_report->covariance = MatrixX(1e-6 * MatrixX::Identity(12, 12));
   for (Lamp& lamp : lamps.lamps) lamp.sd_m.reset();

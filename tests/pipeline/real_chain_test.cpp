@@ -82,7 +82,7 @@ TEST_F(VlpLocateRealLamps, LocatesRigCenterWithFiveLamps) {
   EXPECT_LT(row.fix->residual_px, 5);  // measured: 4.16, 1.8 mm at the ceiling
   EXPECT_THAT(lamps_in_view(row.fix->pose), testing::ElementsAre(2000, 2500, 3000, 3500, 4000));
 
-  // Within 2 cm of the centre; 18.8 mm were measured.
+  // Within 2 cm of the center; 18.8 mm were measured.
   const auto truth = folder.file("truth.csv", "image,x_m,y_m,z_m\nx_0_y_1.27.jpg,0,0,0.01\n");
   const auto evaluate = [&](const std::string& gates) {
     return run_program("vlp-evaluate " + path("fixes.csv") + " --truth " + truth.string() + gates);

@@ -108,7 +108,7 @@ class RealLog : public testing::Test {
   ProgramResult level(const std::string& options = "") const {
     return run_program("vlp-rotation --method lamps " + in_log("detections.csv") + "--lamps " +
                        in_log("lamps.yaml") + "--calibration " + calibration + " -o " +
-                       path("levelled.yaml") + options);
+                       path("leveled.yaml") + options);
   }
 };
 
@@ -120,7 +120,7 @@ TEST_F(RealLog, MatchesErrorsAgainstPath) {
   figures(in_log("lamps.yaml"), calibration);
   EXPECT_THAT(evaluate("").output, testing::HasSubstr("mean           65.831 mm"));
   ASSERT_EQ(level().exit_code, 0);
-  figures(in_log("lamps.yaml"), path("levelled.yaml"));
+  figures(in_log("lamps.yaml"), path("leveled.yaml"));
   EXPECT_EQ(evaluate("--gate mean_mm=32.9 --gate missing=0").exit_code, 0);
   EXPECT_EQ(evaluate("--gate mean_mm=32.5").exit_code, 1);
 }
@@ -139,9 +139,9 @@ TEST_F(RealLog, HasLargerErrorsWithTiltPerImage) {
   EXPECT_NEAR(figures(in_log("lamps.yaml"), calibration, free).mean_distance_m, 0.03639, 1e-4);
   EXPECT_THAT(evaluate(), testing::HasSubstr("p90            67.28"));
   ASSERT_EQ(level().exit_code, 0);
-  EXPECT_NEAR(figures(in_log("lamps.yaml"), path("levelled.yaml"), free).mean_distance_m, 0.03639,
+  EXPECT_NEAR(figures(in_log("lamps.yaml"), path("leveled.yaml"), free).mean_distance_m, 0.03639,
               1e-4);
-  EXPECT_NEAR(figures(in_log("lamps.yaml"), path("levelled.yaml")).mean_distance_m, 0.03265, 1e-4);
+  EXPECT_NEAR(figures(in_log("lamps.yaml"), path("leveled.yaml")).mean_distance_m, 0.03265, 1e-4);
   EXPECT_THAT(evaluate(), testing::HasSubstr("p90            61.89"));
 }
 
@@ -153,7 +153,7 @@ TEST_F(RealLog, Has66MmErrorWithoutTiltCorrection) {
 
 TEST_F(RealLog, HasHalfErrorWithTiltFromLamps) {
   ASSERT_EQ(level().exit_code, 0);
-  const auto [distance_m, residual_px] = figures(in_log("lamps.yaml"), path("levelled.yaml"));
+  const auto [distance_m, residual_px] = figures(in_log("lamps.yaml"), path("leveled.yaml"));
   EXPECT_LT(distance_m, 0.034);
   EXPECT_LT(residual_px, 1.4);
 }
@@ -162,7 +162,7 @@ TEST_F(RealLog, HasHalfErrorWithTiltFromLamps) {
 /// shows in the residuals alone.
 TEST_F(RealLog, HasHalfResidualWithRefinedMap) {
   ASSERT_EQ(level("--refine-map " + path("lamps.yaml")).exit_code, 0);
-  const auto [distance_m, residual_px] = figures(path("lamps.yaml"), path("levelled.yaml"));
+  const auto [distance_m, residual_px] = figures(path("lamps.yaml"), path("leveled.yaml"));
   EXPECT_LT(distance_m, 0.038);
   EXPECT_LT(residual_px, 0.7);
 }
@@ -202,7 +202,7 @@ TEST_F(RealLog, ContradictsGivenLens) {
   keep_every_third_frame();
   const auto adjusted = [&](const std::string& options) {
     return run_program("vlp-adjust " + path("third.csv") + "--lamps " + in_log("lamps.yaml") +
-                       "--map-sd-m 0.02 --calibration " + path("levelled.yaml") + "-o " +
+                       "--map-sd-m 0.02 --calibration " + path("leveled.yaml") + "-o " +
                        path("adjusted.yaml") + "--refine-map " + path("refined.yaml") + options);
   };
   const auto scale = [&] {

@@ -33,10 +33,10 @@ class VlpEvaluateReport : public testing::Test {
     ASSERT_EQ(code, 0) << command << "\n" << errors;
   }
   void SetUp() override {
-    const std::string levelled = (folder / "rotated.yaml").string();
+    const std::string leveled = (folder / "rotated.yaml").string();
     must("vlp-rotation " + kExample + "turning.csv" + rig(kExample + "calibration.yaml") + " -o " +
-         levelled + " --plot" + in("rotation.svg"));
-    must("vlp-dispersion " + kExample + "station.csv" + rig(levelled) + " --station 0.1 0 -o" +
+         leveled + " --plot" + in("rotation.svg"));
+    must("vlp-dispersion " + kExample + "station.csv" + rig(leveled) + " --station 0.1 0 -o" +
          in("calibration.yaml") + " --plot" + in("dispersion.svg"));
     must("vlp-locate " + kExample + "detections.csv" + rig(kExample + "calibration.yaml") + " -o" +
          in("fixes.csv"));
@@ -71,7 +71,7 @@ TEST_F(VlpEvaluateReport, PassesBrowserCheck) {
   EXPECT_EQ(check.exit_code, 0) << check.output << check.errors;
   EXPECT_THAT(run_program("pdfinfo" + in("report.pdf")).output, HasSubstr("(A4)"));
   const std::string paper = run_program("pdftotext -layout" + in("report.pdf") + " -").output;
-  for (const char* part : {"PASS", "mean_mm", "Figures", "Camera", "Rotation centre", "Dispersion",
+  for (const char* part : {"PASS", "mean_mm", "Figures", "Camera", "Rotation center", "Dispersion",
                            "Fixes on the floor", "Distribution of the errors", "Moving tracks",
                            "track.csv", "History", "vlp-evaluate", "SHA-256"}) {
     EXPECT_THAT(paper, HasSubstr(part));

@@ -28,7 +28,7 @@ TEST_F(VlpRotation, EstimatesTiltAndLeverArmOfExample) {
   EXPECT_EQ(found().model, RotationModel::tilt);
   ASSERT_TRUE(found().covariance && found().lever_arm_m && found().lever_arm_covariance);
   EXPECT_THAT(*found().lever_arm_m, IsNear(Eigen::Vector2d(0.004, -0.002), 3e-4));
-  for (const char* part : {"24 of 24", "centre", "zenith", "tilt        1.30", "lever arm", "sd ",
+  for (const char* part : {"24 of 24", "center", "zenith", "tilt        1.30", "lever arm", "sd ",
                            "spread", "residual", "outliers    0", "turn_23.png"}) {
     EXPECT_THAT(result.output, HasSubstr(part));
   }

@@ -92,10 +92,10 @@ TEST_F(VlpSimulate, WarnsOfUnusableCaptures) {
   };
   EXPECT_EQ(warnings_with("seed: 1", "seed: 2"), "");
   EXPECT_THAT(warnings_with("bits: 8", "bits: 16"),
-              AllOf(HasSubstr("lamps: the brightest lamp is only 200 of 65535 grey levels above"),
-                    HasSubstr("boards: the board's white is only 180 of 65535 grey levels")));
+              AllOf(HasSubstr("lamps: the brightest lamp is only 200 of 65535 gray levels above"),
+                    HasSubstr("boards: the board's white is only 180 of 65535 gray levels")));
   EXPECT_THAT(warnings_with("gain_dn_per_e: 0.02", "gain_dn_per_e: 5.0"),
-              HasSubstr("lamps: the ceiling is at 252 of 255 grey levels"));
+              HasSubstr("lamps: the ceiling is at 252 of 255 gray levels"));
   EXPECT_THAT(warnings_with("exposure_s: 5.0e-5", "exposure_s: 5.0e-4"),
               AllOf(HasSubstr("lamp 2 has no clear stripes: the exposure is longer than its"),
                     Not(HasSubstr("lamp 1 has"))));

@@ -182,7 +182,7 @@ TEST_F(VlpStationTerminal, ReportsCertainFailureEarly) {
   drop("boards", 0, 12);
   const Tmux tmux("PATH='" VLP_PROGRAMS_DIR "':$PATH " + run("0001", "") + " 2>/dev/null");
   EXPECT_THAT(tmux.screen_with("Fails"),
-              testing::AllOf(HasSubstr("[x] boards"), HasSubstr("the lens is decentred")));
+              testing::AllOf(HasSubstr("[x] boards"), HasSubstr("the lens is decentered")));
 }
 
 /// Lines of the screen with this text.

@@ -41,7 +41,7 @@ TEST_F(VlpStation, PassesGoodUnitAndKeepsRecord) {
   EXPECT_THAT(calibration, AllOf(HasSubstr("rotation_center"), HasSubstr("dispersion")));
   EXPECT_THAT(this->result("0001", "report.html"),
               AllOf(HasSubstr("<strong>PASS"), HasSubstr("check_mean_mm"), HasSubstr("LENSMODEL"),
-                    // the captions of the pictures of lens, rotation centre and dispersion
+                    // the captions of the pictures of lens, rotation center and dispersion
                     HasSubstr("Coverage: the corners"), HasSubstr("Left: the lamps"),
                     HasSubstr("Fixes at a known station minus")));
   // A unit calibrated again keeps its history, and gives the same calibration.
@@ -168,7 +168,7 @@ TEST_F(VlpStation, MatchesVlpCalibrate) {
     ++same;
   }
   EXPECT_EQ(same, 20);  // of lens, sharpness, rotation and dispersion
-  // The errors have the station's names, and there their fixes go through a table of nanometres.
+  // The errors have the station's names, and there their fixes go through a table of nanometers.
   const auto horizontal = of_session("evaluation.json").at("horizontal");
   EXPECT_NEAR(of_station("check_mean_mm"), horizontal.at("mean_mm").get<double>(), 1e-6);
 }
@@ -249,7 +249,7 @@ TEST_F(VlpStation, DoesNotFailUnitForStationFault) {
 }
 
 /// Row times with which lamps are still identified, with which none is, and with which each is
-/// taken for its neighbour.
+/// taken for its neighbor.
 TEST_F(VlpStation, ReportsWrongRowTime) {
   render();
   std::string stated = "row_time_s: 3.0e-05";
@@ -440,7 +440,7 @@ TEST_F(VlpStation, ReportsLampImagesOfAnotherCamera) {
   EXPECT_THAT(
       result.errors,
       ContainsRegex("is not judged: the lamps are seen through another lens than the "
-                    "boards: they show a focal length of 508[.].* px and the centre [(]407"));
+                    "boards: they show a focal length of 508[.].* px and the center [(]407"));
 }
 
 /// Images of another unit among those of the boards.
@@ -572,7 +572,8 @@ TEST_P(VlpStationFaultyLens, IsNamedAsCause) {
 
 INSTANTIATE_TEST_SUITE_P(
     VlpStation, VlpStationFaultyLens,
-    testing::Values(LensFault{"decentred", "402.3, 297.4", "418.3, 285.4", "the lens is decentred"},
+    testing::Values(LensFault{"decentered", "402.3, 297.4", "418.3, 285.4",
+                              "the lens is decentered"},
                     LensFault{"blurred", "blur_px: 0.7", "blur_px: 2.5", "the lens is blurred"},
                     LensFault{"wrong", "[520, 520.6", "[480, 480.5", "wrong lens"},
                     LensFault{"bent", "warp_m: [0.0003, -0.0002]", "warp_m: [0.01, -0.0002]",

@@ -44,7 +44,7 @@ class VlpRotationByLamps : public testing::Test {
     write_detections(folder / "detections.csv", frames);
     return run_program("vlp-rotation --method lamps " + path("detections.csv") + "--lamps " +
                        path("lamps.yaml") + "--calibration " + path("camera.yaml") + "-o " +
-                       path("levelled.yaml") + options);
+                       path("leveled.yaml") + options);
   }
 };
 
@@ -55,7 +55,7 @@ TEST_F(VlpRotationByLamps, WritesTilt) {
   ASSERT_EQ(result.exit_code, 0) << result.errors;
   EXPECT_THAT(result.output, HasSubstr("captures    9 used, 1 of fewer than three lamps, 0 left"));
   EXPECT_THAT(result.output, HasSubstr("tilt        3.4377 deg towards 57.3 deg"));
-  const Calibration written = read_calibration(folder / "levelled.yaml");
+  const Calibration written = read_calibration(folder / "leveled.yaml");
   const RotationCenter& truth = *rig.calibration.rotation_center;
   EXPECT_EQ(written.rotation_center->model, RotationModel::tilt);
   EXPECT_LT((written.rotation_center->zenith_in_camera - truth.zenith_in_camera).norm(), 1e-6);
@@ -89,7 +89,7 @@ TEST_F(VlpRotationByLamps, WritesRefinedMap) {
   }
   EXPECT_GT(worst_before_m, 1e-3);
   EXPECT_EQ(
-      read_calibration(folder / "levelled.yaml").history.back().options,
+      read_calibration(folder / "leveled.yaml").history.back().options,
       "--lamps lamps.yaml --calibration camera.yaml --method lamps --refine-map refined.yaml");
 }
 
@@ -111,7 +111,7 @@ TEST_F(VlpRotationByLamps, AcceptsCapturesOfMovingCamera) {
   const auto error_rad = [&](const std::string& options) {
     const auto result = level(frames, options);
     EXPECT_EQ(result.exit_code, 0) << result.errors;
-    const Calibration written = read_calibration(folder / "levelled.yaml");
+    const Calibration written = read_calibration(folder / "leveled.yaml");
     return (written.rotation_center->zenith_in_camera -
             rig.calibration.rotation_center->zenith_in_camera)
         .norm();
@@ -119,7 +119,7 @@ TEST_F(VlpRotationByLamps, AcceptsCapturesOfMovingCamera) {
   const double left_out = error_rad("");
   const std::string odometry = "--captures " + folder.file("captures.csv", captures).string();
   EXPECT_LT(error_rad(odometry), 0.2 * left_out);
-  const auto options = read_calibration(folder / "levelled.yaml").history.back().options;
+  const auto options = read_calibration(folder / "leveled.yaml").history.back().options;
   EXPECT_THAT(options, HasSubstr("--captures captures.csv"));
   EXPECT_LT(error_rad("--max-speed-m-per-s 2"), 0.3 * left_out);
   rig.calibration.camera.row_time_s.reset();
@@ -134,7 +134,7 @@ TEST_F(VlpRotationByLamps, ReportsRemedyOrCause) {
   const auto one = level(drive(1));
   EXPECT_EQ(one.exit_code, 3);
   EXPECT_THAT(one.errors, HasSubstr("add captures"));
-  EXPECT_FALSE(std::filesystem::exists(folder / "levelled.yaml"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "leveled.yaml"));
   const auto alike = level({20, drive(1)[0]});
   EXPECT_EQ(alike.exit_code, 2) << "one image twice is a file that is wrong: " << alike.errors;
   auto frames = drive(1);
@@ -150,7 +150,7 @@ TEST_F(VlpRotationByLamps, ReportsRemedyOrCause) {
 }
 
 TEST_F(VlpRotationByLamps, RejectsIncompatibleOptions) {
-  EXPECT_EQ(level(drive(5), "--refine-map " + path("levelled.yaml")).exit_code, 2);
+  EXPECT_EQ(level(drive(5), "--refine-map " + path("leveled.yaml")).exit_code, 2);
   EXPECT_EQ(level(drive(5), "--refine-map " + path("lamps.yaml")).exit_code, 2);
   EXPECT_EQ(level(drive(5), "--plot " + path("a.png")).exit_code, 2);
   const auto axis = run_program("vlp-rotation " + path("detections.csv") + "--lamps " +

@@ -91,7 +91,7 @@ TEST_F(VlpTrain, GivesSameBytesForAllThreadCounts) {
 TEST_F(VlpTrain, NamesLampsWithTooFewLights) {
   const auto result = train(kRig + "/sample" + kLamps);
   EXPECT_EQ(result.exit_code, 3);
-  EXPECT_THAT(result.errors, HasSubstr("too few labelled lights of lamps 1 (has 2), 2 (has 2)"));
+  EXPECT_THAT(result.errors, HasSubstr("too few labeled lights of lamps 1 (has 2), 2 (has 2)"));
   EXPECT_THAT(result.errors, HasSubstr("6 or more of each"));
   EXPECT_FALSE(fs::exists(output));
 }
@@ -201,9 +201,9 @@ TEST_F(VlpTrain, ReportsAmbiguousRowTime) {
   EXPECT_EQ(result.exit_code, 3) << result.output;
   EXPECT_THAT(result.errors, HasSubstr("fit a row time of"));
   EXPECT_FALSE(fs::exists(output));
-  const auto labelled = run_program("vlp-train --row-time " + kRig + "/sample" + kLamps +
-                                    " --labels true_detections.csv");
-  EXPECT_EQ(labelled.exit_code, 0) << labelled.errors;
+  const auto labeled = run_program("vlp-train --row-time " + kRig + "/sample" + kLamps +
+                                   " --labels true_detections.csv");
+  EXPECT_EQ(labeled.exit_code, 0) << labeled.errors;
   const auto nowhere = train("--row-time " + kRig + "/sample" + kLamps);
   EXPECT_EQ(nowhere.exit_code, 2);
   EXPECT_THAT(nowhere.errors, HasSubstr("needs --calibration"));

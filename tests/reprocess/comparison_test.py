@@ -125,7 +125,7 @@ class Changes(unittest.TestCase):
         gates = changes.check_gates({"gate_share": 0.5}, counts, None, {})
         self.assertEqual(changes.sessions_beyond_gates(counts, gates), 0)
 
-    def test_less_than_a_micrometre_is_the_same(self):
+    def test_less_than_a_micrometer_is_the_same(self):
         now = [row(0, "pass", 1.0005), row(1, "pass", 0.9995), row(2, "pass", 1.002)]
         found, _ = changes.changes_of(now, [row(i, "pass", 1) for i in range(3)])
         self.assertEqual([found[key] for key in ("better", "worse", "same")], [0, 1, 2])

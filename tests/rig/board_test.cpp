@@ -134,7 +134,7 @@ TEST(ReadBoard, RejectsInvalidBoardOfSquares) {
   EXPECT_THAT(rejection_message("DICT_5X5_100", "tag36h11"),
               HasSubstr("one of OpenCV's dictionaries"));
   EXPECT_THAT(rejection_message("dictionary", "top_left: red\ndictionary"),
-              HasSubstr("top_left: 'red' is unknown; the colours of a square are: black, white"));
+              HasSubstr("top_left: 'red' is unknown; the colors of a square are: black, white"));
 }
 
 TEST(ReadBoard, ReadsKalibrCheckerboard) {

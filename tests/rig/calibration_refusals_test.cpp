@@ -99,8 +99,8 @@ TEST(ReadCalibration, ReportsLineAndKeyOfInvalidRotationCenter) {
         "rotation_center.lever_arm_covariance: is not a covariance"},
        {"  lever_arm_m: [0.012, -0.009]\n", "",
         "rotation_center.lever_arm_covariance: is of no lever_arm_m"},
-       {"center_px:", "centre_px:",
-        "rotation_center: key 'center_px' is missing; there are: model, centre_px, "
+       {"center_px:", "center_px:",
+        "rotation_center: key 'center_px' is missing; there are: model, center_px, "
         "zenith_in_camera",
         "model: tilt"}});
 }

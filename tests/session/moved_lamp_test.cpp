@@ -57,7 +57,7 @@ class MovedLamp : public testing::Test {
     return solve_dispersion(dispersion, places, DispersionMethod::camera, DispersionCircle::mean,
                             {});
   }
-  StepResult level() const { return solve_levelling({check, map, kFile, camera}, false, {}); }
+  StepResult level() const { return solve_leveling({check, map, kFile, camera}, false, {}); }
   StepResult locate() const { return locate_frames({check, map, dispersion.calibration}); }
   StepResult adjust() const {
     return solve_adjustment({{{"check", check, {}}}, map, kFile, camera, "camera.yaml", 1e-3, {}},
@@ -122,7 +122,7 @@ TEST_F(MovedLamp, IsNotReportedForCorrectMap) {
 
 /// Captures of a large room tie few of its lamps together. The captures that fit a mirrored map by
 /// chance must not pass for all.
-TEST(SolveLevelling, FailsWhenMostCapturesContradictMap) {
+TEST(SolveLeveling, FailsWhenMostCapturesContradictMap) {
   constexpr int rows = 10;
   constexpr double distance_m = 1.2, height_m = 2.5, focal_px = 520, noise_px = 0.05;
   LampCaptures input{{}, {}, "lamps.yaml", {}};
@@ -151,9 +151,9 @@ TEST(SolveLevelling, FailsWhenMostCapturesContradictMap) {
     }
     input.frames.push_back(frame);
   }
-  EXPECT_TRUE(solve_levelling(input, false, {}).ok());
+  EXPECT_TRUE(solve_leveling(input, false, {}).ok());
   for (Lamp& lamp : input.lamps.lamps) lamp.position_m.y() *= -1;
-  const LevellingResult result = solve_levelling(input, false, {});
+  const LevelingResult result = solve_leveling(input, false, {});
   EXPECT_EQ(result.failure, StepFailure::wrong_map) << result.why;
 }
 

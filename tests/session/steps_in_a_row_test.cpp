@@ -61,10 +61,10 @@ struct CalibrationChain {
   Calibration calibrated() const {
     const RotationResult rotation = solve_rotation(turns, RotationMethod::axis, {});
     EXPECT_TRUE(rotation.ok()) << rotation.why;
-    LampCaptures levelled = turns;
-    levelled.calibration = rotation.calibration;
+    LampCaptures leveled = turns;
+    leveled.calibration = rotation.calibration;
     const DispersionResult dispersion =
-        solve_dispersion(levelled, known, DispersionMethod::camera, DispersionCircle::mean, {});
+        solve_dispersion(leveled, known, DispersionMethod::camera, DispersionCircle::mean, {});
     EXPECT_TRUE(dispersion.ok());
     return dispersion.calibration;
   }
@@ -141,7 +141,7 @@ TEST(SolveRotation, CircleLensJacobianMatchesJointFit) {
 }
 
 /// Tilt calibration from the lamps of a drive.
-TEST(SolveLevelling, LensJacobianPredictsChange) {
+TEST(SolveLeveling, LensJacobianPredictsChange) {
   Random random(4);
   Survey survey(kExactMap_m);
   for (int k = 0; k < 40; ++k) {
@@ -150,18 +150,18 @@ TEST(SolveLevelling, LensJacobianPredictsChange) {
   }
   Calibration& calibration = survey.input.calibration;
   const Eigen::MatrixXd covariance = lens_covariance(calibration.camera, 0.1, 8);
-  const auto levelled = [&] {
+  const auto leveled = [&] {
     LampCaptures drive{{}, survey.truth.map, "lamps.yaml", calibration};
     for (const auto& capture : survey.input.captures) {
       drive.frames.push_back({capture.name, capture.detections});
     }
-    const LevellingResult result = solve_levelling(drive, false, {});
+    const LevelingResult result = solve_leveling(drive, false, {});
     EXPECT_TRUE(result.ok()) << result.why;
     return *result.calibration.rotation_center;
   };
-  EXPECT_FALSE(levelled().by_intrinsics);
+  EXPECT_FALSE(leveled().by_intrinsics);
   calibration.intrinsics_report = IntrinsicsReport{40, 4000, 0, 0.1, {}, {}, covariance};
-  const RotationCenter exact = levelled();
+  const RotationCenter exact = leveled();
   ASSERT_TRUE(exact.by_intrinsics);
   const auto before =
       Eigen::Map<const Eigen::VectorXd>(calibration.camera.intrinsics.data(), covariance.rows())
@@ -170,7 +170,7 @@ TEST(SolveLevelling, LensJacobianPredictsChange) {
   const Eigen::VectorXd error =
       Eigen::Map<const Eigen::VectorXd>(calibration.camera.intrinsics.data(), covariance.rows()) -
       before;
-  const Eigen::Vector2d moved = zenith_point(levelled()) - zenith_point(exact);
+  const Eigen::Vector2d moved = zenith_point(leveled()) - zenith_point(exact);
   EXPECT_GT(moved.norm(), 1e-6);
   EXPECT_LT((moved - *exact.by_intrinsics * error).norm(), 0.05 * moved.norm());
 }

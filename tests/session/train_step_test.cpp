@@ -33,14 +33,14 @@ struct Training {
 TEST(TrainLamps, RequiresSeveralLightsOfEachLamp) {
   const TrainStepResult result = Training(1).trained();
   EXPECT_EQ(result.failure, StepFailure::undetermined);
-  EXPECT_THAT(result.why, HasSubstr("too few labelled lights of lamps 1 (has 2), 2 (has 2)"));
+  EXPECT_THAT(result.why, HasSubstr("too few labeled lights of lamps 1 (has 2), 2 (has 2)"));
 }
 
 TEST(TrainLamps, ReportsCrossValidatedConfusion) {
   const TrainStepResult result = Training(kMinExamples).trained();
   ASSERT_TRUE(result.ok()) << result.why;
   EXPECT_EQ(result.classifier.lamps.size(), 6U);
-  EXPECT_EQ(result.labelled.labels, 12 * kMinExamples);
+  EXPECT_EQ(result.labeled.labels, 12 * kMinExamples);
   EXPECT_EQ(result.confusion.counts.sum(), 12 * kMinExamples);
   EXPECT_EQ(result.confusion.wrong(), 0);
 }

@@ -112,7 +112,7 @@ TEST_P(FrameRendererBoard, RenderedCornersMatchTrueCorners) {
     for (const auto& [tag, at] : tags) {
       if (at.size() < 4) continue;
       for (int corner = 0; corner < 4; ++corner) {
-        // Bottom left, bottom right, top right, top left: neighbours along x are 0 1 and 2 3.
+        // Bottom left, bottom right, top right, top left: neighbors along x are 0 1 and 2 3.
         const Eigen::Vector2d found =
             measured_corner(image, transposed, at.at(corner), at.at(corner ^ 1), at.at(3 - corner));
         const double error_px = (found - at.at(corner)).norm();
@@ -207,7 +207,7 @@ double level_at(const Eigen::Vector2d& pixel, double vignetting_power) {
   return image(static_cast<int>(pixel.y()), static_cast<int>(pixel.x()));
 }
 
-// 350 px from the centre are 95 degrees, 360 px beyond the last ray.
+// 350 px from the center are 95 degrees, 360 px beyond the last ray.
 TEST(FrameRenderer, RendersBoardBeyondNinetyDegreesWithoutVignetting) {
   const double on_axis = level_at({400, 100}, 0);
   EXPECT_GT(on_axis, 0);

@@ -59,7 +59,7 @@ TEST_F(FrameRendererDownlight, SourceIsOffsetByDepthTimesSlope) {
   EXPECT_NEAR((core_px - rim_px).norm(), 0.05 * slope.norm() / 1.5 * 500, 0.002);
   const FrameRenderer renderer(scene_);
   EXPECT_LT((find_true_lamps(scene_, renderer, shot).at(0).pixel - rim_px).norm(), 1e-6)
-      << "the truth is the rim's centre";
+      << "the truth is the rim's center";
 }
 
 TEST_F(FrameRendererDownlight, IsHalfAsBrightAtSourceDiameter) {
@@ -168,7 +168,7 @@ TEST_F(FrameRendererDownlight, MatchesRecessEquationInObliqueView) {
 
 TEST_F(FrameRendererDownlight, RendersCrescentWhereRimHidesSource) {
   glow().recess = Recess{0.2, 0.05, 0, {}};
-  const Eigen::Vector3d eye_m(0.75, 0, 0.1);  // the source is 0.1 m beyond the rim's centre
+  const Eigen::Vector3d eye_m(0.75, 0, 0.1);  // the source is 0.1 m beyond the rim's center
   const Eigen::Vector2d rim_px = projected(glow().position_m, shot_at(scene_, eye_m, 0));
   const Brightness crescent = measure_brightness(rendered(eye_m));
   ASSERT_GT(crescent.sum, 0);
@@ -178,7 +178,7 @@ TEST_F(FrameRendererDownlight, RendersCrescentWhereRimHidesSource) {
   const FrameRenderer renderer(scene_);
   const auto lamps = find_true_lamps(scene_, renderer, shot_at(scene_, eye_m, 0));
   ASSERT_EQ(lamps.size(), 1U);
-  EXPECT_LT((lamps[0].pixel - rim_px).norm(), 1e-6) << "the truth is the rim's centre";
+  EXPECT_LT((lamps[0].pixel - rim_px).norm(), 1e-6) << "the truth is the rim's center";
 }
 
 TEST_F(FrameRendererDownlight, HotSpotsMatchTheirEquation) {

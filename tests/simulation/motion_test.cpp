@@ -82,9 +82,9 @@ TEST(FrameRendererMotion, TrueLampMovesWithRenderedLamp) {
                              find_true_lamps(scene, renderer, shot).at(0).pixel);
     };
     const Eigen::Vector2d at_rest = offset();
-    const Eigen::Vector2d centre = find_true_lamps(scene, renderer, shot)[0].pixel;
+    const Eigen::Vector2d center = find_true_lamps(scene, renderer, shot)[0].pixel;
     shot.motion.velocity_m_per_s = velocity;
-    EXPECT_GT((find_true_lamps(scene, renderer, shot)[0].pixel - centre).norm(), 1);
+    EXPECT_GT((find_true_lamps(scene, renderer, shot)[0].pixel - center).norm(), 1);
     EXPECT_LT((offset() - at_rest).norm(), 0.01);
   }
 }

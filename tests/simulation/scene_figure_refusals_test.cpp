@@ -174,7 +174,7 @@ TEST(ReadScene, RejectsInvalidRecessExponents) {
     return refusal_with("depth_m: 0.07,", "depth_m: 0.07, " + keys + ",");
   };
   EXPECT_EQ(with("source_power: 1.5, rim_power: 6, beam_power: 7, far_side_slope: 0.06"), "");
-  EXPECT_THAT(with("far_side_slope: 0"), testing::HasSubstr("recess.far_side_slope: 0 (metres"));
+  EXPECT_THAT(with("far_side_slope: 0"), testing::HasSubstr("recess.far_side_slope: 0 (meters"));
   EXPECT_THAT(with("beam_power: -1"), testing::HasSubstr("recess.beam_power: -1"));
 }
 
@@ -317,7 +317,7 @@ TEST(ReadScene, RejectsInvalidSteadyLampOrBoard) {
             "m: is it in the right unit?");
   EXPECT_EQ(refusal_with("edge_share: 0.7", "edge_share: -0.7"),
             "scene.yaml:13: clutter.steady_lamps[0].edge_share: -0.7 (of the radiance at the "
-            "centre) is not within 0 and 2 (of the radiance at the centre): is it in the right "
+            "center) is not within 0 and 2 (of the radiance at the center): is it in the right "
             "unit?");
   EXPECT_EQ(refusal_with("[0.0003, -0.0002]", "[0.3, -0.2]"),
             "scene.yaml:20: board.warp_m[0]: 0.3 m is not within -0.009 and 0.009 m: is it in the "

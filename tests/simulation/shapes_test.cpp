@@ -53,7 +53,7 @@ TEST(Disc, IntegralOverEnclosingTriangleIsTotal) {
   EXPECT_NEAR(integral_over(Disc({1, 1}, 0.4), triangle), std::numbers::pi * 0.7, 1e-12);
 }
 
-// Sampling takes long where tests are not optimised.
+// Sampling takes long where tests are not optimized.
 #ifdef __SANITIZE_ADDRESS__
 constexpr int kTriangles = 4;
 #else

@@ -97,7 +97,7 @@ TEST(FrameRenderer, StripeContrastIsSincOfExposure) {
 }
 
 TEST(FrameRenderer, StripesMatchExposureTimeOfEachLine) {
-  // At 1 kHz half a period is 16.67 lines; the middle line's exposure is centred at time 0.
+  // At 1 kHz half a period is 16.67 lines; the middle line's exposure is centered at time 0.
   Scene scene = plain_scene();
   scene.camera = pinhole_camera();
   scene.lamps[0].glow.shape = make_disc(1.2);

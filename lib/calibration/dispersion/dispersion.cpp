@@ -144,7 +144,7 @@ std::string_view describe(DispersionStatus status) {
              "(two for --method paper); add captures";
     case DispersionStatus::station_far:
       return "every fix is farther from the station than a fifth of the lamps' height: is it in "
-             "metres, and in the frame of the lamp map? Are these the captures taken there?";
+             "meters, and in the frame of the lamp map? Are these the captures taken there?";
     case DispersionStatus::one_yaw:
       return "all captures, or all but one, are at one yaw, where an error of the camera and one "
              "of the station or the lamp map look alike: turn the camera at the station and add "

@@ -12,7 +12,7 @@
 namespace vlp {
 namespace {
 
-constexpr std::size_t kNeighbours = 8;
+constexpr std::size_t kNeighbors = 8;
 
 using Corners = std::vector<BoardLattice::Corner>;
 
@@ -24,7 +24,7 @@ std::vector<std::size_t> find_nearest(const Corners& corners, const std::vector<
     if (i == middle || is_outlier[i]) continue;
     away.emplace_back((corners[i].in_board_m - corners[middle].in_board_m).squaredNorm(), i);
   }
-  const std::size_t count = std::min(kNeighbours, away.size());
+  const std::size_t count = std::min(kNeighbors, away.size());
   std::partial_sort(away.begin(), away.begin() + static_cast<std::ptrdiff_t>(count), away.end());
   std::vector<std::size_t> nearest;
   for (std::size_t k = 0; k < count; ++k) nearest.push_back(away[k].second);
@@ -36,7 +36,7 @@ std::vector<std::size_t> find_nearest(const Corners& corners, const std::vector<
 double compute_displacement_ratio(const Corners& corners, const std::vector<std::size_t>& nearest,
                                   std::size_t middle) {
   constexpr double max_fraction = 0.25, min_px = 3;
-  if (nearest.size() < kNeighbours) return 0;
+  if (nearest.size() < kNeighbors) return 0;
   std::vector<PlanePair> pairs;
   pairs.reserve(nearest.size());
   double step_px = INFINITY;

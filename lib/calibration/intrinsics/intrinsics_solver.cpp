@@ -329,7 +329,7 @@ std::vector<double> IntrinsicsSolver::compute_view_rms() const {
 }
 
 std::set<IntrinsicsSolver::CornerOfView> IntrinsicsSolver::find_displaced_corners() const {
-  constexpr std::size_t neighbours = 8;
+  constexpr std::size_t neighbors = 8;
   constexpr double sigmas = 8, min_px = 0.1, median_of_normal = 0.6745;
   // If OPENCV_FISHEYE does not fit the lens, the residuals of neighbors also differ from each
   // other.
@@ -348,12 +348,12 @@ std::set<IntrinsicsSolver::CornerOfView> IntrinsicsSolver::find_displaced_corner
         if (other == k || !residual(other).allFinite()) continue;
         near.emplace_back((corners[other].in_board_m - corners[k].in_board_m).squaredNorm(), other);
       }
-      if (near.size() < neighbours || !residual(k).allFinite()) continue;
-      std::partial_sort(near.begin(), near.begin() + neighbours, near.end());
+      if (near.size() < neighbors || !residual(k).allFinite()) continue;
+      std::partial_sort(near.begin(), near.begin() + neighbors, near.end());
       double max_px = 0;
       for (Eigen::Index axis = 0; axis < 2; ++axis) {
         std::vector<double> beside;
-        for (std::size_t n = 0; n < neighbours; ++n) {
+        for (std::size_t n = 0; n < neighbors; ++n) {
           beside.push_back(residual(near[n].second)[axis]);
         }
         const double middle = upper_median(beside);

@@ -154,7 +154,7 @@ double compute_asymmetry(const Map& mtf50, double mean, const std::array<int, 2>
 
 /// Returns the median over pairs of opposite parts of the mean of the pair. A linear change over
 /// the image does not affect it. NaN without a pair, as in a corner.
-double expect_from_neighbours(const Map& map, int col, int row) {
+double expect_from_neighbors(const Map& map, int col, int row) {
   const int reach = map.cols / 6;  // a sixth of the image is larger than a speck
   const auto value = [&](int c, int r) {
     const bool inside = c >= 0 && r >= 0 && c < map.cols && r < map.rows;
@@ -182,7 +182,7 @@ LocalLoss find_local_loss(const Map& map, const std::array<int, 2>& imager_px) {
   LocalLoss largest;
   for (int row = 0; row < map.rows; ++row) {
     for (int col = 0; col < map.cols; ++col) {
-      const double loss = 1 - map.at(col, row) / expect_from_neighbours(map, col, row);
+      const double loss = 1 - map.at(col, row) / expect_from_neighbors(map, col, row);
       if (!std::isfinite(loss) || loss <= largest.fraction) continue;  // not if that is NaN
       largest = {loss, middle_of_part(map, col, row, imager_px)};
     }

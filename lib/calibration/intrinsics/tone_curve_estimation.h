@@ -19,18 +19,18 @@ namespace vlp {
 ///                 median standard deviation of the corners from pixel noise; OPENCV8 or
 ///                 OPENCV_FISHEYE, whichever fits better without a curve
 ///   n             50 / min(ratio), an effective number of residuals
-///   gamma_levels  estimate from the grey values next to the edges (sum_tone_curve_costs())
+///   gamma_levels  estimate from the gray values next to the edges (sum_tone_curve_costs())
 ///
 /// Uses gamma_levels alone if no lens is found, if check_board() reports another board, or if at
-/// least half of the views with usable grey values show no curve. Uses at most 24 views.
+/// least half of the views with usable gray values show no curve. Uses at most 24 views.
 ///
-/// Reason for both terms: grey values are precise but biased by JPEG and sharpening (20 % RMS of
+/// Reason for both terms: gray values are precise but biased by JPEG and sharpening (20 % RMS of
 /// gamma). A wrong curve displaces edges by fractions of their blur, which differ from tag to tag
 /// with its width. No lens and no smooth edge shift of a view (estimate_edge_shifts()) absorbs such
 /// displacements.
 ///
 /// Reason for n: thousands of residuals do not determine gamma as precisely as exact ratios would.
-/// With n, a ratio of 2 % weighs as much as the grey values, and less if the noise explains few of
+/// With n, a ratio of 2 % weighs as much as the gray values, and less if the noise explains few of
 /// the residuals.
 ///
 /// @throws std::invalid_argument as BoardLattice

@@ -78,15 +78,15 @@ BoardDetector::BoardDetector(const Board& board) {
 BoardDetector::~BoardDetector() = default;
 
 std::optional<TagDetection> BoardDetector::exact(const TagDetection& tag,
-                                                 const GreyLevels& image) const {
+                                                 const GrayLevels& image) const {
   return touching_->exact(tag, image);
 }
 
 BoardDetection BoardDetector::detect_squares(const cv::Mat1b& levels) const {
-  const GreyLevels grey{levels, smooth_image(levels)};
+  const GrayLevels gray{levels, smooth_image(levels)};
   BoardDetection seen;
   if (!finder_) {
-    seen.points = squares_->detect_chessboard(grey);
+    seen.points = squares_->detect_chessboard(gray);
     return seen;
   }
   std::map<int, std::vector<TagDetection>> found;
@@ -104,7 +104,7 @@ BoardDetection BoardDetector::detect_squares(const cv::Mat1b& levels) const {
       seen.tags.push_back(same.front());
     }
   }
-  seen.points = squares_->detect_beside(seen.tags, grey);
+  seen.points = squares_->detect_beside(seen.tags, gray);
   return seen;
 }
 
@@ -132,7 +132,7 @@ BoardDetection BoardDetector::detect(const cv::Mat& image) const {
       seen.foreign.push_back(tag);
     }
   }
-  const GreyLevels grey{levels, touching_ ? smooth_image(levels) : cv::Mat1f()};
+  const GrayLevels gray{levels, touching_ ? smooth_image(levels) : cv::Mat1f()};
   std::vector<TagDetection> once;
   for (const auto& [id, same] : found) {
     if (same.size() == 1) once.push_back(same.front());
@@ -142,11 +142,11 @@ BoardDetection BoardDetector::detect(const cv::Mat& image) const {
     seen.tags = once;
   } else {
     for (const TagDetection& tag : once) {
-      if (const auto found_exact = exact(tag, grey)) seen.tags.push_back(*found_exact);
+      if (const auto found_exact = exact(tag, gray)) seen.tags.push_back(*found_exact);
     }
   }
   if (touching_) {
-    for (const TagDetection& tag : touching_->find_missing(seen.tags, grey)) {
+    for (const TagDetection& tag : touching_->find_missing(seen.tags, gray)) {
       if (found[tag.id].size() <= 1) seen.tags.push_back(tag);
     }
   }

@@ -19,7 +19,7 @@ class TagFinder;
 class TagGeometry;
 class TouchingTags;
 class SquareCorners;
-struct GreyLevels;
+struct GrayLevels;
 
 /// Curvature of a tag's edge between its corners, measured from the pixels next to it. The outward
 /// distance of the edge from the straight line between the corners is
@@ -34,7 +34,7 @@ struct EdgeCurvature {
 };
 
 /// Step of the light across an edge of a tag: blur, and light on the dark and the bright side in
-/// the middle of the edge, in grey levels without tone curve.
+/// the middle of the edge, in gray levels without tone curve.
 ///
 /// The blur is that of lens and pixel together, as the sigma of the Gaussian with the same MTF50.
 /// It is 0 if unknown. It is accurate to 3 % from 0.5 to 2 px, also for the disc of a defocused
@@ -117,7 +117,7 @@ struct BoardDetection {
 /// indices ascend and are the same in every view.
 std::vector<PointDetection> collect_corners(const BoardDetection& seen);
 
-/// Converts an image to grey levels of 8 bits. 16-bit images are scaled so that their brightest
+/// Converts an image to gray levels of 8 bits. 16-bit images are scaled so that their brightest
 /// pixel has level 255.
 cv::Mat1b convert_to_8_bits(const cv::Mat& image);
 
@@ -150,7 +150,7 @@ class BoardDetector {
 
  private:
   /// Returns the tag with refined corners; std::nullopt if they cannot be measured.
-  std::optional<TagDetection> exact(const TagDetection& tag, const GreyLevels& image) const;
+  std::optional<TagDetection> exact(const TagDetection& tag, const GrayLevels& image) const;
 
   BoardDetection detect_squares(const cv::Mat1b& levels) const;
 

@@ -15,7 +15,7 @@ namespace {
 
 struct CrossingPixel {
   Eigen::Vector2d offset;
-  double grey;
+  double gray;
 };
 
 /// Residuals and Jacobian for ceres::TinySolver. Parameters: corner relative to the guess (2),
@@ -37,14 +37,14 @@ struct Crossing {
     const Blur blur(p[4]);
     const auto rows = static_cast<Eigen::Index>(pixels.size());
     for (Eigen::Index i = 0; i < rows; ++i) {
-      const auto& [offset, grey] = pixels[static_cast<std::size_t>(i)];
+      const auto& [offset, gray] = pixels[static_cast<std::size_t>(i)];
       const Eigen::Vector2d at = offset - corner;
       const double u1 = along1.dot(at), u2 = along2.dot(at);
       const double v1 = normal1.dot(at), v2 = normal2.dot(at);
       const BlurredStep step1(v1 - p[9] * u1 * u1, blur), step2(v2 - p[10] * u2 * u2, blur);
       const double lit = 1 + light.dot(at), pattern = step1.value * step2.value;
       const double unlit = p[5] + p[6] * pattern;
-      residuals[i] = unlit * lit - grey;
+      residuals[i] = unlit * lit - gray;
       if (jacobian == nullptr) continue;
       const double by_one = lit * p[6] * step1.slope * step2.value;
       const double by_two = lit * p[6] * step1.value * step2.slope;
@@ -85,13 +85,13 @@ void initialize_levels(const std::vector<CrossingPixel>& pixels, Crossing::Param
   p[5] = 0;
   p[6] = 1;
   const Crossing crossing{pixels};
-  Eigen::VectorXd pattern(crossing.NumResiduals()), grey(crossing.NumResiduals());
+  Eigen::VectorXd pattern(crossing.NumResiduals()), gray(crossing.NumResiduals());
   crossing(p.data(), pattern.data(), nullptr);
-  for (Eigen::Index i = 0; i < grey.size(); ++i) grey[i] = pixels[static_cast<std::size_t>(i)].grey;
-  pattern += grey;  // from the residuals
+  for (Eigen::Index i = 0; i < gray.size(); ++i) gray[i] = pixels[static_cast<std::size_t>(i)].gray;
+  pattern += gray;  // from the residuals
   const Eigen::VectorXd swing = pattern.array() - pattern.mean();
-  p[6] = swing.dot(grey) / std::max(swing.squaredNorm(), 1e-9);
-  p[5] = grey.mean() - p[6] * pattern.mean();
+  p[6] = swing.dot(gray) / std::max(swing.squaredNorm(), 1e-9);
+  p[5] = gray.mean() - p[6] * pattern.mean();
 }
 
 }  // namespace
@@ -103,7 +103,7 @@ std::optional<Eigen::Vector2d> fit_edge_crossing(const cv::Mat1b& image,
   constexpr std::size_t min_pixels = 16;
   constexpr int max_iterations = 15;
   constexpr double initial_blur_px = 0.8, min_blur_px = 0.05, max_displacement_px = 1.5;
-  constexpr double function_tolerance = 1e-3;  // grey levels squared
+  constexpr double function_tolerance = 1e-3;  // gray levels squared
   constexpr double min_contrast = 3, max_relative_rms = 0.35;
   const auto pixels = collect_pixels(image, guess_px, radius_px);
   if (pixels.size() < min_pixels) return {};

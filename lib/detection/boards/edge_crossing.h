@@ -10,7 +10,7 @@
 namespace vlp {
 
 /// Fits the intersection of the two edges at a corner where two black squares touch, by nonlinear
-/// least squares of the grey levels.
+/// least squares of the gray levels.
 ///
 /// @param guess_px   approximate position of the corner
 /// @param along      approximate directions of the edges, of any length
@@ -19,7 +19,7 @@ namespace vlp {
 /// or
 ///                   if the corner is more than 1.5 px from the guess
 ///
-///   grey = (middle + contrast step(d1) step(d2)) (1 + light . (x - corner))
+///   gray = (middle + contrast step(d1) step(d2)) (1 + light . (x - corner))
 ///   d1, d2  distances from two parabolas through the corner, because the lens bends the edges
 ///   step    blurred step, with the same blur for both edges
 ///   light   gradient of the illumination (vignetting), which would bias a fit without it

@@ -18,7 +18,7 @@ namespace {
 
 constexpr double kWhite = 255;
 
-/// Grey level of a light after a tone curve, and its derivative with respect to the light.
+/// Gray level of a light after a tone curve, and its derivative with respect to the light.
 struct EncodedLevel {
   EncodedLevel(double light, double gamma) : level(light), slope(1) {
     if (gamma == 1) return;

@@ -50,7 +50,7 @@ Eigen::Vector2d find_intersection(const EdgeCurve& a, const EdgeCurve& b, Eigen:
 struct EdgePrior {
   /// Tone curve, level = 255 (light / 255)^(1 / gamma).
   double gamma = 1;
-  /// Prior of the blur and of the light on the brighter side. Each adds a residual in grey levels:
+  /// Prior of the blur and of the light on the brighter side. Each adds a residual in gray levels:
   /// blur_weight (blur - blur_px) and bright_weight (bright - bright_light). Weight 0: no prior.
   double blur_px = 0, blur_weight = 0;
   double bright_light = 0, bright_weight = 0;
@@ -58,26 +58,26 @@ struct EdgePrior {
 
 /// Result of fit_edge().
 struct EdgeFit {
-  /// Sum of the squared residuals, in grey levels squared.
+  /// Sum of the squared residuals, in gray levels squared.
   double squares;
   std::size_t pixels;
   /// True if the brighter side is saturated.
   bool is_saturated;
-  /// Light on the brighter and on the darker side in the middle of the edge, in grey levels without
+  /// Light on the brighter and on the darker side in the middle of the edge, in gray levels without
   /// tone curve.
   double bright_light, dark_light;
   /// Variance of the position of the ends across the edge (mean of both), in px^2. It applies to a
-  /// noise of one grey level and a known curvature.
+  /// noise of one gray level and a known curvature.
   double end_variance = 0;
   /// Sigma of the Gaussian with the MTF50 of the step, in px. The line spread may be flatter or
   /// more peaked than a Gaussian.
   double equivalent_blur_px = 0;
-  /// Variances of the blur and of bright_light for a noise of one grey level. They are not computed
+  /// Variances of the blur and of bright_light for a noise of one gray level. They are not computed
   /// (0) for gamma 1 without saturation, where both are well determined.
   double blur_variance = 0, bright_variance = 0;
 };
 
-/// Fits an edge to pixels by nonlinear least squares of their grey levels, with the tone curve and
+/// Fits an edge to pixels by nonlinear least squares of their gray levels, with the tone curve and
 /// the priors of `prior`.
 ///
 /// @param edge  initial curve and blur; overwritten by the fit

@@ -9,14 +9,14 @@
 namespace vlp {
 
 /// Image and its smoothed copy, which find_saddle_point() uses.
-struct GreyLevels {
+struct GrayLevels {
   cv::Mat1b sharp;
   cv::Mat1f smoothed;
 };
 
-/// Finds the saddle point of the grey levels at a corner where two black squares touch.
+/// Finds the saddle point of the gray levels at a corner where two black squares touch.
 ///
-/// @param smoothed   grey levels, smoothed by about 1 px, because pixel noise and the sharp edges
+/// @param smoothed   gray levels, smoothed by about 1 px, because pixel noise and the sharp edges
 /// of
 ///                   the squares would disturb the fit
 /// @param guess_px   approximate position of the corner

@@ -56,7 +56,7 @@ SquareCorners::SquareCorners(const Board& board)
       layout_(compute_board_layout(board)) {}
 
 std::vector<PointDetection> SquareCorners::refine(const std::vector<Guess>& guesses,
-                                                  const GreyLevels& image) const {
+                                                  const GrayLevels& image) const {
   constexpr int min_px = 2, max_px = 5;
   constexpr double min_fit_px = 2.5, max_fit_px = 8, fit_fraction = 0.75;
   constexpr double edge_px = 2;  // a corner nearer to the image's edge is cut short
@@ -80,7 +80,7 @@ std::vector<PointDetection> SquareCorners::refine(const std::vector<Guess>& gues
   return points;
 }
 
-std::vector<PointDetection> SquareCorners::detect_chessboard(const GreyLevels& image) const {
+std::vector<PointDetection> SquareCorners::detect_chessboard(const GrayLevels& image) const {
   std::vector<cv::Point2f> found;
   const cv::Mat searched = reduce_image(image.sharp, choose_reduction(image.sharp));
   seed_random_generator();
@@ -117,7 +117,7 @@ std::vector<PointDetection> SquareCorners::detect_chessboard(const GreyLevels& i
 }
 
 std::vector<PointDetection> SquareCorners::detect_beside(const std::vector<TagDetection>& markers,
-                                                         const GreyLevels& image) const {
+                                                         const GrayLevels& image) const {
   constexpr std::size_t max_markers = 4;
   constexpr double adjacent = 0.8, near = 2.2;  // in squares
   constexpr double max_marker_error =

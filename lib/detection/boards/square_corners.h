@@ -23,11 +23,11 @@ class SquareCorners {
   /// Detects the corners of a chessboard by OpenCV's findChessboardCornersSB(). Returns all
   /// corners, or none if the board is not completely in view. The two ends of the board cannot be
   /// distinguished (order_lattice()).
-  std::vector<PointDetection> detect_chessboard(const GreyLevels& image) const;
+  std::vector<PointDetection> detect_chessboard(const GrayLevels& image) const;
 
   /// Detects the corners next to markers whose own corners are accurate to 1 to 2 px.
   std::vector<PointDetection> detect_beside(const std::vector<TagDetection>& markers,
-                                            const GreyLevels& image) const;
+                                            const GrayLevels& image) const;
 
  private:
   /// Prediction of a corner: its pixel, the next corners along the row and the column, and a
@@ -39,7 +39,7 @@ class SquareCorners {
     double free_px;
   };
   std::vector<PointDetection> refine(const std::vector<Guess>& guesses,
-                                     const GreyLevels& image) const;
+                                     const GrayLevels& image) const;
 
   int cols_, rows_;
   double square_size_m_, margin_m_;

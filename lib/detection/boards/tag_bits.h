@@ -14,7 +14,7 @@ namespace vlp {
 /// sampled at their centers. A bit is white above the mean of the brightest and the darkest sample.
 /// Up to two bits may differ. Returns false if a bit lies outside the image.
 ///
-/// @param levels       grey levels of the image
+/// @param levels       gray levels of the image
 /// @param border_bits  width of the printed border, in bits
 bool matches_tag_bits(const TagDetection& tag, const cv::Mat1f& levels,
                       const apriltag_family_t& family, int border_bits);

@@ -349,7 +349,7 @@ class EdgeModels {
   EdgePrior prior_with_light(const EdgeCurve& edge, double gamma) const;
 
  private:
-  /// Standard deviation of a grey level.
+  /// Standard deviation of a gray level.
   double noise_ = 0;
   std::optional<EdgeField> blur_, light_;
 };

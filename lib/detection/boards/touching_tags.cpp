@@ -34,7 +34,7 @@ TouchingTags::TouchingTags(const Board& board)
   free_fraction_ = std::min(board.tag_spacing, border_bits_ / width);
 }
 
-std::optional<TagDetection> TouchingTags::exact(TagDetection tag, const GreyLevels& image) const {
+std::optional<TagDetection> TouchingTags::exact(TagDetection tag, const GrayLevels& image) const {
   constexpr int min_px = 2, max_px = 5;
   constexpr double min_fit_px = 2.5, max_fit_px = 8, fit_fraction = 0.75;
   const double free_px = shortest_edge_px(tag) * free_fraction_;
@@ -90,7 +90,7 @@ std::optional<TagDetection> TouchingTags::predict(const BoardTag& missing,
 }
 
 std::vector<TagDetection> TouchingTags::find_missing(const std::vector<TagDetection>& tags,
-                                                     const GreyLevels& image) const {
+                                                     const GrayLevels& image) const {
   std::vector<TagDetection> all = tags;
   for (bool more = true; more;) {
     more = false;

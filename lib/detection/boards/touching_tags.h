@@ -22,12 +22,12 @@ class TouchingTags {
   /// Returns the tag with refined corners: the intersections of the edges next to the saddle points
   /// at its corners, or the saddle points. Returns std::nullopt if a saddle point is not found, or
   /// if the bits between the corners are not those of the tag.
-  std::optional<TagDetection> exact(TagDetection tag, const GreyLevels& image) const;
+  std::optional<TagDetection> exact(TagDetection tag, const GrayLevels& image) const;
 
   /// Finds tags of the board that are missing in `tags`, which are refined. Predicts their position
   /// by a homography of the nearest tags. Returns those that exact() accepts.
   std::vector<TagDetection> find_missing(const std::vector<TagDetection>& tags,
-                                         const GreyLevels& image) const;
+                                         const GrayLevels& image) const;
 
  private:
   std::optional<TagDetection> predict(const BoardTag& missing,

@@ -112,7 +112,7 @@ Background background(const Histogram& sample) {
   double noise = std::sqrt(squares / std::max(1, half));
   const bool no_noise_below = clipped(sample, median, step);
   if (no_noise_below) noise = std::max(noise, noise_above(sample, median));
-  // Grey levels are coarse: mean and scatter of the surrounding levels are more precise.
+  // Gray levels are coarse: mean and scatter of the surrounding levels are more precise.
   constexpr double around = 3;
   const double min_noise = 0.3 * step;
   double near = 0, sum = 0, sum_of_squares = 0;

@@ -8,7 +8,7 @@ namespace vlp {
 
 /// Dark level and noise of an image of lamps, estimated from a sample of its pixels.
 struct Background {
-  /// Mean and standard deviation of the pixels around the median, in grey levels. If the dark level
+  /// Mean and standard deviation of the pixels around the median, in gray levels. If the dark level
   /// is clipped, at black or above, the standard deviation is derived from the pixels brighter than
   /// the median.
   double level;

@@ -10,7 +10,7 @@
 
 namespace vlp {
 
-/// Non-owning view of a grey image. The memory has to stay valid as long as the view is used.
+/// Non-owning view of a gray image. The memory has to stay valid as long as the view is used.
 struct ImageView {
   /// First pixel of the first row. Pixels are std::uint8_t if `bits` is 8. If `bits` is 16, pixels
   /// are aligned std::uint16_t in native byte order.

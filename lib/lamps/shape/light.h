@@ -63,7 +63,7 @@ struct Light {
   /// Steady lights only: fraction of the pixels in the middle that have the level of the light's
   /// brightest pixel. 0 if this level is not full scale.
   double clipped;
-  /// Level of the brightest scanlines above the dark level, in grey levels.
+  /// Level of the brightest scanlines above the dark level, in gray levels.
   double peak;
   /// True if the light was found by its modulation, which then also determined its stripes.
   bool by_modulation;

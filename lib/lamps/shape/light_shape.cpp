@@ -68,7 +68,7 @@ double compute_axis_ratio(const Matrix2& rim_from_circle) {
 double estimate_correlated_points(const std::vector<Eigen::Vector2d>& points,
                                   const std::vector<EdgePoint>& outline,
                                   const std::vector<bool>& counted, const RobustEllipse& fit) {
-  constexpr double neighbours_px = 4, unknowns = 3;
+  constexpr double neighbors_px = 4, unknowns = 3;
   const Matrix2 circle_from_rim = fit.rim_from_circle.inverse();
   std::vector<double> errors(points.size(), 0);
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -78,7 +78,7 @@ double estimate_correlated_points(const std::vector<Eigen::Vector2d>& points,
   for (std::size_t i = 0; i < points.size(); ++i) {
     squares += errors[i] * errors[i];
     for (std::size_t j = 0; j < i && counted[i]; ++j) {
-      if (!counted[j] || (outline[i].pixel - outline[j].pixel).norm() >= neighbours_px) continue;
+      if (!counted[j] || (outline[i].pixel - outline[j].pixel).norm() >= neighbors_px) continue;
       products += 2 * errors[i] * errors[j];
       pairs += 2;
     }

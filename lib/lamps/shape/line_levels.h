@@ -29,7 +29,7 @@ class LineLevels {
   LineLevels(const ImageView& lines, const std::vector<PixelRun>& chords,
              const Background& background);
 
-  /// Returns the brightest level above the dark level, in grey levels.
+  /// Returns the brightest level above the dark level, in gray levels.
   double brightest() const { return brightest_; }
   std::optional<LineLevel> at(int line) const;
   /// Returns the period of the stripes; 0 for steady light.

@@ -206,7 +206,7 @@ std::optional<Step> fit_step(const Piece& piece, double dark, const StepImageMod
   constexpr int num_iterations = 12;
   constexpr double clear_px = 2, farthest_px = 3;
   // Prior standard deviations of the slopes, of the change along the rim and of the log blur,
-  // weighted relative to the noise in grey levels.
+  // weighted relative to the noise in gray levels.
   constexpr double noise = 1.5, slope_sd = 0.3, along_sd = 0.05, log_blur_sd = 0.4;
   if (piece.samples.size() < min_samples) return std::nullopt;
   std::array<double, 2> sums{}, counts{};

@@ -26,17 +26,16 @@ struct Confusion {
 
 /// Computes the confusion matrix for lights that the classifier was not trained on. Their lamps may
 /// differ from those of the classifier.
-Confusion compute_confusion(const LampClassifier& classifier,
-                            std::span<const LabelledLight> lights);
+Confusion compute_confusion(const LampClassifier& classifier, std::span<const LabeledLight> lights);
 
 /// Number of folds of the cross-validation.
 inline constexpr int kFolds = 5;
 
-using TrainClassifier = std::function<LampClassifier(std::span<const LabelledLight>)>;
+using TrainClassifier = std::function<LampClassifier(std::span<const LabeledLight>)>;
 
 /// Computes the confusion matrix by cross-validation. `train` makes a classifier of all images but
 /// every fifth one; this classifier is applied to the lights of the held-out images. The folds are
 /// deterministic. `lights` as for train_classifier().
-Confusion cross_validate(std::span<const LabelledLight> lights, const TrainClassifier& train);
+Confusion cross_validate(std::span<const LabeledLight> lights, const TrainClassifier& train);
 
 }  // namespace vlp

@@ -28,13 +28,13 @@ LampFeatures standardized(const LampClassifier& classifier, const LampFeatures& 
   return (features - classifier.mean).cwiseQuotient(classifier.scale);
 }
 
-void standardize(std::span<const LabelledLight> lights, LampClassifier& classifier) {
+void standardize(std::span<const LabeledLight> lights, LampClassifier& classifier) {
   classifier.mean.setZero();
   classifier.scale.setZero();
   const auto n = static_cast<double>(lights.size());
-  for (const LabelledLight& light : lights)
+  for (const LabeledLight& light : lights)
     classifier.mean += compute_lamp_features(light.stripes) / n;
-  for (const LabelledLight& light : lights) {
+  for (const LabeledLight& light : lights) {
     classifier.scale += (compute_lamp_features(light.stripes) - classifier.mean).cwiseAbs2() / n;
   }
   constexpr double minimum = 1e-6;  // for a constant feature
@@ -42,7 +42,7 @@ void standardize(std::span<const LabelledLight> lights, LampClassifier& classifi
 }
 
 /// Fits centers and covariance to the lights that are `used`.
-void fit(std::span<const LabelledLight> lights, const std::vector<bool>& used,
+void fit(std::span<const LabeledLight> lights, const std::vector<bool>& used,
          LampClassifier& classifier) {
   std::map<int, LampClassifier::Class> lamps;
   for (std::size_t i = 0; i < lights.size(); ++i) {
@@ -75,7 +75,7 @@ void fit(std::span<const LabelledLight> lights, const std::vector<bool>& used,
 
 }  // namespace
 
-LampClassifier train_classifier(std::span<const LabelledLight> lights) {
+LampClassifier train_classifier(std::span<const LabeledLight> lights) {
   LampClassifier classifier;
   standardize(lights, classifier);
   std::vector<bool> used(lights.size(), true);

@@ -13,7 +13,7 @@
 namespace vlp {
 
 /// Light with the id of its lamp.
-struct LabelledLight {
+struct LabeledLight {
   int lamp;
   Stripes stripes;
   /// Index of the light's image.
@@ -54,7 +54,7 @@ inline constexpr int kMinExamples = 6;
 /// Excludes lights that are far from the others of their lamp, such as partly hidden ones. Shrinks
 /// C towards its diagonal with the weight of ten lights, and allows for a drift of the lamps by
 /// kLampDrift.
-LampClassifier train_classifier(std::span<const LabelledLight> lights);
+LampClassifier train_classifier(std::span<const LabeledLight> lights);
 
 /// Returns the id of the lamp with these stripes. @pre The stripes have a period.
 ///

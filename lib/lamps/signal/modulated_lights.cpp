@@ -356,7 +356,7 @@ struct BoxSearch {
 std::optional<BoxSearch> search_box(const ImageView& lines, const PixelBox& box,
                                     const Background& background,
                                     std::span<const double> lamp_periods_lines) {
-  // Noise of at least one grey level is assumed.
+  // Noise of at least one gray level is assumed.
   constexpr double min_noise = 1;
   const auto periods = choose_periods(lamp_periods_lines, box.height);
   if (periods.empty()) return std::nullopt;

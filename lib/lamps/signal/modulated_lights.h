@@ -36,7 +36,7 @@ struct ModulatedLight {
   /// Phase coherence |sum z| / sum |z| over the cells of its brightest part, see
   /// find_modulated_lights().
   double phase_coherence;
-  /// Level of its brightest scanlines above the dark level, in grey levels. The fundamental of a
+  /// Level of its brightest scanlines above the dark level, in gray levels. The fundamental of a
   /// square wave between 0 and this level has the amplitude (2 / pi) sin(pi duty) times the level.
   double peak;
   /// Sum of the amplitudes of its cells.

@@ -131,7 +131,7 @@ class Watershed {
   /// Adds the next cell; cells have to be added in descending order of amplitude.
   void add(int cell) {
     const float amplitude = map_.amplitude[std::size_t(cell)];
-    const auto [basin, beside_border] = join_neighbours(cell, amplitude);
+    const auto [basin, beside_border] = join_neighbors(cell, amplitude);
     int& label = labels_[std::size_t(cell)];
     if (basin >= 0) {
       label = amplitude >= kBorderFraction * peak(basin) ? basin : kBorder;
@@ -162,7 +162,7 @@ class Watershed {
 
   /// Returns the basin of a cell's neighbors, merged with others if the saddle is high, and whether
   /// one of the neighbors is a border.
-  std::pair<int, bool> join_neighbours(int cell, float amplitude) {
+  std::pair<int, bool> join_neighbors(int cell, float amplitude) {
     const int x = cell % map_.cells, y = cell / map_.cells;
     int basin = kNone;
     bool beside_border = false;

@@ -19,7 +19,7 @@ inline constexpr int kCellWidth_px = 8;
 struct CellLevels {
   PixelBox box;  ///< part of the image; cells begin at its corner
   int cells, bins, lines_per_bin;
-  /// Mean level of each cell above the dark level, in grey levels, by bin and cell.
+  /// Mean level of each cell above the dark level, in gray levels, by bin and cell.
   std::vector<float> levels;
 
   const float* row(int bin) const { return levels.data() + std::ptrdiff_t(bin) * cells; }
@@ -33,7 +33,7 @@ CellLevels average_cells(const ImageView& lines, const PixelBox& box, double dar
 struct ModulationMap {
   PixelBox box;
   int cells, steps, lines_per_step;
-  /// Largest amplitude over all periods, and the mean level around it, in grey levels, by step and
+  /// Largest amplitude over all periods, and the mean level around it, in gray levels, by step and
   /// cell.
   std::vector<float> amplitude, mean;
 
@@ -55,7 +55,7 @@ struct ModulationMap {
 ModulationMap map_modulation(const CellLevels& cells, std::span<const double> periods_lines);
 
 /// Returns the amplitude that noise of the dark level exceeds with the probability 1e-9 in one
-/// cell, at one period, in grey levels. The squared amplitude of white noise with the standard
+/// cell, at one period, in gray levels. The squared amplitude of white noise with the standard
 /// deviation `noise` per pixel is exponentially distributed. Its mean is 4 noise^2 sum w^2 /
 /// kCellWidth_px, with sum w^2 = 2 / (3 P).
 double min_significant_amplitude(double noise, double period_lines);
@@ -70,7 +70,7 @@ struct ModulatedRegion {
     int step, begin, end;
   };
   PixelBox box;
-  double peak;  ///< largest amplitude, in grey levels
+  double peak;  ///< largest amplitude, in gray levels
   std::vector<Span> spans;
   int cells;
 };

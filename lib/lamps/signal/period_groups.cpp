@@ -53,14 +53,14 @@ std::vector<std::size_t> remove_densest_group(std::span<const MeasuredPeriod> li
 }  // namespace
 
 std::vector<PeriodGroup> group_periods(std::span<const MeasuredPeriod> lights) {
-  std::map<int, std::vector<std::size_t>> labelled;
+  std::map<int, std::vector<std::size_t>> labeled;
   std::vector<std::size_t> others;
   for (std::size_t i = 0; i < lights.size(); ++i) {
-    (lights[i].lamp ? labelled[*lights[i].lamp] : others).push_back(i);
+    (lights[i].lamp ? labeled[*lights[i].lamp] : others).push_back(i);
   }
   std::vector<PeriodGroup> groups;
-  groups.reserve(labelled.size());
-  for (auto& [lamp, members] : labelled) {
+  groups.reserve(labeled.size());
+  for (auto& [lamp, members] : labeled) {
     groups.push_back(make_group(lights, std::move(members), lamp));
   }
   std::sort(others.begin(), others.end(), [&](std::size_t a, std::size_t b) {

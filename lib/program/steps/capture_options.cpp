@@ -108,7 +108,7 @@ void add_detect_options(CLI::App& app, CaptureOptions& options) {
   app.add_option("--classifier", options.frontend.classifier,
                  "Lamp classifier by vlp-train, instead of the map's frequencies");
   app.add_option("--annotate", options.frontend.annotate,
-                 "Folder for pictures of the lights found, with outlines, centres and lamps");
+                 "Folder for pictures of the lights found, with outlines, centers and lamps");
   add_readout_option(app, options.frontend.readout);
   app.add_option("--exposure-s", options.frontend.exposure_s,
                  "Exposure of the images, for the check of the lamp map (default: short)")

@@ -12,7 +12,7 @@ namespace vlp {
 namespace {
 
 void print_circle(const char* name, const Circle& circle) {
-  fmt::print("{:12}radius {:.3f} mm, centre {:.3f} {:.3f} mm from the station\n", name,
+  fmt::print("{:12}radius {:.3f} mm, center {:.3f} {:.3f} mm from the station\n", name,
              1e3 * circle.radius, 1e3 * circle.center.x(), 1e3 * circle.center.y());
 }
 

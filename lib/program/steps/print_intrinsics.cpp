@@ -33,7 +33,7 @@ void print_summary(const IntrinsicsSolution& solution, const CalibrationReport& 
     fmt::print(", sd {:.2f} by noise, {:.2f} by views\n", report.focal_sd_px,
                report.focal_sd_by_views_px);
   }
-  fmt::print("centre        {:.2f}, {:.2f} px\n", parameters[2], parameters[3]);
+  fmt::print("center        {:.2f}, {:.2f} px\n", parameters[2], parameters[3]);
   fmt::print("uncertainty   {:.3f} px mean, {:.3f} px worst\n", report.uncertainty_mean_px,
              report.uncertainty_worst_px);
   if (report.region_fraction > 0.999) {

@@ -50,7 +50,7 @@ void print_residuals(const RotationFit& fit, const RotationCaptures& spot) {
 }  // namespace
 
 void print_center(const RotationCenter& center, const Camera& camera) {
-  fmt::print("centre      {:.3f} {:.3f} px in the undistorted image{}\n", center.center_px.x(),
+  fmt::print("center      {:.3f} {:.3f} px in the undistorted image{}\n", center.center_px.x(),
              center.center_px.y(), format_sd(center.covariance, 1, "px"));
   const Eigen::Vector3d& up = center.zenith_in_camera;
   fmt::print("zenith      {:.6f} {:.6f} {:.6f} in the camera\n", up.x(), up.y(), up.z());
@@ -75,7 +75,7 @@ void print_summary(const RotationFit& fit, const RotationCaptures& spot,
   if (circles.circles.empty()) {
     fmt::print("circles     none determined\n");
   } else {
-    fmt::print("circles     {}, their centres spread by {:.3f} px\n", circles.circles.size(),
+    fmt::print("circles     {}, their centers spread by {:.3f} px\n", circles.circles.size(),
                circles.spread_px);
   }
   print_residuals(fit, spot);

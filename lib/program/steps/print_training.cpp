@@ -7,12 +7,12 @@
 namespace vlp {
 namespace {
 
-void print_labelled(const LabelledLights& labelled, const LampClassifier& classifier) {
+void print_labeled(const LabeledLights& labeled, const LampClassifier& classifier) {
   int used = 0;
   for (const auto& lamp : classifier.lamps) used += lamp.examples;
-  const auto lights = static_cast<int>(labelled.lights.size());
+  const auto lights = static_cast<int>(labeled.lights.size());
   fmt::print("labels      {}\n  no light  {}\n  left out  {} unlike their lamp's others\n",
-             labelled.labels, labelled.without_light, lights - used);
+             labeled.labels, labeled.without_light, lights - used);
   fmt::print("trained on  {} lights of {} lamps\n", used, classifier.lamps.size());
 }
 
@@ -36,7 +36,7 @@ void print_confusion(const Confusion& confusion) {
 }  // namespace
 
 void print_training(const TrainStepResult& result) {
-  print_labelled(result.labelled, result.classifier);
+  print_labeled(result.labeled, result.classifier);
   print_confusion(result.confusion);
 }
 

@@ -65,15 +65,15 @@ void run_rotation_by_lamps(const CLI::App& app, CaptureOptions images, const Til
       options.motion.motion(), rad_from_deg(options.yaw_rate_sd_deg_per_s.value_or(0)));
   // A table without motion does not affect the result and is not recorded.
   if (input.motions.empty()) inputs.pop_back();
-  const LevellingResult result =
-      solve_levelling(input, !refined_map.empty(), make_program_history_entry(app, inputs));
+  const LevelingResult result =
+      solve_leveling(input, !refined_map.empty(), make_program_history_entry(app, inputs));
   print_remarks(result);
   throw_if_failed(result);
   if (!refined_map.empty()) {
-    write_refined_map(refined_map, result.levelling.map, images.frontend.room);
+    write_refined_map(refined_map, result.leveling.map, images.frontend.room);
   }
   write_calibration(images.output, result.calibration);
-  report(result.levelling, input.calibration.camera);
+  report(result.leveling, input.calibration.camera);
 }
 
 }  // namespace vlp

@@ -19,7 +19,7 @@ struct TiltOptions {
   std::optional<double> yaw_rate_sd_deg_per_s;
 };
 
-/// Estimates the tilt of the camera from captures taken anywhere (calibration/levelling), for
+/// Estimates the tilt of the camera from captures taken anywhere (calibration/leveling), for
 /// vlp-rotation --method lamps.
 void run_rotation_by_lamps(const CLI::App& app, CaptureOptions images, const TiltOptions& options);
 

@@ -16,9 +16,9 @@ namespace vlp {
 namespace {
 
 constexpr std::size_t kMaxColumns = 200;
-constexpr std::array<const char*, 5> kPartColors{plot_colors::grey, plot_colors::blue,
+constexpr std::array<const char*, 5> kPartColors{plot_colors::gray, plot_colors::blue,
                                                  plot_colors::green, plot_colors::purple,
-                                                 plot_colors::vermillion};
+                                                 plot_colors::vermilion};
 
 double compute_sum(const std::vector<double>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0);

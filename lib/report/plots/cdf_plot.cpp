@@ -13,7 +13,7 @@ namespace vlp {
 namespace {
 
 constexpr std::size_t kMaxSteps = 500;
-constexpr std::array<const char*, 4> kColors = {plot_colors::blue, plot_colors::vermillion,
+constexpr std::array<const char*, 4> kColors = {plot_colors::blue, plot_colors::vermilion,
                                                 plot_colors::green, plot_colors::purple};
 
 /// Returns rows of error in mm and cumulative fraction in percent.

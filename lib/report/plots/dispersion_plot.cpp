@@ -52,10 +52,10 @@ Drawing make_drawing(const DispersionPlot& plot) {
       "set offsets graph 0.05, graph 0.05, graph 0.05, graph 0.05\n"
       "plot " +
       layer("before", plot_colors::blue, "8", "2") + ", " +
-      layer("after", plot_colors::vermillion, "7", "1");
+      layer("after", plot_colors::vermilion, "7", "1");
   if (!plot.outliers_m.empty()) {
     commands += ", $outliers using 1:2 with points pointtype 4 linecolor rgb '" +
-                std::string(plot_colors::grey) + "' title 'left out'";
+                std::string(plot_colors::gray) + "' title 'left out'";
   }
   commands +=
       ", '+' using (0):(0) every ::0::0 with points pointtype 1 pointsize 2 linewidth 2 linecolor "

@@ -29,7 +29,7 @@ std::vector<double> compute_lengths_m(const ErrorPlot& plot) {
 std::vector<std::vector<std::string>> make_table(const ErrorPlot& plot) {
   constexpr std::size_t max_rows = 10;
   constexpr int place_digits = 3, error_digits = 2;
-  constexpr double millimetres = 1e3;
+  constexpr double millimeters = 1e3;
   std::vector<ErrorPlot::Fix> fixes = plot.fixes;
   const std::size_t count = std::min(max_rows, fixes.size());
   std::partial_sort(fixes.begin(), fixes.begin() + static_cast<std::ptrdiff_t>(count), fixes.end(),
@@ -42,7 +42,7 @@ std::vector<std::vector<std::string>> make_table(const ErrorPlot& plot) {
   }
   for (std::size_t i = 0; i < count; ++i) {
     const ErrorPlot::Fix& fix = fixes[i];
-    const Eigen::Vector2d error_mm = millimetres * (fix.fix_m - fix.truth_m);
+    const Eigen::Vector2d error_mm = millimeters * (fix.fix_m - fix.truth_m);
     table.push_back(
         {fix.image,
          fixed(fix.truth_m.x(), place_digits) + ", " + fixed(fix.truth_m.y(), place_digits),
@@ -137,19 +137,19 @@ std::string layers(const ErrorPlot& plot, const Blocks& blocks, const Scale& sca
         "'truth'");
   }
   if (cut > 0) {
-    layers.push_back("$cut" + arrow + "1.5 dashtype 2" + color(plot_colors::vermillion) +
-                     "title '" + std::to_string(cut) + " beyond " +
-                     format_mm_with_unit(scale.longest_m()) + ", cut short'");
+    layers.push_back("$cut" + arrow + "1.5 dashtype 2" + color(plot_colors::vermilion) + "title '" +
+                     std::to_string(cut) + " beyond " + format_mm_with_unit(scale.longest_m()) +
+                     ", cut short'");
   }
   if (!blocks.missing.empty()) {
     const std::size_t count = plot.missing_m.size(), step = thinning_step(count, kMaxMissing);
     layers.push_back(
-        "$missing using 1:2 with points pointtype 2 linewidth 2" + color(plot_colors::vermillion) +
+        "$missing using 1:2 with points pointtype 2 linewidth 2" + color(plot_colors::vermilion) +
         "title 'no fix: " + (step == 1 ? std::to_string(count) : thinning_note(count, step)) + "'");
   }
   if (!blocks.lamps.empty()) {
     layers.push_back("$lamps using 1:2 with points pointtype 6 pointsize 1.6 linewidth 2" +
-                     color(plot_colors::grey) +
+                     color(plot_colors::gray) +
                      "title 'lamps', $lamps using 1:2:(sprintf('%d', int($3))) with labels left "
                      "offset 1,0.7 notitle");
   }

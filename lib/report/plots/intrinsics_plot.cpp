@@ -54,7 +54,7 @@ std::string layers(const IntrinsicsPlot& plot, const std::string& corner_style,
   if (std::any_of(plot.corners.begin(), plot.corners.end(),
                   [](const auto& corner) { return corner.outlier; })) {
     layers +=
-        ", $outliers " + outlier_style + " linecolor rgb '" + plot_colors::vermillion + "' notitle";
+        ", $outliers " + outlier_style + " linecolor rgb '" + plot_colors::vermilion + "' notitle";
   }
   return layers + "\n";
 }

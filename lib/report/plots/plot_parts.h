@@ -11,10 +11,10 @@ namespace vlp {
 /// dashes.
 namespace plot_colors {
 constexpr const char* blue = "#0072b2";
-constexpr const char* vermillion = "#d55e00";
+constexpr const char* vermilion = "#d55e00";
 constexpr const char* green = "#009e73";
 constexpr const char* purple = "#cc79a7";
-constexpr const char* grey = "#666666";
+constexpr const char* gray = "#666666";
 }  // namespace plot_colors
 
 /// Returns `text` as a gnuplot string without interpretation of its content; line breaks are kept.

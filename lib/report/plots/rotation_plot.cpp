@@ -24,7 +24,7 @@ std::string format_square_range(const Eigen::AlignedBox2d& box) {
 
 Drawing make_drawing(const RotationPlot& plot) {
   std::string places, ellipses, labels;
-  std::set<int> labelled;
+  std::set<int> labeled;
   Eigen::AlignedBox2d image, centers(plot.rotation_center_px);
   centers.extend(plot.principal_point_px);
   for (const auto& [lamp, places_px, center_px, radii_px] : plot.traces) {
@@ -32,7 +32,7 @@ Drawing make_drawing(const RotationPlot& plot) {
     ellipses +=
         data_row({center_px.x(), center_px.y(), 2 * radii_px.x(), 2 * radii_px.y(), double(lamp)});
     // One label per lamp, although it has an ellipse at each height.
-    if (labelled.insert(lamp).second) {
+    if (labeled.insert(lamp).second) {
       labels += data_row({center_px.x(), center_px.y(), double(lamp)});
     }
     image.extend(center_px - radii_px).extend(center_px + radii_px);
@@ -43,7 +43,7 @@ Drawing make_drawing(const RotationPlot& plot) {
       "$principal using 1:2 with points pointtype 1 pointsize 2 linewidth 2 linecolor rgb "
       "'#0072b2' title 'principal point', "
       "$axis using 1:2 with points pointtype 2 pointsize 2 linewidth 2 linecolor rgb '#d55e00' "
-      "title 'rotation centre'\n";
+      "title 'rotation center'\n";
   const std::string commands =
       data_block("places", places) + data_block("ellipses", ellipses) +
       data_block("labels", labels) + data_block("axis", data_row({axis.x(), axis.y()})) +
@@ -60,7 +60,7 @@ Drawing make_drawing(const RotationPlot& plot) {
       format_square_range(image.extend(centers)) +
       "plot $ellipses using 1:2:3:4 with ellipses linecolor rgb '#999999' notitle, "
       "$places using 1:2:3 with points pointtype 7 pointsize 0.6 linecolor palette notitle, " +
-      marks + "set title 'centres of the ellipses'\n" + format_square_range(centers) +
+      marks + "set title 'centers of the ellipses'\n" + format_square_range(centers) +
       "plot $ellipses using 1:2:5 with points pointtype 6 pointsize 1.2 linewidth 2 linecolor "
       "palette notitle, "
       "$labels using 1:2:(sprintf('%d', int($3))) with labels left offset 0.8,0 notitle, " +

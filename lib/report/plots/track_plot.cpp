@@ -41,7 +41,7 @@ std::string layers(const std::string& columns) {
   return "plot $commanded using " + columns + " with lines linewidth 2 linecolor rgb 'black' " +
          "title 'commanded', $fixes using " + columns + " with points pointtype 7 pointsize 0.35" +
          color(plot_colors::blue) + "title 'fixes', $fitted using " + columns +
-         " with lines linewidth 2 dashtype 2" + color(plot_colors::vermillion) +
+         " with lines linewidth 2 dashtype 2" + color(plot_colors::vermilion) +
          "title 'fitted line'\n";
 }
 

@@ -63,7 +63,7 @@ std::string subject_part(const RunRecord& record, const Calibration& calibration
                       {"begun (UTC)", record.begun_utc},
                       {"ended (UTC)", record.ended_utc},
                       {"procedure",
-                       "lens by views of a board; rotation centre and tilt by a turn; "
+                       "lens by views of a board; rotation center and tilt by a turn; "
                        "dispersion at one place; check at known points"},
                       {"program", record.program},
                       {"libraries", record.libraries},
@@ -183,7 +183,7 @@ std::string make_blank_part() {
 }  // namespace
 
 std::vector<CertifiedValue> collect_certified_values(const Calibration& calibration) {
-  constexpr double millimetres = 1e3, degrees = 180 / std::numbers::pi;
+  constexpr double millimeters = 1e3, degrees = 180 / std::numbers::pi;
   const std::vector<double>& k = calibration.camera.intrinsics;
   const auto& lens = calibration.intrinsics_report;
   const std::optional<MatrixX> lens_covariance = lens ? lens->covariance : std::nullopt;
@@ -191,13 +191,13 @@ std::vector<CertifiedValue> collect_certified_values(const Calibration& calibrat
   add_pair(values, "focal length", "px", {k[0], k[1]}, lens_covariance);
   add_pair(values, "principal point", "px", {k[2], k[3]}, lens_covariance, 1, 2);
   if (const auto& center = calibration.rotation_center) {
-    add_pair(values, "rotation centre, undistorted image", "px", center->center_px,
+    add_pair(values, "rotation center, undistorted image", "px", center->center_px,
              center->covariance);
     add_pair(values, "zenith from the optical axis, 180/pi times its normalized point", "deg",
              zenith_point(*center), compute_zenith_covariance(calibration), degrees);
     if (center->lever_arm_m) {
       add_pair(values, "lever arm", "mm", *center->lever_arm_m, center->lever_arm_covariance,
-               millimetres);
+               millimeters);
     }
   }
   if (const auto& dispersion = calibration.dispersion) {

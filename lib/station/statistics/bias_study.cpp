@@ -138,9 +138,9 @@ void draw_bias(const std::filesystem::path& picture, const std::string& title,
     commands += data_block("line", line);
     plotted = ", $line using 1:2 with lines" + colored(plot_colors::green) +
               "' title 'line', $line using 1:3 with lines dashtype 2" +
-              colored(plot_colors::vermillion) +
+              colored(plot_colors::vermilion) +
               "' title '95 % band', $line using 1:4 with lines dashtype 2" +
-              colored(plot_colors::vermillion) + "' notitle";
+              colored(plot_colors::vermilion) + "' notitle";
   }
   commands += "plot 0 with lines dashtype 3" + colored(plot_colors::purple) +
               "' title 'no bias', $data using 1:2 with points pointtype 6" +

@@ -178,7 +178,7 @@ void draw_trend(const std::filesystem::path& picture, const std::string& title,
   const auto horizontal_line = [](double value, const std::string& line_style) {
     return significant(value, 9) + " with lines " + line_style;
   };
-  const std::string limits = std::string("dashtype 2 linecolor rgb '") + plot_colors::vermillion;
+  const std::string limits = std::string("dashtype 2 linecolor rgb '") + plot_colors::vermilion;
   std::string commands = data_block("data", data) + plot_settings();
   if (!alarm_points.empty()) commands += data_block("marked", alarm_points);
   commands += "set xlabel 'runs, in the order of their end'\nset ylabel " + gnuplot_quoted(title) +
@@ -199,7 +199,7 @@ void draw_trend(const std::filesystem::path& picture, const std::string& title,
     commands += std::string(
                     ", $marked using 1:2 with points pointtype 4 pointsize 2 linewidth 2 "
                     "linecolor rgb '") +
-                plot_colors::vermillion + "' title 'alarms'";
+                plot_colors::vermilion + "' title 'alarms'";
   }
   draw(picture, {"trend", 1000, 480, commands + "\n"});
 }

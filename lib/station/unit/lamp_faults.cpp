@@ -130,8 +130,8 @@ std::optional<CommonOffset> find_common_offset(std::span<const Frame> frames, co
 }
 
 std::string describe(const CommonOffset& offset) {
-  constexpr double millimetres = 1e3;
-  const Eigen::Vector2d offset_mm = millimetres * offset.offset_m;
+  constexpr double millimeters = 1e3;
+  const Eigen::Vector2d offset_mm = millimeters * offset.offset_m;
   return fmt::format(
       "all {} captures of the check are off by {:.1f} mm in one direction of the {} (x {:+.1f} mm, "
       "y {:+.1f} mm): {}",

@@ -101,7 +101,7 @@ std::string describe_lens_fault(std::span<const Frame> frames, const LampMap& ma
   if (max_corner_displacement_px(calibration.camera, unconstrained.camera) < min_displacement_px)
     return "";
   const auto words = [](const Camera& camera) {
-    return fmt::format("a focal length of {:.1f} px and the centre ({:.1f}, {:.1f})",
+    return fmt::format("a focal length of {:.1f} px and the center ({:.1f}, {:.1f})",
                        std::sqrt(camera.focal_px().prod()), camera.center_px().x(),
                        camera.center_px().y());
   };

@@ -135,7 +135,7 @@ TEST_F(RenderedDriveCalibration, EstimatesTiltOfMovingCamera) {
   const Found unknown =
       level(driving, std::vector<KnownMotion>(kCaptures, KnownMotion::up_to(2, rad_from_deg(180))));
   const Found left_out = level(driving, {});
-  print("standing, levelled", of_standing);
+  print("standing, leveled", of_standing);
   print("1 m/s, odometry 1 %", with_odometry);
   print("1 m/s, unknown", unknown);
   print("1 m/s, left out", left_out);

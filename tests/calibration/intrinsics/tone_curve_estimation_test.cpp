@@ -21,7 +21,7 @@ namespace {
 
 constexpr double kCornerNoise_px = 0.02;
 
-/// Camera with a tone curve whose grey values indicate another one.
+/// Camera with a tone curve whose gray values indicate another one.
 struct CodedCamera {
   double gamma, levels_gamma;
   /// Relative difference of the edge shifts between tags.

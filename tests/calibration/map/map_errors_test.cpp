@@ -69,9 +69,9 @@ TEST_F(FindMapErrors, ReturnsOffsetOfOneLampForAnyTilt) {
     EXPECT_EQ(one[0].kind, MapErrorKind::moved);
     EXPECT_EQ(one[0].lamps, std::vector<int>{map.lamps[i].id});
     EXPECT_LT((one[0].offset_m - Eigen::Vector3d(0.03, -0.004, 0)).norm(), 1e-3);
-    const MapErrors levelled = find_map_errors(frames, map, rig.calibration);
-    EXPECT_EQ(describe(levelled.errors), found()) << "with the tilt in the calibration";
-    EXPECT_THAT(levelled.offsets, SizeIs(map.lamps.size()));
+    const MapErrors leveled = find_map_errors(frames, map, rig.calibration);
+    EXPECT_EQ(describe(leveled.errors), found()) << "with the tilt in the calibration";
+    EXPECT_THAT(leveled.offsets, SizeIs(map.lamps.size()));
   }
   EXPECT_THAT(found(),
               testing::StartsWith("lamp 8 hangs 30 mm from where the map has it (x +30 mm"));

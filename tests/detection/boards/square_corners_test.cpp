@@ -119,12 +119,12 @@ TEST(SquareCorners, RejectsCornersNextToMisreadMarker) {
   cv::Mat1f smoothed;
   image.convertTo(smoothed, CV_32F);
   cv::GaussianBlur(smoothed, smoothed, {}, 1);
-  const GreyLevels grey{image, smoothed};
+  const GrayLevels gray{image, smoothed};
   BoardDetection seen = BoardDetector(board).detect(image);
   ASSERT_EQ(seen.tags.size(), compute_board_layout(board).size());
   for (const double off_px : {30.0, 1e12}) {
     for (auto& corner_px : seen.tags[7].corners_px) corner_px.x() += off_px;
-    const auto points = SquareCorners(board).detect_beside(seen.tags, grey);
+    const auto points = SquareCorners(board).detect_beside(seen.tags, gray);
     EXPECT_GE(points.size(), 8U);
     EXPECT_LT(points.size(), seen.points.size());
     for (const PointDetection& point : points) {

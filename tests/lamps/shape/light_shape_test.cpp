@@ -58,7 +58,7 @@ TEST_F(LightShapeOfMovingDisc, CenterMatchesPositionAtReadoutOfCenterRow) {
     shape.apply_shear({oval, 1e-12 * Matrix2::Identity()}, motion, *light);
     shape.apply_shear({oval, 1e-12 * Matrix2::Identity()}, Vector2d::Zero(), unshifted);
     EXPECT_THAT(light->pixel, IsNear(center_px, 2e-3));
-    EXPECT_GT((unshifted.pixel - center_px).norm(), 8e-3) << "read sooner than its centre";
+    EXPECT_GT((unshifted.pixel - center_px).norm(), 8e-3) << "read sooner than its center";
   }
 }
 

@@ -82,7 +82,7 @@ TEST(RefineOutline, IsUnbiasedUnderBlurAndDarkRim) {
   }
 }
 
-/// Adds noise of this standard deviation, in grey levels.
+/// Adds noise of this standard deviation, in gray levels.
 cv::Mat noisy(const cv::Mat& image, double noise, std::uint64_t seed) {
   cv::RNG random(seed);
   cv::Mat1f levels;

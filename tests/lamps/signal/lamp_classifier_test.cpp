@@ -18,10 +18,10 @@ struct LampSpec {
 };
 
 /// Returns lights of lamps in typical sizes and phases, one of each lamp in every image.
-std::vector<LabelledLight> make_lights(const std::vector<LampSpec>& lamps, std::size_t images,
-                                       std::uint64_t seed) {
+std::vector<LabeledLight> make_lights(const std::vector<LampSpec>& lamps, std::size_t images,
+                                      std::uint64_t seed) {
   Random random(seed);
-  std::vector<LabelledLight> lights;
+  std::vector<LabeledLight> lights;
   for (std::size_t image = 0; image < images; ++image) {
     for (const LampSpec& lamp : lamps) {
       const auto lines = static_cast<int>(random.uniform(45, 75));
@@ -126,14 +126,14 @@ TEST(CrossValidate, ExcludesHeldOutImagesFromTraining) {
   // trained on lamp 9.
   auto lights = make_lights(kLamps, 40, 1);
   std::erase_if(lights,
-                [](const LabelledLight& light) { return light.lamp == 9 && light.image % 5 != 0; });
+                [](const LabeledLight& light) { return light.lamp == 9 && light.image % 5 != 0; });
   const Confusion confusion = cross_validate(lights, train_classifier);
   EXPECT_EQ(confusion.counts(2, 2), 0);
   EXPECT_EQ(confusion.counts(2, 3), 8);
 }
 
 TEST(CrossValidate, UsesGivenTrainingFunction) {
-  const auto mistaken = [](std::span<const LabelledLight> lights) {
+  const auto mistaken = [](std::span<const LabeledLight> lights) {
     LampClassifier classifier = train_classifier(lights);
     std::swap(classifier.lamps.front().lamp, classifier.lamps.back().lamp);
     return classifier;

@@ -21,7 +21,7 @@ TEST(RotationPlot, LabelsLampsRotationCenterAndPrincipalPoint) {
                           {210, 190}};
   draw(folder / "a.svg", make_drawing(plot));
   const std::string svg = TemporaryFolder::read_content(folder / "a.svg");
-  for (const char* part : {"unit 'seven'", ">42<", ">43<", "principal point", "rotation centre"}) {
+  for (const char* part : {"unit 'seven'", ">42<", ">43<", "principal point", "rotation center"}) {
     EXPECT_THAT(svg, HasSubstr(part));
   }
   EXPECT_THAT(svg, Not(HasSubstr(">44<")));

@@ -121,7 +121,7 @@ TEST(PublishRun, ThrowsForDifferentCalibration) {
 TEST(PublishRun, NamesCalibrationByVerdict) {
   const TemporaryFolder folder;
   RunRecord record = passed();
-  record.set_verdict({{"the lens is decentred", true}});
+  record.set_verdict({{"the lens is decentered", true}});
   EXPECT_TRUE(fs::exists(publish_run(record, {}, folder / "a") / "failed-calibration.yaml"));
   record.set_verdict({{"lamp 5 is loose", false}});
   EXPECT_TRUE(fs::exists(publish_run(record, {}, folder / "b") / "invalid-calibration.yaml"));

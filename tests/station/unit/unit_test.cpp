@@ -180,7 +180,7 @@ TEST(RejectRepetition, ReportsEarlierRun) {
 
 TEST(DecideVerdict, ReturnsVerdictOfFirstCause) {
   EXPECT_EQ(decide_verdict({}), Verdict::pass);
-  EXPECT_EQ(decide_verdict({{"decentred", true}, {"the operator left"}}), Verdict::fail);
+  EXPECT_EQ(decide_verdict({{"decentered", true}, {"the operator left"}}), Verdict::fail);
   EXPECT_EQ(decide_verdict({{"lamp 5 is loose"}, {"the fixes are off", true}}), Verdict::invalid);
 }
 

@@ -18,15 +18,15 @@ namespace vlp {
 const Light* find_light(const Observation& image, const Eigen::Vector2d& pixel);
 
 /// Lights whose lamps are given by a table.
-struct LabelledLights {
-  std::vector<LabelledLight> lights;
+struct LabeledLights {
+  std::vector<LabeledLight> lights;
   /// Number of labels in images that are used, and number of these labels without a light.
   int labels = 0, without_light = 0;
 };
 
 /// Adds the lights of one folder; `labels` refers to its images by name.
-void add_labelled(const std::vector<Observation>& images, const std::vector<Frame>& labels,
-                  LabelledLights& labelled);
+void add_labeled(const std::vector<Observation>& images, const std::vector<Frame>& labels,
+                 LabeledLights& labeled);
 
 /// Measured period of a light, with its position.
 struct LightPeriod : MeasuredPeriod {
@@ -37,7 +37,7 @@ struct LightPeriod : MeasuredPeriod {
 };
 
 /// Returns the periods of the lights that are completely in view and whose stripes are
-/// trustworthy(). If `labels` is not empty, only of labelled lights.
+/// trustworthy(). If `labels` is not empty, only of labeled lights.
 std::vector<LightPeriod> collect_periods(const std::vector<Observation>& images,
                                          const std::vector<Frame>& labels);
 

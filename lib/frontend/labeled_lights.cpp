@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "frontend/labelled_lights.h"
+#include "frontend/labeled_lights.h"
 
 #include <array>
 #include <unordered_map>
@@ -34,19 +34,19 @@ const Light* find_light(const Observation& image, const Eigen::Vector2d& pixel) 
   return nearest;
 }
 
-void add_labelled(const std::vector<Observation>& images, const std::vector<Frame>& labels,
-                  LabelledLights& labelled) {
+void add_labeled(const std::vector<Observation>& images, const std::vector<Frame>& labels,
+                 LabeledLights& labeled) {
   const auto frames = frames_by_image(labels);
-  std::size_t number = labelled.lights.empty() ? 0 : labelled.lights.back().image + 1;
+  std::size_t number = labeled.lights.empty() ? 0 : labeled.lights.back().image + 1;
   for (const Observation& image : images) {
     const auto frame = frames.find(image.name());
     if (frame == frames.end() || !image.is_kept()) continue;
     for (const Detection& label : frame->second->detections) {
-      ++labelled.labels;
+      ++labeled.labels;
       if (const Light* light = find_light(image, label.pixel)) {
-        labelled.lights.push_back({label.lamp, light->stripes, number});
+        labeled.lights.push_back({label.lamp, light->stripes, number});
       } else {
-        ++labelled.without_light;
+        ++labeled.without_light;
       }
     }
     ++number;

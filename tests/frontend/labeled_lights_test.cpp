@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "frontend/labelled_lights.h"
+#include "frontend/labeled_lights.h"
 
 #include <gtest/gtest.h>
 
@@ -17,45 +17,45 @@ std::vector<Observation> sample_lights() {
   return LampIntake(detector, ImageUse::fixes, {}, {}).observe_all(list_images(kSample)).images;
 }
 
-TEST(AddLabelled, AddsLightsNamedByTable) {
+TEST(AddLabeled, AddsLightsNamedByTable) {
   const auto images = sample_lights();
   ASSERT_EQ(images.size(), 2);
-  LabelledLights labelled;
+  LabeledLights labeled;
   const auto labels = read_detections(kSample + "/true_detections.csv");
-  add_labelled(images, labels, labelled);
-  EXPECT_EQ(labelled.labels, 12);
-  EXPECT_EQ(labelled.without_light, 0);
-  ASSERT_EQ(labelled.lights.size(), 12);
-  for (const LabelledLight& light : labelled.lights) {
+  add_labeled(images, labels, labeled);
+  EXPECT_EQ(labeled.labels, 12);
+  EXPECT_EQ(labeled.without_light, 0);
+  ASSERT_EQ(labeled.lights.size(), 12);
+  for (const LabeledLight& light : labeled.lights) {
     const double frequency_hz =
         std::array{1600, 2000, 2500, 3100, 3800, 4700}.at(static_cast<std::size_t>(light.lamp - 1));
     EXPECT_NEAR(light.stripes.period_lines * frequency_hz * 3e-5, 1, 0.05) << light.lamp;
     EXPECT_LT(light.image, 2);
   }
   // A second folder's images have numbers of their own.
-  add_labelled(images, labels, labelled);
-  EXPECT_EQ(labelled.lights.back().image, 3);
+  add_labeled(images, labels, labeled);
+  EXPECT_EQ(labeled.lights.back().image, 3);
 }
 
-TEST(AddLabelled, CountsLabelsWithoutLight) {
+TEST(AddLabeled, CountsLabelsWithoutLight) {
   auto labels = read_detections(kSample + "/true_detections.csv");
   labels[0].detections[0].pixel.x() += 30;
-  LabelledLights labelled;
-  add_labelled(sample_lights(), labels, labelled);
-  EXPECT_EQ(labelled.without_light, 1);
-  EXPECT_EQ(labelled.lights.size(), 11);
+  LabeledLights labeled;
+  add_labeled(sample_lights(), labels, labeled);
+  EXPECT_EQ(labeled.without_light, 1);
+  EXPECT_EQ(labeled.lights.size(), 11);
 }
 
-TEST(AddLabelled, RejectsTruncatedLights) {
+TEST(AddLabeled, RejectsTruncatedLights) {
   auto images = sample_lights();
   const auto labels = read_detections(kSample + "/true_detections.csv");
   images[0].size_px = {int(labels[0].detections[0].pixel.x()), 600};
-  LabelledLights labelled;
-  add_labelled(images, labels, labelled);
-  EXPECT_GT(labelled.without_light, 0);
+  LabeledLights labeled;
+  add_labeled(images, labels, labeled);
+  EXPECT_GT(labeled.without_light, 0);
 }
 
-TEST(MeasuredPeriods, ReturnsPeriodsOfAllOrLabelledLights) {
+TEST(MeasuredPeriods, ReturnsPeriodsOfAllOrLabeledLights) {
   const auto images = sample_lights();
   const auto all = collect_periods(images, {});
   EXPECT_GE(all.size(), 8);
