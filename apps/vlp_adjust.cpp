@@ -148,12 +148,12 @@ int main(int argc, char** argv) {
       ->check(vlp::finite_not_negative());
   app.add_option("--place-sd-m", options.place_sd_m,
                  "Standard deviation per axis of places that state none, those of truth.csv too")
-      ->check(vlp::finite_positive());
+      ->check(vlp::make_finite_positive_validator());
   app.add_option("--lens-sd-px", options.lens_sd_px,
                  "Of a lens whose calibration states no covariance: by how much each of its "
                  "parameters may be off, as the shift of the image that it makes, rms; such a lens "
                  "is then estimated (default: it is exact)")
-      ->check(vlp::finite_positive())
+      ->check(vlp::make_finite_positive_validator())
       ->check(CLI::Range(1e-3, 1e3));  // px; smaller: exact lens, larger: unusable lens
   vlp::add_motion_options(
       app, options.motion,

@@ -115,7 +115,7 @@ int main(int argc, char** argv) {
   app.add_option("-o,--output", options.output,
                  "Where to write the PDF; board.yaml goes beside it, under the same name")
       ->required()
-      ->check(vlp::ends_in(".pdf"));
+      ->check(vlp::make_ending_validator(".pdf"));
   app.add_option("--paper", options.paper, "A0 to A4 or Letter (default: A4)");
   app.add_option("--cols", options.cols, "Tags or squares along the width (default: 6 tags, 10)")
       ->check(CLI::Range(1, 100));

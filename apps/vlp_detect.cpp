@@ -93,7 +93,7 @@ int main(int argc, char** argv) {
                  "centers are those of ellipses in the image");
   app.add_option("--row-time-s", options.frontend.row_time_s,
                  "Row time of a camera without a calibration")
-      ->check(vlp::finite_positive())
+      ->check(vlp::make_finite_positive_validator())
       ->excludes("--calibration");
   app.add_option("-o,--output", options.output, "Where to write detections.csv")->required();
   app.add_option(

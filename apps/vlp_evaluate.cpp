@@ -279,7 +279,7 @@ void add_options(CLI::App& app, Options& options) {
          "--station-mm", options.station_mm,
          "Captures whose true places are within so much are of one station (default: 1, and "
          "what a turn about the calibration's lever arm adds)")
-      ->check(finite_positive());
+      ->check(make_finite_positive_validator());
   app.add_option("--compare", options.compare,
                  "Other fixes of the same captures: are these better, worse, the same (within "
                  "1 um or 1 % of the mean error, whichever is more), or is there no evidence?");
@@ -303,7 +303,7 @@ void add_options(CLI::App& app, Options& options) {
                                      "lever arm is for --station-mm");
   auto* noise = app.add_option("--noise-px", options.noise_px,
                                "... and the standard deviation of each lamp's pixel, per axis")
-                    ->check(finite_positive());
+                    ->check(make_finite_positive_validator());
   noise->needs(lamps)->needs(calibration);
   add_report_options(app, options.report);
   add_threads_option(app, options.threads, "For the intervals");

@@ -242,7 +242,7 @@ void add_solve_options(CLI::App& app, Options& options) {
   app.add_option("--corners", options.corners,
                  "Write the corners as they were seen, too, a .csv to calibrate from again without "
                  "the images")
-      ->check(ends_in(".csv"));
+      ->check(make_ending_validator(".csv"));
   app.add_option("--pixel-pitch-m", options.pixel_pitch_m, "Width of a pixel")
       ->check(CLI::Range(1e-7, 1e-4));
   app.add_option("--held-out", options.held_out,

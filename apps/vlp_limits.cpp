@@ -143,7 +143,7 @@ void add_options(CLI::App& app, Options& options) {
   app.add_option("--noise-px", options.noise_px,
                  "Standard deviation of each lamp's pixel, per axis")
       ->required()
-      ->check(finite_positive());
+      ->check(make_finite_positive_validator());
   auto* center = app.add_option("--center-px", options.center_px,
                                 "... of the image center, per axis (default 0)")
                      ->check(finite_not_negative());
@@ -174,7 +174,7 @@ void add_options(CLI::App& app, Options& options) {
       ->check(finite())
       ->option_text("X_MIN X_MAX Y_MIN Y_MAX");
   app.add_option("--step-m", options.step_m, "Distance between places on the floor (default 0.05)")
-      ->check(finite_positive());
+      ->check(make_finite_positive_validator());
   app.add_option("--map", options.map, "Write the figures of every place to this CSV file");
   app.add_option("--picture", options.picture,
                  "Draw the horizontal standard deviation over the floor, .png or .svg")

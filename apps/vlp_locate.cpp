@@ -184,7 +184,7 @@ void add_sensor_options(CLI::App& app, Options& options) {
          "Standard deviation of z_m in captures.csv, which then counts in all fixes: it tells "
          "apart where three lamps fit several leans, and is the error of the height for "
          "--one-lamp")
-      ->check(finite_positive());
+      ->check(make_finite_positive_validator());
   app.add_option(
          "--frames", options.window_size,
          "Captures to fix together, with one velocity, where captures.csv has time_s within "

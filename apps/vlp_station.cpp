@@ -44,7 +44,7 @@ void add_run(CLI::App& app, StationRunOptions& options) {
   run->add_option("--idle-s", options.idle_s,
                   "Give the verdict when no image came for so long, of a source none that could be "
                   "used")
-      ->check(finite_positive());
+      ->check(make_finite_positive_validator());
   add_operator(*run, options);
   add_threads_option(*run, options.threads);
 }

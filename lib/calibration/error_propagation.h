@@ -19,7 +19,7 @@ using PerturbedSolve = std::function<std::optional<Eigen::VectorXd>(const Eigen:
 /// Estimates the derivative of a solution with respect to errors of its inputs, one column per
 /// error.
 ///
-/// @param exact       solution without errors, f(0)
+/// @param nominal       solution without errors, f(0)
 /// @param covariance  covariance of the errors
 /// @return            d solution / d error; std::nullopt if a solve fails or the covariance is not
 ///     positive definite

@@ -16,7 +16,7 @@ namespace vlp {
 /// views: the names must outlive it.
 class NameIndex {
  public:
-  /// Reserves memory for `most` names, fewer than 2^32.
+  /// Reserves memory for `max_names` names, fewer than 2^32.
   explicit NameIndex(std::size_t max_names);
 
   /// Adds a name with the next index, from 0. Returns false, without a change, if the name exists.

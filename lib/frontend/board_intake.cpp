@@ -214,7 +214,7 @@ IntakeFailure explain_no_board(const std::vector<fs::path>& images, const Board&
             fmt::format("the images show tags of {}, but with other ids than the board has, "
                         "{} to {} ({} of them in {}){}",
                         board.family, board.first_id,
-                        board.first_id + static_cast<int>(compute_board_layout(board).size()) - 1,
+                        board.first_id + static_cast<int>(list_board_tags(board).size()) - 1,
                         foreign->seen.foreign.size(), foreign->image,
                         layout.empty() ? "" : "; " + layout),
             board_file};

@@ -34,8 +34,8 @@ const Light* find_light(const Observation& image, const Eigen::Vector2d& pixel) 
   return nearest;
 }
 
-void add_labeled(const std::vector<Observation>& images, const std::vector<Frame>& labels,
-                 LabeledLights& labeled) {
+void add_labeled_lights(const std::vector<Observation>& images, const std::vector<Frame>& labels,
+                        LabeledLights& labeled) {
   const auto frames = frames_by_image(labels);
   std::size_t number = labeled.lights.empty() ? 0 : labeled.lights.back().image + 1;
   for (const Observation& image : images) {

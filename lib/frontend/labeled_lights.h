@@ -25,8 +25,8 @@ struct LabeledLights {
 };
 
 /// Adds the lights of one folder; `labels` refers to its images by name.
-void add_labeled(const std::vector<Observation>& images, const std::vector<Frame>& labels,
-                 LabeledLights& labeled);
+void add_labeled_lights(const std::vector<Observation>& images, const std::vector<Frame>& labels,
+                        LabeledLights& labeled);
 
 /// Measured period of a light, with its position.
 struct LightPeriod : MeasuredPeriod {

@@ -50,9 +50,9 @@ inline double robust_planar_variance(std::vector<double> squares, double degrees
 
 /// Computes the outlier bound of squared linear residuals, in units of robust_linear_variance().
 /// Normal residuals exceed it as rarely as they exceed sigmas^2 if the variance is known.
-inline double linear_outlier_bound(double sigmas, double degrees_of_freedom) {
+inline double compute_squared_outlier_bound_1d(double sigmas, double degrees_of_freedom) {
   constexpr double m_per_residual = 0.367540;  // 2 (2 q phi(q))^2
-  return student_bound(sigmas, m_per_residual * std::max(degrees_of_freedom, 1.0));
+  return compute_t_squared_bound(sigmas, m_per_residual * std::max(degrees_of_freedom, 1.0));
 }
 
 /// Computes the same bound for planar residuals, in units of robust_planar_variance().

@@ -8,7 +8,7 @@
 #include "lamps/image/image_view.h"
 #include "lamps/image/pixel_runs.h"
 #include "lamps/shape/light.h"
-#include "lamps/shape/light_shape.h"
+#include "lamps/shape/light_center.h"
 #include "lamps/signal/modulated_lights.h"
 
 namespace vlp {

@@ -181,7 +181,7 @@ LightDetector LightDetector::with_tilt(
   return {lamps_, camera, classifier_};
 }
 
-LightDetector LightDetector::with_readout(Readout readout) const {
+LightDetector LightDetector::with_readout_direction(Readout readout) const {
   DetectorCamera camera = camera_;
   camera.readout = readout;
   return {lamps_, camera, classifier_};

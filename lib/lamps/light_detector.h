@@ -10,8 +10,8 @@
 #include "lamps/image/image_view.h"
 #include "lamps/image/pixel_box.h"
 #include "lamps/shape/light.h"
+#include "lamps/shape/light_center.h"
 #include "lamps/shape/light_parts.h"
-#include "lamps/shape/light_shape.h"
 #include "lamps/signal/lamp_classifier.h"
 #include "rig/calibration.h"
 #include "rig/lamp_map.h"
@@ -49,7 +49,7 @@ class LightDetector {
   LightDetector with_tilt(const std::optional<Eigen::Matrix3d>& level_from_camera) const;
 
   /// Returns a copy of the detector for images with another readout direction.
-  LightDetector with_readout(Readout readout) const;
+  LightDetector with_readout_direction(Readout readout) const;
 
   Readout readout() const { return camera_.readout; }
 

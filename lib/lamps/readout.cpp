@@ -26,7 +26,7 @@ void add_evidence(const ImageView& image, ReadoutEvidence& evidence) {
   const LightDetector by_rows({}, {Readout::rows, {}, {}});
   evidence.rows += compute_readout_evidence(by_rows.detect(image));
   evidence.columns +=
-      compute_readout_evidence(by_rows.with_readout(Readout::columns).detect(image));
+      compute_readout_evidence(by_rows.with_readout_direction(Readout::columns).detect(image));
 }
 
 std::optional<Readout> find_readout(std::size_t images,
@@ -51,7 +51,7 @@ LightsWithReadout detect_with_either_readout(const LightDetector& detector,
   const Readout default_readout = detector.readout();
   const Readout other_readout = default_readout == Readout::rows ? Readout::columns : Readout::rows;
   LightsWithReadout result{default_readout, detector.detect(image)};
-  std::vector<Light> lights = detector.with_readout(other_readout).detect(image);
+  std::vector<Light> lights = detector.with_readout_direction(other_readout).detect(image);
   const double default_evidence = compute_readout_evidence(result.lights),
                other_evidence = compute_readout_evidence(lights);
   const ReadoutEvidence evidence = default_readout == Readout::rows

@@ -8,10 +8,10 @@
 
 namespace vlp {
 
-PoseEstimate robot_from_camera(const PoseEstimate& camera,
-                               const InclinationJacobian& d_pose_d_inclination,
-                               double inclination_sigma_rad, const CameraMount& mount,
-                               const InclinationRotation& lean) {
+PoseEstimate compute_robot_pose(const PoseEstimate& camera,
+                                const InclinationJacobian& d_pose_d_inclination,
+                                double inclination_sigma_rad, const CameraMount& mount,
+                                const InclinationRotation& lean) {
   const Eigen::Matrix3d world_from_level = rotation_about_z(camera.pose.yaw_rad);
   const Eigen::Vector3d arm_in_level =
       lean.level_from_base * rotation_about_z(-mount.yaw_in_robot_rad) * mount.position_in_robot_m;

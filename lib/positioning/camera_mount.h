@@ -20,9 +20,9 @@ using InclinationJacobian = Eigen::Matrix<double, 4, 2>;
 /// @param camera   pose of the camera with the covariance from pixel noise
 /// @param d_pose_d_inclination  derivative of the camera pose by the inclination; m depends on the
 /// inclination, too
-PoseEstimate robot_from_camera(const PoseEstimate& camera,
-                               const InclinationJacobian& d_pose_d_inclination,
-                               double inclination_sigma_rad, const CameraMount& mount,
-                               const InclinationRotation& lean);
+PoseEstimate compute_robot_pose(const PoseEstimate& camera,
+                                const InclinationJacobian& d_pose_d_inclination,
+                                double inclination_sigma_rad, const CameraMount& mount,
+                                const InclinationRotation& lean);
 
 }  // namespace vlp

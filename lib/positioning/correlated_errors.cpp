@@ -301,10 +301,10 @@ CommonErrors::Effect CommonErrors::effect_on(const Sighting& sighting, const Lev
   return effect;
 }
 
-CommonErrors::Gain CommonErrors::compute_gain(std::span<const Sighting> sightings,
-                                              std::span<const std::size_t> lamps,
-                                              const PoseEstimate& camera, const Lens& lens,
-                                              const Eigen::Matrix3d& level_from_base) const {
+CommonErrors::Gain CommonErrors::compute_error_gain(std::span<const Sighting> sightings,
+                                                    std::span<const std::size_t> lamps,
+                                                    const PoseEstimate& camera, const Lens& lens,
+                                                    const Eigen::Matrix3d& level_from_base) const {
   const LevelPose pose(camera.pose);
   Gain gain(shared());
   for (std::size_t i = 0; i < sightings.size(); ++i) {
@@ -312,7 +312,7 @@ CommonErrors::Gain CommonErrors::compute_gain(std::span<const Sighting> sighting
     const Effect effect = effect_on(sighting, pose, lens, level_from_base);
     Eigen::Matrix<double, 4, 2> d_fix_d_z;
     if (sightings.size() == 1) {
-      // compute_one_lamp_pose(): s = p - H e^{jg} z.
+      // compute_pose_at_known_height_and_yaw(): s = p - H e^{jg} z.
       d_fix_d_z.setZero();
       d_fix_d_z.topRows<2>() = -height_above(pose, sighting.lamp_m) * product_matrix(pose.heading);
     } else {
@@ -326,11 +326,10 @@ CommonErrors::Gain CommonErrors::compute_gain(std::span<const Sighting> sighting
   return gain;
 }
 
-CommonErrors::BodyGain CommonErrors::compute_gain(std::span<const BodyObservation> sightings,
-                                                  std::span<const std::size_t> lamps,
-                                                  const Eigen::Vector3d& arm_m, const BodyFix& fix,
-                                                  const Lens& lens,
-                                                  const Eigen::Matrix3d& body_from_base) const {
+CommonErrors::BodyGain CommonErrors::compute_error_gain(
+    std::span<const BodyObservation> sightings, std::span<const std::size_t> lamps,
+    const Eigen::Vector3d& arm_m, const BodyFix& fix, const Lens& lens,
+    const Eigen::Matrix3d& body_from_base) const {
   const EvaluatedState body(fix.state);
   BodyGain whole(shared());
   for (std::size_t i = 0; i < sightings.size(); ++i) {

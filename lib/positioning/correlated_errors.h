@@ -111,16 +111,16 @@ class CommonErrors {
   using BodyGain = GainMatrix<kBodyStates>;
   /// Returns the gain of a least-squares fix (estimate_pose_least_squares) with the covariance of
   /// `camera`. `lamps` are the indices in the map of the observed lamps. For a single lamp, returns
-  /// the gain of compute_one_lamp_pose().
-  Gain compute_gain(std::span<const Sighting> sightings, std::span<const std::size_t> lamps,
-                    const PoseEstimate& camera, const Lens& lens,
-                    const Eigen::Matrix3d& level_from_base) const;
+  /// the gain of compute_pose_at_known_height_and_yaw().
+  Gain compute_error_gain(std::span<const Sighting> sightings, std::span<const std::size_t> lamps,
+                          const PoseEstimate& camera, const Lens& lens,
+                          const Eigen::Matrix3d& level_from_base) const;
   /// Returns the gain of a body with the camera at `arm_m`. The gain of the pixels, in standard
   /// deviations, is that of the least-squares fix (estimate_body).
-  BodyGain compute_gain(std::span<const BodyObservation> sightings,
-                        std::span<const std::size_t> lamps, const Eigen::Vector3d& arm_m,
-                        const BodyFix& fix, const Lens& lens,
-                        const Eigen::Matrix3d& body_from_base) const;
+  BodyGain compute_error_gain(std::span<const BodyObservation> sightings,
+                              std::span<const std::size_t> lamps, const Eigen::Vector3d& arm_m,
+                              const BodyFix& fix, const Lens& lens,
+                              const Eigen::Matrix3d& body_from_base) const;
   /// Computes the expected contribution of the errors to chi-squared, from the common covariance
   /// `common` = G C G' of the fix:
   ///   tr(R C R') = tr(W J_c C J_c') - tr(N common),   R = W^1/2 (J_c - J G),   N = J' W J.

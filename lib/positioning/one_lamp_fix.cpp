@@ -19,8 +19,9 @@ Eigen::Vector2d compute_lamp_from_center_m(const Sighting& sighting, double heig
 
 }  // namespace
 
-std::optional<Pose> compute_one_lamp_pose(const Sighting& sighting, const HeightAndYaw& known,
-                                          const MotionAtReadout& readout) {
+std::optional<Pose> compute_pose_at_known_height_and_yaw(const Sighting& sighting,
+                                                         const HeightAndYaw& known,
+                                                         const MotionAtReadout& readout) {
   const double height_m = sighting.lamp_m.z() - known.z_m;
   if (!(height_m > 0)) return std::nullopt;
   const Eigen::Vector2d lamp_from_camera_m =

@@ -25,22 +25,23 @@ struct MotionAtReadout {
 ///   s = p - e^{jg} (H e^{jwt} z + (e^{jwt} - 1) a + u t)
 ///   u, w  velocity and yaw rate;   a  arm;   t  time of the readout
 /// Returns std::nullopt if the lamp is not above the camera.
-std::optional<Pose> compute_one_lamp_pose(const Sighting& sighting, const HeightAndYaw& known,
-                                          const MotionAtReadout& readout = {});
+std::optional<Pose> compute_pose_at_known_height_and_yaw(const Sighting& sighting,
+                                                         const HeightAndYaw& known,
+                                                         const MotionAtReadout& readout = {});
 
 /// Returns the covariance of (X, Y, Zs, g) from the pixel noise alone.
-/// @pre compute_one_lamp_pose() computed `pose`
+/// @pre compute_pose_at_known_height_and_yaw() computed `pose`
 Matrix4 compute_one_lamp_covariance(const Sighting& sighting, const Pose& pose);
 
 /// Returns the covariance of (X, Y, Zs, g) from the errors of height, yaw and motion.
-/// @pre compute_one_lamp_pose() computed `pose`
+/// @pre compute_pose_at_known_height_and_yaw() computed `pose`
 Matrix4 compute_one_lamp_sensor_covariance(const Sighting& sighting, const Pose& pose,
                                            const HeightAndYaw& known,
                                            const MotionAtReadout& readout);
 
 /// Returns the derivative of (X, Y, Zs, g) by a small rotation of the level frame about each of its
 /// axes.
-/// @pre compute_one_lamp_pose() computed `pose`
+/// @pre compute_pose_at_known_height_and_yaw() computed `pose`
 Eigen::Matrix<double, 4, 3> compute_one_lamp_rotation_jacobian(const Sighting& sighting,
                                                                const Pose& pose);
 

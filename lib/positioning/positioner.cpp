@@ -305,7 +305,7 @@ Matrix4 Positioner::Impl::common_covariance(const FrameObservations& frame,
   for (std::size_t i = 0; i < frame.size; ++i) lamps[i] = find_index(frame.ids[i]);
   const std::span<const std::size_t> in_map(lamps.data(), frame.size);
   const Matrix4 common = common_.compute_covariance(
-      common_.compute_gain(frame.span(), in_map, fix.estimate, lens_, level_from_base));
+      common_.compute_error_gain(frame.span(), in_map, fix.estimate, lens_, level_from_base));
   if (computes_common_chi_squared_ && fix.redundancy > 0) {
     fix.common_chi_squared = common_.expected_chi_squared(frame.span(), in_map, fix.estimate,
                                                           common, lens_, level_from_base);
@@ -320,7 +320,7 @@ BodyCovariance Positioner::Impl::common_covariance(const BodyObservations& frame
   for (std::size_t i = 0; i < frame.size; ++i) lamps[i] = find_index(frame.ids[i]);
   const std::span<const std::size_t> in_map(lamps.data(), frame.size);
   const BodyCovariance common = common_.compute_covariance(
-      common_.compute_gain(frame.span(), in_map, arm_m, solution, lens_, body_from_base_));
+      common_.compute_error_gain(frame.span(), in_map, arm_m, solution, lens_, body_from_base_));
   if (computes_common_chi_squared_ && fix.redundancy > 0) {
     fix.common_chi_squared = common_.expected_chi_squared(frame.span(), in_map, arm_m, solution,
                                                           common, lens_, body_from_base_);
@@ -465,8 +465,8 @@ void Positioner::Impl::add_covariances(const FrameObservations& frame,
     PoseEstimate whole = fix.estimate;
     whole.covariance += common;
     fix.noise_covariance =
-        robot_from_camera(fix.estimate, d_pose_d_inclination, sigma_rad, *mount_, lean).covariance;
-    fix.estimate = robot_from_camera(whole, d_pose_d_inclination, sigma_rad, *mount_, lean);
+        compute_robot_pose(fix.estimate, d_pose_d_inclination, sigma_rad, *mount_, lean).covariance;
+    fix.estimate = compute_robot_pose(whole, d_pose_d_inclination, sigma_rad, *mount_, lean);
   } else {
     if (sigma_rad > 0) {
       fix.estimate.covariance +=
@@ -529,7 +529,7 @@ Fix Positioner::Impl::locate(std::span<const Detection> detections, const Sensor
     const Sighting& sighting = frame.sightings.front();
     HeightAndYaw known = *sensors.height_and_yaw;
     known.z_m -= origin_m_.z();
-    const auto pose = compute_one_lamp_pose(sighting, known, *readout);
+    const auto pose = compute_pose_at_known_height_and_yaw(sighting, known, *readout);
     if (!pose) return without_fix(FixStatus::lamp_below_camera, frame.unknown_lamps);
     fix.estimate = {*pose, compute_one_lamp_covariance(sighting, *pose)};
     height_and_yaw_covariance =

@@ -104,7 +104,7 @@ class Positioner {
   /// Computes the fix of one frame. Neither allocates memory nor throws.
   ///
   /// Methods, by the number of lamps:
-  ///   one   compute_one_lamp_pose()
+  ///   one   compute_pose_at_known_height_and_yaw()
   ///   two   closed form
   ///   more  estimate_pose_least_squares() from compute_initial_pose(), without outliers
   ///   (estimate_pose_robust)

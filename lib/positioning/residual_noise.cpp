@@ -29,7 +29,7 @@ double median_reduced_chi_squared(std::span<const Fix> fixes) {
 
 }  // namespace
 
-ResidualSums sum_residuals(std::span<const Fix> fixes) {
+ResidualSums sum_squared_residuals(std::span<const Fix> fixes) {
   // Five standard deviations of the others: no fix of normal noise, but one with a wrong lamp.
   constexpr double max_ratio = 25;
   const double max_reduced = max_ratio * median_reduced_chi_squared(fixes);

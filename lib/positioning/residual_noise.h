@@ -20,7 +20,7 @@ struct ResidualSums {
 };
 
 /// Computes the sums.
-ResidualSums sum_residuals(std::span<const Fix> fixes);
+ResidualSums sum_squared_residuals(std::span<const Fix> fixes);
 
 /// Estimates the standard deviation of a pixel per axis from the residuals:
 ///   sqrt(sum of squared residuals / degrees of freedom)

@@ -46,8 +46,8 @@ std::optional<UnitBudget> UnitErrors::budget(const Pose& level, std::span<const 
   }
   const auto noise = invert_positive_definite(information);
   if (!noise) return std::nullopt;
-  const CommonErrors::Gain gain =
-      whole_.compute_gain(sightings, lamps, {level, *noise}, lens_, Eigen::Matrix3d::Identity());
+  const CommonErrors::Gain gain = whole_.compute_error_gain(sightings, lamps, {level, *noise},
+                                                            lens_, Eigen::Matrix3d::Identity());
   const auto part = [&](CommonErrorSource of) {
     return parts_[static_cast<std::size_t>(of)].compute_covariance(gain);
   };
@@ -64,8 +64,8 @@ std::optional<UnitBudget> UnitErrors::budget(const Pose& level, std::span<const 
                                         make_row_clock(camera_));
   if (!limit) return std::nullopt;
   const CommonErrors::BodyGain gain =
-      whole_.compute_gain(limit->frame.span(), lamps, Eigen::Vector3d::Zero(), limit->fix, lens_,
-                          Eigen::Matrix3d::Identity());
+      whole_.compute_error_gain(limit->frame.span(), lamps, Eigen::Vector3d::Zero(), limit->fix,
+                                lens_, Eigen::Matrix3d::Identity());
   const auto part = [&](CommonErrorSource of) {
     return Matrix4(
         parts_[static_cast<std::size_t>(of)].compute_covariance(gain).topLeftCorner<4, 4>());

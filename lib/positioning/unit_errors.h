@@ -19,8 +19,9 @@
 
 namespace vlp {
 
-/// Covariances of (X, Y, Z, yaw) in meters and radians. `noise` is independent between images. The
-/// others are the parts of the errors common to all fixes of a camera (CommonErrors::only).
+/// Covariances of (X, Y, Z, yaw) in meters and radians. `noise` is independent between images.
+/// `lens`, `zenith`, `offset` and `lamp_map` are the parts common to all fixes of a camera
+/// (CommonErrors::only).
 struct UnitBudget {
   Matrix4 noise, lens, zenith, offset, lamp_map;
   /// Increase of `noise` due to unknown motion, and the further increase due to unknown roll and

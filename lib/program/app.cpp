@@ -119,14 +119,14 @@ int count_cores() { return static_cast<int>(std::max(1U, std::thread::hardware_c
 CLI::Validator finite() {
   return number_check("finite", [](double) { return true; });
 }
-CLI::Validator finite_positive() {
+CLI::Validator make_finite_positive_validator() {
   return number_check("finite positive", [](double value) { return value > 0; });
 }
 CLI::Validator finite_not_negative() {
   return number_check("finite and not negative", [](double value) { return value >= 0; });
 }
 
-CLI::Validator ends_in(const std::string& ending) {
+CLI::Validator make_ending_validator(const std::string& ending) {
   return CLI::Validator(
       [ending](const std::string& name) {
         return name.ends_with(ending) ? std::string() : "the file's name should end in " + ending;

@@ -34,11 +34,11 @@ int count_cores();
 
 /// Return validators of options that accept finite numbers: any, positive, or not negative.
 CLI::Validator finite();
-CLI::Validator finite_positive();
+CLI::Validator make_finite_positive_validator();
 CLI::Validator finite_not_negative();
 
 /// Returns a validator that accepts file names with this ending.
-CLI::Validator ends_in(const std::string& ending);
+CLI::Validator make_ending_validator(const std::string& ending);
 /// Returns a validator that accepts file names of plots: .png or .svg.
 CLI::Validator is_plot_file();
 

@@ -78,7 +78,7 @@ std::string intrinsics_table(const IntrinsicsReport& report) {
   return html_table(table);
 }
 
-std::string rotation_table(const RotationCenter& center) {
+std::string format_rotation_table(const RotationCenter& center) {
   const Eigen::Vector3d& up = center.zenith_in_camera;
   const double tilt_rad = std::atan2(up.head<2>().norm(), up.z());
   HtmlTable table{"",

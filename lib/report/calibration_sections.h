@@ -12,7 +12,7 @@ namespace vlp {
 /// Return the parts of a calibration as HTML tables.
 std::string camera_table(const Camera& camera);
 std::string intrinsics_table(const IntrinsicsReport& report);
-std::string rotation_table(const RotationCenter& center);
+std::string format_rotation_table(const RotationCenter& center);
 std::string dispersion_table(const Dispersion& dispersion, const Eigen::Vector2d& focal_px);
 
 /// Returns a foldable list in HTML: program, version and options of each part, and the digests of

@@ -15,7 +15,7 @@ namespace vlp {
 /// characters U+FFFD.
 std::string html_text(std::string_view text);
 
-/// Returns `<name>text</name>` with escaped text.
+/// Returns `<name>text</name>` with escaped text, and a newline.
 std::string html_element(std::string_view name, std::string_view text);
 
 /// Returns a self-contained page with the report's style. `content` is HTML.

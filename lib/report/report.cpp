@@ -131,7 +131,8 @@ std::string report_html(const Report& report) {
   if (const auto& calibration = report.calibration) {
     camera = camera_table(calibration->camera);
     if (calibration->intrinsics_report) camera += intrinsics_table(*calibration->intrinsics_report);
-    if (calibration->rotation_center) rotation = rotation_table(*calibration->rotation_center);
+    if (calibration->rotation_center)
+      rotation = format_rotation_table(*calibration->rotation_center);
     if (calibration->dispersion)
       dispersion = dispersion_table(*calibration->dispersion, calibration->camera.focal_px());
   }

@@ -59,7 +59,7 @@ std::vector<Eigen::Vector2d> square_corners_m(const Board& board) {
   return corners_m;
 }
 
-std::vector<BoardTag> compute_board_layout(const Board& board) {
+std::vector<BoardTag> list_board_tags(const Board& board) {
   if (board.kind == BoardKind::charuco) return make_markers(board);
   if (board.kind == BoardKind::chessboard) return {};
   std::vector<BoardTag> tags;

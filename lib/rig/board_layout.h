@@ -34,6 +34,6 @@ bool is_black(const Board& board, int col, int row);
 std::vector<Eigen::Vector2d> square_corners_m(const Board& board);
 
 /// Returns the tags or markers of a board, row by row from the top left; none for a chessboard.
-std::vector<BoardTag> compute_board_layout(const Board& board);
+std::vector<BoardTag> list_board_tags(const Board& board);
 
 }  // namespace vlp

@@ -17,7 +17,7 @@ void begin_part(YAML::Emitter& out, const char* key) {
 /// Required keys come last, see write_calibration().
 void emit_camera(YAML::Emitter& out, const Camera& camera) {
   begin_part(out, "camera");
-  emit_text(out, "id", camera.id);
+  emit_quoted(out, "id", camera.id);
   if (camera.pixel_pitch_m) emit_number(out, "pixel_pitch_m", *camera.pixel_pitch_m);
   if (camera.row_time_s) emit_number(out, "row_time_s", *camera.row_time_s);
   if (camera.readout) {
@@ -151,13 +151,13 @@ void emit_history(YAML::Emitter& out, const std::vector<HistoryEntry>& history) 
     out << YAML::BeginMap;
     emit_word(out, "part", entry.part);
     emit_word(out, "program", entry.program);
-    emit_text(out, "version", entry.version);
-    emit_text(out, "options", entry.options);
+    emit_quoted(out, "version", entry.version);
+    emit_quoted(out, "options", entry.options);
     out << YAML::Key << "inputs" << YAML::Value << YAML::BeginSeq;
     for (const auto& input : entry.inputs) {
       out << YAML::Flow << YAML::BeginMap;
-      emit_text(out, "file", input.file);
-      emit_text(out, "sha256", input.sha256);
+      emit_quoted(out, "file", input.file);
+      emit_quoted(out, "sha256", input.sha256);
       out << YAML::EndMap;
     }
     out << YAML::EndSeq << YAML::EndMap;

@@ -16,7 +16,7 @@ namespace vlp {
 /// point, too ("1.0e-07"): without a point, YAML 1.1 readers such as PyYAML parse it as text.
 std::string shortest(double value);
 
-/// Returns a text for a message, truncated to `enough` bytes.
+/// Returns a text for a message, truncated to `max_bytes` bytes.
 std::string truncate_text(std::string_view text, std::size_t max_bytes);
 /// Returns a text in quotes for a message, truncated to 40 bytes.
 std::string in_quotes(std::string_view text);

@@ -35,7 +35,7 @@ void emit_integers(YAML::Emitter& out, std::string_view key, std::span<const int
   out << YAML::EndSeq;
 }
 
-void emit_text(YAML::Emitter& out, std::string_view key, const std::string& value) {
+void emit_quoted(YAML::Emitter& out, std::string_view key, const std::string& value) {
   emit_key(out, key) << YAML::DoubleQuoted << value;
 }
 

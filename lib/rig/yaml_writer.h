@@ -19,7 +19,7 @@ namespace vlp {
 void emit_number(YAML::Emitter& out, std::string_view key, double value);
 void emit_integer(YAML::Emitter& out, std::string_view key, int value);
 void emit_integers(YAML::Emitter& out, std::string_view key, std::span<const int> values);
-void emit_text(YAML::Emitter& out, std::string_view key, const std::string& value);
+void emit_quoted(YAML::Emitter& out, std::string_view key, const std::string& value);
 /// Writes a word that needs no quotes: a format, a model, an enumerator.
 void emit_word(YAML::Emitter& out, std::string_view key, std::string_view value);
 void emit_numbers(YAML::Emitter& out, std::string_view key, std::span<const double> values);

@@ -183,7 +183,7 @@ LocatedImages locate_images(const LampImages& images, ImageUse use, LocateInput 
   input.frames = collect_kept_frames(seen.images);
   const LampIntake without_pictures = intake.with_annotate({});
   std::map<std::string, Observation> latest;
-  const LevelRotations levels = redetect_tilted(input, [&](const LevelRotations& tilted) {
+  const LevelRotations levels = redetect_tilted_captures(input, [&](const LevelRotations& tilted) {
     const Observations repeated = observe_again(without_pictures, files, tilted);
     for (const Observation& image : repeated.images) {
       if (image.is_kept()) latest.insert_or_assign(image.name(), image);
@@ -207,7 +207,7 @@ LocatedImages locate_images(const LampImages& images, ImageUse use, LocateInput 
   return result;
 }
 
-LevelRotations redetect_tilted(LocateInput& input, const Redetector& redetect) {
+LevelRotations redetect_tilted_captures(LocateInput& input, const Redetector& redetect) {
   return TiltedCaptures(input, redetect).iterate();
 }
 

@@ -20,7 +20,7 @@ struct LocatedImages {
 
 /// Detects the lamps in images (observe_lamps()) and locates the camera of each image. `input`
 /// holds everything except the frames. If the tilt of a camera is estimated, its lamps are detected
-/// again in the plane that is level by its fix (redetect_tilted()).
+/// again in the plane that is level by its fix (redetect_tilted_captures()).
 ///
 /// Skipped images and remarks of the intake are part of the result. It fails as locate_frames()
 /// does, or if no lamp is identified.
@@ -41,6 +41,6 @@ using Redetector = std::function<std::vector<Frame>(const LevelRotations&)>;
 /// discarded. A capture without a fix either way keeps the detection with more lamps.
 ///
 /// Replaces the frames of `input`. Returns the level rotations of the frames that changed.
-LevelRotations redetect_tilted(LocateInput& input, const Redetector& redetect);
+LevelRotations redetect_tilted_captures(LocateInput& input, const Redetector& redetect);
 
 }  // namespace vlp

@@ -164,7 +164,7 @@ bool warn_of_noise(LocateResult& result, const std::vector<Frame>& frames, doubl
     }
   }
   constexpr double max_noise_ratio = 3;
-  const auto estimated_px = estimate_noise_px(sum_residuals(result.fixes));
+  const auto estimated_px = estimate_noise_px(sum_squared_residuals(result.fixes));
   if (estimated_px && stated_px > 0) {
     result.metrics.push_back({"residual_ratio", *estimated_px / stated_px});
   }
@@ -222,8 +222,8 @@ void warn_of_motion(LocateResult& result, const LocateInput& input, bool is_nois
   LocateInput moving = input;
   moving.motion = KnownMotion::up_to(max_speed_m_per_s, max_yaw_rate_rad_per_s);
   const std::vector<Fix> fixes = locate_all_frames(moving, input.how);
-  const auto standing_px = estimate_noise_px(sum_residuals(result.fixes));
-  const auto moving_px = estimate_noise_px(sum_residuals(fixes));
+  const auto standing_px = estimate_noise_px(sum_squared_residuals(result.fixes));
+  const auto moving_px = estimate_noise_px(sum_squared_residuals(fixes));
   const std::size_t still_failed = input.frames.size() - count_fixes(fixes);
   const bool fits =
       is_noisy ? moving_px && *moving_px < *standing_px / 2 : 2 * still_failed < failed;
@@ -231,7 +231,7 @@ void warn_of_motion(LocateResult& result, const LocateInput& input, bool is_nois
   // Velocity and yaw rate fit the errors if there are few residuals.
   constexpr double min_degrees_of_freedom = 12;
   if (!fits || !speed_m_per_s || *speed_m_per_s > max_speed_m_per_s ||
-      sum_residuals(fixes).degrees_of_freedom < min_degrees_of_freedom) {
+      sum_squared_residuals(fixes).degrees_of_freedom < min_degrees_of_freedom) {
     return;
   }
   result.warnings.push_back(fmt::format(
@@ -288,7 +288,7 @@ bool locate_with_noise(const LocateInput& input, LocateResult& result) {
   for (std::size_t i = 0; i < input.frames.size(); ++i) {
     (has_sigma(input.frames[i]) ? stated : unstated).push_back(result.fixes[i]);
   }
-  const ResidualSums residuals = sum_residuals(stated);
+  const ResidualSums residuals = sum_squared_residuals(stated);
   const double factor = estimate_birge_ratio(residuals);
   bool is_noisy = false;
   if (unstated.empty()) is_noisy = warn_of_noise(result, input.frames, factor);
@@ -301,10 +301,10 @@ bool locate_with_noise(const LocateInput& input, LocateResult& result) {
   PositionerOptions how = input.how;
   bool is_known = true;
   if (!unstated.empty()) {
-    auto unstated_factor = estimate_noise_factor(sum_residuals(unstated));
+    auto unstated_factor = estimate_noise_factor(sum_squared_residuals(unstated));
     // Few frames without given noise may have no redundancy: then the noise in pixels is estimated
     // from all frames.
-    if (!unstated_factor) unstated_factor = estimate_noise_px(sum_residuals(result.fixes));
+    if (!unstated_factor) unstated_factor = estimate_noise_px(sum_squared_residuals(result.fixes));
     is_known = unstated_factor.has_value();
     if (is_known) {
       how.unstated_sigma_px =

@@ -99,7 +99,7 @@ TrainStepResult train_lamp_classifier(const DetectedLights& seen,
   TrainStepResult result;
   LabeledLights& labeled = result.labeled;
   for (std::size_t i = 0; i < labels.size(); ++i) {
-    add_labeled(seen.folders[i].images, labels[i], labeled);
+    add_labeled_lights(seen.folders[i].images, labels[i], labeled);
   }
   if (labeled.labels == 0) {
     throw InputError(first_folder,

@@ -60,7 +60,7 @@ SimulationSummary simulate_archive(const Scene& scene, std::size_t sessions, con
                                    const SimulationOptions& options,
                                    const SimulationProgress& progress) {
   check(scene);
-  claim_for_simulation(output, options.provenance);
+  claim_output_folder(output, options.provenance);
   write_table(scene, sessions, output);
   SimulationSummary summary;
   std::mutex counting;

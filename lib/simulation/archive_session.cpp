@@ -30,7 +30,7 @@ constexpr std::array kDamageTargets = {DamageTarget{ArchiveDamage::cut_images, "
                                        DamageTarget{ArchiveDamage::empty, "boards"},
                                        DamageTarget{ArchiveDamage::missing, "rotation"}};
 
-/// Returns how many of the first n sessions are chosen if the fraction `share` of all is chosen.
+/// Returns how many of the first n sessions are chosen if the fraction `fraction` of all is chosen.
 /// Rounded to nearest, so that small archives have chosen sessions, too.
 std::size_t count_chosen(std::size_t n, double fraction) {
   return static_cast<std::size_t>(std::floor(static_cast<double>(n) * fraction + 0.5));
@@ -76,7 +76,7 @@ void draw_camera(Scene& scene, const ArchiveVariation& variation, cv::RNG random
 }
 
 void draw_session(Scene& scene, const ArchiveVariation& variation, cv::RNG random) {
-  scene.seed = draw_seed(random);
+  scene.seed = draw_seed_from(random);
   for (SceneLamp& lamp : scene.lamps) {
     for (double& part : lamp.map_error_m) {
       part += variation.map_error_m * random.uniform(-1.0, 1.0);

@@ -70,7 +70,7 @@ std::vector<PrintedRectangle> make_board_pattern(const Board& board) {
   std::vector<PrintedRectangle> all;
   if (board.has_squares()) add_squares(board, all);
   if (board.corner_squares) add_corner_squares(board, all);
-  for (const BoardTag& tag : compute_board_layout(board)) add_tag(board, tag, all);
+  for (const BoardTag& tag : list_board_tags(board)) add_tag(board, tag, all);
   return all;
 }
 

@@ -8,7 +8,7 @@
 
 namespace vlp {
 
-/// Rectangle on a board, in the board frame (compute_board_layout.h).
+/// Rectangle on a board, in the board frame (list_board_tags.h).
 struct PrintedRectangle {
   double left_m, top_m, right_m, bottom_m;
   bool white;

@@ -52,8 +52,7 @@ FrameRenderer::FrameRenderer(const Scene& scene)
   if (scene.board) pattern_.emplace(*scene.board);
 }
 
-cv::Mat1f FrameRenderer::integrate_exposure(const cv::Mat1f& electrons_per_s,
-                                            double exposure_s) const {
+cv::Mat1f FrameRenderer::apply_exposure(const cv::Mat1f& electrons_per_s, double exposure_s) const {
   return cv::Mat1f(rays_.without_margin(electrons_per_s).mul(transmission_, exposure_s));
 }
 
@@ -351,7 +350,7 @@ cv::Mat1f FrameRenderer::lamp_electrons(const LampShot& shot) const {
       add_mirror_images(scene_, shot, LampFrame(scene_, rays_, optics_, shot, part, &mirror), sum);
     }
   }
-  return integrate_exposure(sum, shot.exposure_s / part.count);
+  return apply_exposure(sum, shot.exposure_s / part.count);
 }
 
 namespace {
@@ -365,7 +364,7 @@ std::vector<Eigen::Vector3d> sample_points(const Board& board) {
     }
     return points_m;
   }
-  for (const BoardTag& tag : compute_board_layout(board)) {
+  for (const BoardTag& tag : list_board_tags(board)) {
     points_m.emplace_back(tag.corners_m[0].x(), tag.corners_m[0].y(), 0);
     points_m.emplace_back(tag.corners_m[2].x(), tag.corners_m[2].y(), 0);
   }
@@ -394,7 +393,7 @@ cv::Mat1f FrameRenderer::board_electrons(const BoardShot& shot) const {
   optics_.spread(supersampled, {-rays_.margin_px(), -rays_.margin_px(), 2});
   cv::resize(supersampled, image, pixels, 0, 0, cv::INTER_AREA);
   optics_.add_veil(image);
-  return integrate_exposure(image, shot.exposure_s);
+  return apply_exposure(image, shot.exposure_s);
 }
 
 }  // namespace vlp

@@ -39,7 +39,7 @@ class FrameRenderer {
   }
 
  private:
-  cv::Mat1f integrate_exposure(const cv::Mat1f& electrons_per_s, double exposure_s) const;
+  cv::Mat1f apply_exposure(const cv::Mat1f& electrons_per_s, double exposure_s) const;
 
   const Scene& scene_;
   PixelRays rays_;

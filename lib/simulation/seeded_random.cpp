@@ -18,7 +18,7 @@ cv::RNG make_random(std::uint64_t seed, std::string_view name, std::size_t index
   return cv::RNG(state[0] | std::uint64_t(state[1]) << 32);
 }
 
-std::uint64_t draw_seed(cv::RNG& random) {
+std::uint64_t draw_seed_from(cv::RNG& random) {
   const std::uint64_t high = random.next();
   return high << 32 | random.next();
 }

@@ -14,6 +14,6 @@ namespace vlp {
 cv::RNG make_random(std::uint64_t seed, std::string_view name, std::size_t index);
 
 /// Draws a seed of 64 bits.
-std::uint64_t draw_seed(cv::RNG& random);
+std::uint64_t draw_seed_from(cv::RNG& random);
 
 }  // namespace vlp

@@ -44,7 +44,7 @@ CaptureIndices find_capture_indices(const LampShots& captures, std::size_t index
   return {turned / yaws / spots, turned / yaws % spots, turned % yaws, 0};
 }
 
-/// Returns the ray of the pixel at the offset `off` from `middle`. If that pixel has no ray,
+/// Returns the ray of the pixel at the offset `offset` from `middle`. If that pixel has no ray,
 /// returns the ray of the last pixel on the way there that has one.
 std::optional<Lens::Ray> find_last_ray(const Lens& lens, const Eigen::Vector2d& middle,
                                        const Eigen::Vector2d& offset) {
@@ -137,7 +137,7 @@ LampShot make_lamp_shot(const Scene& scene, const CaptureSet& set, std::size_t i
     const double periods = lamp.phase ? *lamp.phase + lamp.frequency_hz * shot.time_s : free_phase;
     shot.waves.push_back({lamp.frequency_hz, lamp.duty, periods - std::floor(periods)});
   }
-  shot.noise_seed = draw_seed(random);
+  shot.noise_seed = draw_seed_from(random);
   // Drawn last, so that the other random values equal those of a scene without such lights.
   for (const ForeignLight& light : scene.clutter.foreign_lights) {
     const double free_phase = random.uniform(0.0, 1.0);
@@ -182,7 +182,7 @@ BoardShot make_board_shot(const Scene& scene, const CaptureSet& set, std::size_t
   shot.camera_from_board_at_0.translation() =
       distance_m * sight - shot.camera_from_board_at_0.linear() * middle_m;
   shot.velocity_in_camera_m_per_s = views.velocity_m_per_s;
-  shot.noise_seed = draw_seed(random);
+  shot.noise_seed = draw_seed_from(random);
   return shot;
 }
 

@@ -99,7 +99,7 @@ std::string make_provenance(const fs::path& scene, std::optional<std::uint64_t> 
   return mark + version + '\n' + text;
 }
 
-void claim_for_simulation(const fs::path& output, const std::string& provenance) {
+void claim_output_folder(const fs::path& output, const std::string& provenance) {
   const fs::path mark = output / "scene.yaml";
   if (fs::exists(mark)) {
     constexpr std::size_t max_bytes = 2 << 20;
@@ -124,7 +124,7 @@ SimulationSummary simulate(const Scene& scene, const fs::path& output,
                            const SimulationOptions& options, const SimulationProgress& progress) {
   const std::vector<CaptureSet> sets = select_sets(scene, options.folders);
   const FrameRenderer renderer(scene);
-  claim_for_simulation(output, options.provenance);
+  claim_output_folder(output, options.provenance);
   write_common_files(scene, output);
 
   std::size_t total = 0;

@@ -44,8 +44,9 @@ struct SimulationSummary {
 using SimulationProgress = std::function<void(const SimulationSummary& so_far, std::size_t total)>;
 
 /// Renders a scene into `output`:
-///   scene.yaml, lamps.yaml (as surveyed), board.yaml, make_true_calibration.yaml,
-///   find_true_lamps.yaml FOLDER/0000.png, 0001.png, ... (.jpg if the scene sets a JPEG quality)
+///   scene.yaml, lamps.yaml (as surveyed), board.yaml, true_calibration.yaml,
+///   true_lamps.yaml
+///   FOLDER/0000.png, 0001.png, ... (.jpg if the scene sets a JPEG quality)
 ///   FOLDER/ the tables of write_truth()
 /// Files are written atomically. Existing images are kept, so that an interrupted simulation can be
 /// resumed. The bytes depend on the scene alone, not on the number of threads.
@@ -54,9 +55,9 @@ using SimulationProgress = std::function<void(const SimulationSummary& so_far, s
 SimulationSummary simulate(const Scene& scene, const std::filesystem::path& output,
                            const SimulationOptions& options, const SimulationProgress& progress);
 
-/// Claims a folder for captures by writing `origin` as its scene.yaml. Has no effect if the folder
-/// is claimed by the same `origin` already.
+/// Claims a folder for captures by writing `provenance` as its scene.yaml. Has no effect if the
+/// folder is claimed by the same `provenance` already.
 /// @throws InputError if the folder holds something else
-void claim_for_simulation(const std::filesystem::path& output, const std::string& provenance);
+void claim_output_folder(const std::filesystem::path& output, const std::string& provenance);
 
 }  // namespace vlp

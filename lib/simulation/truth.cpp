@@ -204,7 +204,7 @@ std::vector<TrueCorner> find_true_corners(const Scene& scene, const FrameRendere
     for (std::size_t i = 0; i < corners_m.size(); ++i) add({}, static_cast<int>(i), corners_m[i]);
     return corners;
   }
-  for (const BoardTag& tag : compute_board_layout(print)) {
+  for (const BoardTag& tag : list_board_tags(print)) {
     for (int corner = 0; corner < 4; ++corner) {
       add(tag.id, corner, tag.corners_m[static_cast<std::size_t>(corner)]);
     }

@@ -97,7 +97,7 @@ std::string describe_database(const std::string& where) {
   return "postgresql://" + parts["host"] + port + "/" + parts["dbname"];
 }
 
-std::string make_database_identity(const std::string& where) {
+std::string make_records_database_id(const std::string& where) {
   const std::string name = describe_database(where);
   if (!is_server_address(where)) {
     return get_host_name() + ":" + std::filesystem::absolute(name).lexically_normal().string();

@@ -33,7 +33,7 @@ std::string get_host_name();
 ///
 /// A server that is reached without a network has the machine, too. The user's name is included
 /// only if it is the name of the database because none is given. Throws as describe_database().
-std::string make_database_identity(const std::string& where);
+std::string make_records_database_id(const std::string& where);
 
 /// Returns a connection string for SOCI's PostgreSQL backend, with the connection timeout
 /// timeout_s(). SOCI 4.0 reads a string without a parameter as a database name and interprets

@@ -311,7 +311,7 @@ class ForeignScene {
     set_.lamps->spots_m = {{random_.uniform(-0.7, 0.7), random_.uniform(-0.3, 0.3)}};
     set_.lamps->heights_m = {random_.uniform(0.0, 0.7)};
     set_.lamps->yaws_rad = {random_.uniform(0.0, 2 * std::numbers::pi)};
-    scene_.seed = draw_seed(random_);
+    scene_.seed = draw_seed_from(random_);
     draw_clutter();
     draw_random_parts(scene_);
     return make_lamp_shot(scene_, set_, 0);

@@ -57,7 +57,7 @@ TEST(SampleSizeWarnings, WarnsForFewUnits) {
               ElementsAre("there are too few stations with a fix for intervals"));
 }
 
-TEST(LimitWarning, WarnsIfErrorsAreBelowLimit) {
+TEST(LimitWarning, WarnsIfErrorsAreBelowCrlb) {
   Evaluation limited = evaluation(1000);
   EXPECT_EQ(make_limit_warning(limited), "");
   limited.limit = CrlbRatio{0.609, 1e-3, 36, 1.0 / 12};

@@ -95,7 +95,7 @@ std::string make_tiff(const std::vector<std::string>& entries) {
   return bytes + std::string(4, '\0');
 }
 
-TEST(ReadHeaderSize, UsesFirstTagsOfTiff) {
+TEST(ReadHeaderSize, UsesFirstOfRepeatedTagsOfTiff) {
   const std::string width("\0\x01\x04\0\x01\0\0\0\x30\x75\0\0", 12),
       height("\x01\x01\x04\0\x01\0\0\0\x2c\x01\0\0", 12),
       small_width("\0\x01\x04\0\x01\0\0\0\x02\0\0\0", 12),

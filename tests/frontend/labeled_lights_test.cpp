@@ -22,7 +22,7 @@ TEST(AddLabeled, AddsLightsNamedByTable) {
   ASSERT_EQ(images.size(), 2);
   LabeledLights labeled;
   const auto labels = read_detections(kSample + "/true_detections.csv");
-  add_labeled(images, labels, labeled);
+  add_labeled_lights(images, labels, labeled);
   EXPECT_EQ(labeled.labels, 12);
   EXPECT_EQ(labeled.without_light, 0);
   ASSERT_EQ(labeled.lights.size(), 12);
@@ -33,7 +33,7 @@ TEST(AddLabeled, AddsLightsNamedByTable) {
     EXPECT_LT(light.image, 2);
   }
   // A second folder's images have numbers of their own.
-  add_labeled(images, labels, labeled);
+  add_labeled_lights(images, labels, labeled);
   EXPECT_EQ(labeled.lights.back().image, 3);
 }
 
@@ -41,7 +41,7 @@ TEST(AddLabeled, CountsLabelsWithoutLight) {
   auto labels = read_detections(kSample + "/true_detections.csv");
   labels[0].detections[0].pixel.x() += 30;
   LabeledLights labeled;
-  add_labeled(sample_lights(), labels, labeled);
+  add_labeled_lights(sample_lights(), labels, labeled);
   EXPECT_EQ(labeled.without_light, 1);
   EXPECT_EQ(labeled.lights.size(), 11);
 }
@@ -51,7 +51,7 @@ TEST(AddLabeled, RejectsTruncatedLights) {
   const auto labels = read_detections(kSample + "/true_detections.csv");
   images[0].size_px = {int(labels[0].detections[0].pixel.x()), 600};
   LabeledLights labeled;
-  add_labeled(images, labels, labeled);
+  add_labeled_lights(images, labels, labeled);
   EXPECT_GT(labeled.without_light, 0);
 }
 

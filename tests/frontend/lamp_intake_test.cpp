@@ -83,7 +83,7 @@ TEST_F(LampIntakeOfImage, KeepsDarkImageForFixes) {
   EXPECT_TRUE(collect_lamps(image).empty());
 }
 
-TEST(ObserveLamps, RejectsImagesByUse) {
+TEST(ObserveLamps, RejectsRepeatedImagesUnlessUsedForFixes) {
   const TemporaryFolder folder;
   for (const char* name : {"a.png", "b.png"}) {
     std::filesystem::copy_file(kRig + "/sample/0000.png", folder / name);

@@ -36,7 +36,7 @@ TEST(MeasureSignal, ReturnsSmallRatioForPureNoise) {
   }
 }
 
-TEST(MeasureSignal, MatchesContrastOfLamp) {
+TEST(MeasureSignal, ReturnsSignalToNoiseOfLamp) {
   for (const double times : {10., 30., 100.}) {
     constexpr double sd = 50;
     cv::Mat image = noise(2000, sd);

@@ -71,7 +71,7 @@ TEST(Selection, KeepsImagesWithoutLamps) {
             (Reasons{{}, {}}));
 }
 
-TEST(Selection, RejectsCopyOfSeparatelyKeptImage) {
+TEST(Selection, RejectsCopyOfImageAddedByKeep) {
   std::vector images{image_of_lamps("a", kPixels), image_of_lamps("b", kPixels)};
   Selection selection(ImageUse::turn, {});
   selection.keep(images[0]);

@@ -58,7 +58,7 @@ TEST(SigmasOfOneInTenThousand, MatchesNormalDistribution) {
 TEST(StudentBound, IsExceededAsRarelyAsSigmas) {
   for (const double sigmas : kSigmas) {
     for (const double m : kDegreesOfFreedom) {
-      const double tail = student_upper_tail(std::sqrt(student_bound(sigmas, m)), m);
+      const double tail = student_upper_tail(std::sqrt(compute_t_squared_bound(sigmas, m)), m);
       EXPECT_GT(find_sigmas(tail), sigmas - 0.01) << m;
       EXPECT_LT(find_sigmas(tail), sigmas + (m < 8 ? 0.3 : 0.03)) << m;
     }
@@ -78,7 +78,7 @@ TEST(ChiSquaredBound, IsExceededAsRarelyAsSigmas) {
 TEST(StatisticalBounds, ApproachNormalDistribution) {
   constexpr double m = 1e9;
   for (const double sigmas : kSigmas) {
-    EXPECT_NEAR(student_bound(sigmas, m), sigmas * sigmas, 1e-6);
+    EXPECT_NEAR(compute_t_squared_bound(sigmas, m), sigmas * sigmas, 1e-6);
     EXPECT_NEAR((chi_squared_bound(sigmas, m) - m) / std::sqrt(2 * m), sigmas, 1e-3);
   }
 }

@@ -264,7 +264,7 @@ TEST_F(HostileNames, ReadRunReturnsWrittenNames) {
   constexpr int every = 20;  // parsing takes long without optimization
   for (int i = 0; i < kNames; ++i) {
     const std::string name = random_name(random);
-    const std::string text = format_run({run_with(name, i), name});
+    const std::string text = serialize_run({run_with(name, i), name});
     if (i % every != 0) continue;
     const auto json = nlohmann::json::parse(text);
     ASSERT_EQ(json.at("station"), printable_line(name));

@@ -101,7 +101,8 @@ class HostileStation : public SmallStation {
     run.verdict = "INVALID";
     run.causes = "no images\n";
     run.calibration = "format: vlp-calibration/1\n";
-    std::string text = format_run({run, make_database_identity((home / "records.db").string())});
+    std::string text =
+        serialize_run({run, make_records_database_id((home / "records.db").string())});
     const auto at = text.find(from);
     ASSERT_NE(at, std::string::npos) << from;
     write("spool/a.json", text.replace(at, from.size(), to));
@@ -537,8 +538,8 @@ TEST_F(HostileStation, LimitsSizeOfSpoolFiles) {
   long_text.calibration.assign(limit_bytes - 1000, 'x');
   // Runs of other records, so that they are read but not delivered.
   const std::vector<std::pair<std::string, std::string>> files{
-      {"a million values", format_run({large, "elsewhere"})},
-      {"a text of 64 MiB", format_run({long_text, "elsewhere"})},
+      {"a million values", serialize_run({large, "elsewhere"})},
+      {"a text of 64 MiB", serialize_run({long_text, "elsewhere"})},
       {"64 MiB of levels", std::string(limit_bytes - 1, '[') + "\n"},
       {"more than 64 MiB", std::string(limit_bytes + 1, 'x')}};
   const auto script =

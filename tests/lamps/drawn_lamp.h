@@ -13,7 +13,7 @@
 #include "camera/lens.h"
 #include "lamps/light_detector.h"
 #include "lamps/shape/drawn_disc.h"
-#include "lamps/shape/light_shape.h"
+#include "lamps/shape/light_center.h"
 #include "rig/lamp_map.h"
 #include "support/random.h"
 

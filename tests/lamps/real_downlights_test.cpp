@@ -139,7 +139,8 @@ TEST(DetectWithEitherReadout, FindsReadoutOfRealGlows) {
   const fs::path data = real_data("luxapose");
   if (data.empty()) GTEST_SKIP() << "no real captures here";
   const LightDetector by_rows(read_lamp_map(data / "lamps.yaml"), {Readout::rows, 1 / 47540.0, {}});
-  for (const LightDetector& detector : {by_rows, by_rows.with_readout(Readout::columns)}) {
+  for (const LightDetector& detector :
+       {by_rows, by_rows.with_readout_direction(Readout::columns)}) {
     for (const auto& [name, readout, count] :
          {std::tuple("x_0_y_1.27.jpg", Readout::rows, 5),
           std::tuple("2014-02-27--18-15-03-62.jpg", Readout::columns, 3),

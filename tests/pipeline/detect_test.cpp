@@ -68,7 +68,7 @@ TEST_F(VlpDetect, ReportsBothRowTimesIfGivenOneIsWrong) {
 }
 
 /// Two rooms with the same frequencies in one map.
-TEST_F(VlpDetect, IdentifiesLampsOfNamedRoom) {
+TEST_F(VlpDetect, IdentifiesOnlyLampsOfRoomOption) {
   std::istringstream lines(TemporaryFolder::read_content(kRig + "/lamps.yaml"));
   std::string lamps;
   int id = 0;
@@ -266,7 +266,7 @@ TEST_F(VlpDetect, SkipsAndCountsUnusableImages) {
   EXPECT_EQ(CsvTable(folder / "found.csv").rows(), 12);
 }
 
-TEST_F(VlpDetect, ReportsMissingImagesInOneLine) {
+TEST_F(VlpDetect, ReportsErrorInOneLineIfNoLampIsFound) {
   const auto refused = [&](const std::string& images, int exit_code, const std::string& message) {
     const auto result = detect(images);
     EXPECT_EQ(result.exit_code, exit_code);

@@ -37,7 +37,7 @@ double mean(const std::vector<double>& values) {
   return sum / static_cast<double>(values.size());
 }
 
-TEST(Example, MatchesGenerator) {
+TEST(MakeExample, ReproducesCommittedFiles) {
   const TemporaryFolder folder;
   ASSERT_EQ(run_program(VLP_MAKE_EXAMPLE " '" + (folder / "example").string() + "'").exit_code, 0);
   for (const std::string name : {"lamps.yaml", "calibration.yaml", "detections.csv", "truth.csv",

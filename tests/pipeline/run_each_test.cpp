@@ -43,7 +43,7 @@ class RunEach : public testing::Test {
   TemporaryFolder folder;
 };
 
-TEST_F(RunEach, MatchesSeparateRunsOfVlpCalibrate) {
+TEST_F(RunEach, ReportsExitCodeAndErrorsOfSeparateRuns) {
   const auto [code, output, errors] = run(line("nowhere's") + line("\n"));
   EXPECT_EQ(code, 0);
   EXPECT_EQ(errors, "");

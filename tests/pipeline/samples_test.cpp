@@ -76,7 +76,7 @@ TEST_P(RenderedSamples, MatchScene) {
 }
 
 /// As committed: what another system renders is not asked here.
-TEST_P(RenderedSamplesOfDiscs, AreLocated) {
+TEST_P(RenderedSamplesOfDiscs, HaveMeanErrorBelowLimit) {
   const std::string rendered = (dataset / "rendered").string();
   const std::string fixes = (folder / "fixes.csv").string();
   const auto located =

@@ -94,8 +94,8 @@ TEST(ComputeOneLampPose, MatchesTruthWithKnownHeightAndYaw) {
   Random random(6);
   for (int i = 0; i < 100; ++i) {
     const Pose truth = random_pose(random);
-    const auto pose =
-        compute_one_lamp_pose(seen({0.3, -0.4, 2}, truth), {truth.position_m.z(), truth.yaw_rad});
+    const auto pose = compute_pose_at_known_height_and_yaw(seen({0.3, -0.4, 2}, truth),
+                                                           {truth.position_m.z(), truth.yaw_rad});
     ASSERT_TRUE(pose);
     expect_pose(*pose, truth);
   }
@@ -103,8 +103,8 @@ TEST(ComputeOneLampPose, MatchesTruthWithKnownHeightAndYaw) {
 
 TEST(ComputeOneLampPose, ReturnsNulloptWhenLampIsNotAboveCamera) {
   const Sighting sighting = seen({0, 0, 2}, {{0, 0, 0}, 0});
-  EXPECT_FALSE(compute_one_lamp_pose(sighting, {2, 0}));
-  EXPECT_FALSE(compute_one_lamp_pose(sighting, {2.5, 0}));
+  EXPECT_FALSE(compute_pose_at_known_height_and_yaw(sighting, {2, 0}));
+  EXPECT_FALSE(compute_pose_at_known_height_and_yaw(sighting, {2.5, 0}));
 }
 
 }  // namespace

@@ -119,7 +119,7 @@ INSTANTIATE_TEST_SUITE_P(
     name_of_body);
 
 /// A calibration as by vlp-intrinsics: no other part depends on the lens.
-TEST_F(CommonErrorsTest, MatchesFiniteDifferencesForLensAlone) {
+TEST_F(CommonErrorsTest, MatchesFiniteDifferencesIfOnlyLensIsUncertain) {
   rig.calibrate_in_a_row();
   rig.calibration.rotation_center.reset();
   rig.calibration.dispersion.reset();

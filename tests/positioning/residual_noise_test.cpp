@@ -29,7 +29,7 @@ Fix fix_with(double chi_squared, double common_chi_squared, double degrees_of_fr
 
 TEST(SumResiduals, IgnoresFixesWithoutRedundancy) {
   const std::vector<Fix> fixes{fix_with(12, 2, 8), Fix(), fix_with(5, 1, 0), fix_with(6, 0, 4)};
-  const ResidualSums sums = sum_residuals(fixes);
+  const ResidualSums sums = sum_squared_residuals(fixes);
   EXPECT_EQ(sums.degrees_of_freedom, 12);
   EXPECT_EQ(sums.chi_squared, 18);
   EXPECT_EQ(sums.common_chi_squared, 2);
@@ -38,7 +38,7 @@ TEST(SumResiduals, IgnoresFixesWithoutRedundancy) {
 
 TEST(SumResiduals, ExcludesFixWithWrongLamp) {
   const std::vector<Fix> fixes{fix_with(5, 0, 4), fix_with(4, 0, 4), fix_with(3000, 0, 4)};
-  EXPECT_EQ(sum_residuals(fixes).chi_squared, 9);
+  EXPECT_EQ(sum_squared_residuals(fixes).chi_squared, 9);
 }
 
 TEST(EstimateNoiseFactor, SubtractsCommonErrors) {

@@ -61,7 +61,7 @@ std::pair<int, std::string> end_with_full_stdout(const std::function<void()>& ru
   return end;
 }
 
-TEST(RunApp, ReportsFullStdout) {
+TEST(RunApp, ReportsErrorIfStdoutIsFull) {
   for (const std::function<void()>& run : std::vector<std::function<void()>>{
            [] {}, [] { throw GateNotMet("mean_mm"); }, [] { throw Undetermined("add lamps"); }}) {
     const auto [code, said] = end_with_full_stdout(run);
@@ -96,11 +96,11 @@ TEST(Validators, CheckNumbersAndNames) {
   EXPECT_NE(finite()("inf"), "");
   EXPECT_NE(finite()("1 m"), "");
   EXPECT_EQ(finite_not_negative()("0"), "");
-  EXPECT_NE(finite_positive()("0"), "");
+  EXPECT_NE(make_finite_positive_validator()("0"), "");
   EXPECT_EQ(is_plot_file()("a.svg"), "");
   EXPECT_NE(is_plot_file()("a.pdf"), "");
-  EXPECT_EQ(ends_in(".csv")("corners.csv"), "");
-  EXPECT_EQ(ends_in(".csv")("corners.vnl"), "the file's name should end in .csv");
+  EXPECT_EQ(make_ending_validator(".csv")("corners.csv"), "");
+  EXPECT_EQ(make_ending_validator(".csv")("corners.vnl"), "the file's name should end in .csv");
 }
 
 }  // namespace

@@ -14,15 +14,15 @@ Board board_with(const IdOrder& order) {
 /// Returns the ids row by row from the top left.
 std::vector<int> ids_of(const IdOrder& order) {
   std::vector<int> ids;
-  for (const BoardTag& tag : compute_board_layout(board_with(order))) ids.push_back(tag.id);
+  for (const BoardTag& tag : list_board_tags(board_with(order))) ids.push_back(tag.id);
   return ids;
 }
 
-TEST(ComputeBoardLayout, PlacesMarkersInWhiteSquares) {
+TEST(ListBoardTags, PlacesMarkersInWhiteSquares) {
   Board board{"DICT_4X4_50", 5, 4, 0.01, 1, 1, false, 3, {false, BoardCorner::top_left}};
   board.kind = BoardKind::charuco;
   board.square_size_m = 0.02;
-  const auto markers = compute_board_layout(board);
+  const auto markers = list_board_tags(board);
   ASSERT_EQ(markers.size(), 10U);
   // The first inner corner is the origin; the marker is in the square right of the first one.
   EXPECT_EQ(markers[0].id, 3);
@@ -33,10 +33,10 @@ TEST(ComputeBoardLayout, PlacesMarkersInWhiteSquares) {
   EXPECT_EQ(tag_field_m(board), Eigen::Vector2d(0.06, 0.04));
   EXPECT_EQ(square_corners_m(board).back(), Eigen::Vector2d(0.06, 0.04));
   board.top_left_white = true;
-  EXPECT_NEAR(compute_board_layout(board)[0].corners_m[3].x(), -0.015, 1e-12);
+  EXPECT_NEAR(list_board_tags(board)[0].corners_m[3].x(), -0.015, 1e-12);
 }
 
-TEST(ComputeBoardLayout, CountsIdsInIdOrder) {
+TEST(ListBoardTags, AssignsIdsByIdOrderOfBoard) {
   using enum BoardCorner;
   EXPECT_EQ(ids_of({false, top_left}), (std::vector{10, 11, 12, 13, 14, 15}));
   EXPECT_EQ(ids_of({false, top_right}), (std::vector{12, 11, 10, 15, 14, 13}));
@@ -48,11 +48,11 @@ TEST(ComputeBoardLayout, CountsIdsInIdOrder) {
   EXPECT_EQ(ids_of({true, bottom_right}), (std::vector{15, 13, 11, 14, 12, 10}));
 }
 
-TEST(ComputeBoardLayout, PlacesTagsAtPitch) {
+TEST(ListBoardTags, PlacesTagsAtPitch) {
   const Board board = board_with({false, BoardCorner::top_left});
   EXPECT_DOUBLE_EQ(compute_tag_pitch_m(board), 0.03);
   EXPECT_TRUE(tag_field_m(board).isApprox(Eigen::Vector2d(0.08, 0.05)));
-  const BoardTag last = compute_board_layout(board).back();
+  const BoardTag last = list_board_tags(board).back();
   const auto [bottom_left, bottom_right, top_right, top_left] = last.corners_m;
   EXPECT_TRUE(bottom_left.isApprox(Eigen::Vector2d(0.06, 0.05)));
   EXPECT_TRUE(bottom_right.isApprox(Eigen::Vector2d(0.08, 0.05)));

@@ -134,7 +134,7 @@ LocateInput room_with_a_moved_lamp(double by_m) {
   return input;
 }
 
-TEST(LocateFrames, ReportsRejectedLampWithOffset) {
+TEST(LocateFrames, WarnsOfMovedLampWithDisplacement) {
   const LocateResult found = locate_frames(room_with_a_moved_lamp(0.03));
   EXPECT_THAT(found.warnings,
               testing::Contains("lamp 2 hangs 30 mm from where the map has it (x +30 mm, y +0 mm): "
@@ -181,7 +181,7 @@ TEST(LocateFrames, WarnsOfLampsOutsideCalibratedRegion) {
   }
 }
 
-TEST(LocateFrames, FailsWithoutFix) {
+TEST(LocateFrames, ReturnsUndeterminedIfNoFrameHasFix) {
   LocateInput input = example();
   for (Frame& frame : input.frames) frame.detections.resize(1);
   const LocateResult found = locate_frames(input);

@@ -30,7 +30,7 @@ LensResult solve_with_grid(const SplineGrid& grid) {
   return solve_lens(input, {});
 }
 
-TEST(SolveLensNarrowGrid, FailsWithProposedGrid) {
+TEST(SolveLensNarrowGrid, ProposesWiderSplineGrid) {
   const LensResult result = solve_with_grid({3, 12, 12, 100});
   ASSERT_FALSE(result.ok());
   EXPECT_THAT(result.why,

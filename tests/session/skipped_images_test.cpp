@@ -21,7 +21,7 @@ std::vector<std::string> lines(const std::vector<SkippedImage>& skipped) {
   return lines;
 }
 
-TEST(SkippedImages, OmitsFolderOfImages) {
+TEST(SkippedImages, OmitsFolderFromNamesInSingleFolder) {
   EXPECT_THAT(lines(skipped_images({Observation{"f/a.png"},
                                     rejected("f/b.png", RejectionReason::unreadable, "is empty"),
                                     rejected("f/c.png", RejectionReason::blurred, "is 3: large")})),

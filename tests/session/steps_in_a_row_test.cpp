@@ -177,7 +177,7 @@ TEST(SolveLeveling, LensJacobianPredictsChange) {
 
 class SequentialCalibrationFixes : public testing::TestWithParam<PlaceOf> {};
 
-TEST_P(SequentialCalibrationFixes, CovarianceMatchesErrors) {
+TEST_P(SequentialCalibrationFixes, FixCovarianceMatchesErrors) {
   constexpr int trials = 40;
   Random random(3);
   NeesStatistics whole, common;

@@ -132,7 +132,7 @@ TEST_P(FrameRendererBoard, TrueCornersMatchMrcalProjection) {
   const MrcalOracle mrcal(std::string(to_string(scene_.camera.lens_model)),
                           scene_.camera.intrinsics);
   const BoardShot shot = make_board_shot(scene_, views_, 1);
-  const auto layout = compute_board_layout(scene_.board->print);
+  const auto layout = list_board_tags(scene_.board->print);
   const Eigen::Vector2d field_m = tag_field_m(scene_.board->print);
   const auto truth = find_true_corners(scene_, renderer, shot);
   ASSERT_FALSE(truth.empty());

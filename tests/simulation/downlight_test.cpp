@@ -134,7 +134,7 @@ TEST_F(FrameRendererDownlight, ChipsMatchTheirEquation) {
   }
 }
 
-TEST_F(FrameRendererDownlight, MatchesRecessEquationInObliqueView) {
+TEST_F(FrameRendererDownlight, MatchesRecessModelInObliqueView) {
   Recess recess{0.06, 0.03, 0.1, {}};
   recess.source_power = 1.5;
   recess.rim_power = 3;

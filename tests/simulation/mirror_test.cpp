@@ -113,7 +113,7 @@ TEST_F(FrameRendererMirror, ReflectsDarkSideOfRecess) {
   EXPECT_LT(cv::norm(image, cv::Mat1f(0.2 * moved), cv::NORM_INF), 0.01);
 }
 
-TEST_F(FrameRendererMirror, CeilingReflectsUpperFaceOfDiscButNotOfRecess) {
+TEST_F(FrameRendererMirror, GlossyCeilingShowsDiscButNotRecessedLamp) {
   // A glossy ceiling 20 cm above the lamp: its mirror image is at 1.8 + 0.2 m, 1.9 m above.
   scene_.clutter.mirrors = {{{{-1, -1, 1.8}, {2, 0, 0}, {0, 2, 0}, 0}, 0.2}};
   scene_.lamps[0].glow.position_m.x() = 0.5;

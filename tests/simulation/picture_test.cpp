@@ -52,7 +52,7 @@ TEST(Expose, IsUnchangedByGammaOne) {
 
 const ImageProcessing kBayer{1, {}, {}, Bayer{0.5, 0.25}};
 
-TEST(ExposeBayer, ReturnsGrayForUniformLight) {
+TEST(ExposeBayer, ReturnsGrayColorImageForUniformLight) {
   const cv::Mat image = expose(kSensor, cv::Mat1f(20, 40, 200), 1, kBayer);
   ASSERT_EQ(image.type(), CV_8UC3);
   EXPECT_TRUE(same(image, cv::Mat(image.size(), CV_8UC3, cv::Scalar::all(100))));

@@ -139,7 +139,7 @@ TEST(ReadScene, ReadsSpotsInOrderOfFile) {
   EXPECT_EQ(count_shots(set), 2U * 2 * 2 * 3);
 }
 
-TEST(ReadScene, OrdersGridRowByRowFromFirstCorner) {
+TEST(ReadScene, OrdersCaptureSpotsRowByRow) {
   const LampShots captures = read_scene_text(kSceneYaml).sets.at(1).lamps.value();
   const std::vector<Vector2d> expected{{-0.6, 0.3},  {0, 0.3},  {0.6, 0.3},
                                        {-0.6, -0.3}, {0, -0.3}, {0.6, -0.3}};

@@ -19,7 +19,7 @@ CaptureSet turning() {
   return {"turning", 5e-5, captures, {}};
 }
 
-TEST(LampShot, IteratesRepeatsThenYawsThenSpotsThenHeights) {
+TEST(LampShot, IteratesRepeatsFastestAndHeightsSlowest) {
   const Scene scene = plain_scene();
   const CaptureSet set = turning();
   ASSERT_EQ(count_shots(set), 2 * 2 * 3 * 2);

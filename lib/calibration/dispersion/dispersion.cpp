@@ -67,7 +67,7 @@ void fit_chen_guan(DispersionFit& fit, const ReferencePointFixes& station,
 
 void fit_camera(DispersionFit& fit, const ReferencePointFixes& station,
                 const Eigen::Vector2d& focal_px, DispersionCircle kind) {
-  const auto separation = separate_offsets(station);
+  const auto separation = separate_camera_and_world_offsets(station);
   if (!separation) {
     fit.status = DispersionStatus::diverged;
     return;
@@ -115,7 +115,7 @@ DispersionFit fit_dispersion(std::span<const ReferencePointCapture> captures, co
   if (count == 0) return fit;
   const bool paper = method == DispersionMethod::paper;
   const std::vector<bool> all(fixes.size(), true);
-  if (are_all_far(fixes)) {
+  if (are_all_fixes_far(fixes)) {
     fit.status = DispersionStatus::station_far;
   } else if (count < (paper ? 2 : 3)) {
     fit.status = DispersionStatus::too_few_captures;

@@ -156,7 +156,8 @@ LampDerivatives propagate_map(const ReferencePointFixes& fixes, const OffsetSepa
 
 }  // namespace
 
-std::optional<OffsetSeparation> separate_offsets(const ReferencePointFixes& fixes) {
+std::optional<OffsetSeparation> separate_camera_and_world_offsets(
+    const ReferencePointFixes& fixes) {
   OffsetSeparation result;
   result.used.resize(fixes.at(result.offset_px).size());
   if (!approach(fixes, result)) return std::nullopt;

@@ -36,7 +36,7 @@ struct OffsetSeparation {
 ///
 /// Returns std::nullopt if the captures do not determine the unknowns, or if the iterations do not
 /// converge.
-std::optional<OffsetSeparation> separate_offsets(const ReferencePointFixes& fixes);
+std::optional<OffsetSeparation> separate_camera_and_world_offsets(const ReferencePointFixes& fixes);
 
 /// Number of standard deviations beyond which a fix is an outlier, for a known variance
 /// (planar_outlier_bound()).

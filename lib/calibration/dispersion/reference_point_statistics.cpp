@@ -20,7 +20,7 @@ constexpr double kMaxErrorFraction = 0.2;  // of the lamps' height
 /// Computes q of compute_variance_factor().
 double compute_student_factor(double degrees_of_freedom) {
   constexpr double sigmas_of_95_percent = 1.96;
-  return student_bound(sigmas_of_95_percent, degrees_of_freedom) /
+  return compute_t_squared_bound(sigmas_of_95_percent, degrees_of_freedom) /
          (sigmas_of_95_percent * sigmas_of_95_percent);
 }
 
@@ -69,7 +69,7 @@ bool is_at_one_yaw_without_one(const OptionalFixes& fixes, std::vector<bool> use
   return false;
 }
 
-bool are_all_far(const OptionalFixes& fixes) {
+bool are_all_fixes_far(const OptionalFixes& fixes) {
   return std::all_of(fixes.begin(), fixes.end(), [](const auto& fix) {
     return !fix || fix->error_m.norm() > kMaxErrorFraction * fix->height_m;
   });

@@ -38,7 +38,7 @@ bool is_at_one_yaw_without_one(const OptionalFixes& fixes, std::vector<bool> use
 
 /// Returns true if every fix is farther from the reference point than a camera tilted by 11 degrees
 /// would be.
-bool are_all_far(const OptionalFixes& fixes);
+bool are_all_fixes_far(const OptionalFixes& fixes);
 
 /// Degrees of freedom assigned to given noise: its standard deviation is accurate to 29 %, 1 /
 /// sqrt(12).
@@ -48,9 +48,9 @@ inline constexpr double kStatedFreedom = 6;
 /// errors.
 ///
 /// The residuals have the variance s^2 = `ratio` times the nominal one, with nu degrees of freedom;
-/// q(m) = (t_m / 1.96)^2 with a bound t_m of Student's t at 97.5 % (student_bound). If the noise is
-/// not stated the factor is ratio q(nu). Given noise counts as an estimate with
-/// n = kStatedFreedom:
+/// q(m) = (t_m / 1.96)^2 with a bound t_m of Student's t at 97.5 % (compute_t_squared_bound). If
+/// the noise is not stated the factor is ratio q(nu). Given noise counts as an estimate with n =
+/// kStatedFreedom:
 ///   f = max(1, (n + nu ratio) / (n + nu) q(n + nu)),
 /// and if the residuals contradict it, f (ratio q(nu) / f)^w where that is larger: w rises from 0
 /// to 1 with chi-squared between its bounds of 20 % and 5 %, so that the factor is continuous.

@@ -129,7 +129,7 @@ std::optional<LayoutFit::Line> fit_pitch_line(
 LayoutFit fit_layout(const Board& board, const std::vector<Step>& steps) {
   constexpr double straight = 0.25;       // off the way, of its length
   std::map<int, Eigen::Vector2d> places;  // in pitches
-  for (const BoardTag& tag : compute_board_layout(board)) {
+  for (const BoardTag& tag : list_board_tags(board)) {
     places[tag.id] = tag.corners_m[3] / compute_tag_pitch_m(board);
   }
   std::vector<double> pitches;

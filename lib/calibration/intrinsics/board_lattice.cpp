@@ -58,7 +58,7 @@ BoardLattice::BoardLattice(const Board& board)
   cols_ = uniform ? 2 * board.cols : board.cols;
   rows_ = uniform ? 2 * board.rows : board.rows;
   spacing_m_ = uniform ? board.tag_size_m : compute_tag_pitch_m(board);
-  const auto tags = compute_board_layout(board);
+  const auto tags = list_board_tags(board);
   for (std::size_t i = 0; i < tags.size(); ++i) {
     const int index = static_cast<int>(i);
     tag_positions_[tags[i].id] = {index % board.cols, index / board.cols, tags[i].corners_m};

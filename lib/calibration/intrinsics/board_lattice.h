@@ -60,7 +60,7 @@ class BoardLattice {
   }
   /// Returns the index of the tag of a point. The corners of a tag share its edges and therefore
   /// have correlated errors. On a board of squares each point is a group of its own.
-  std::size_t tag_index(std::size_t point) const {
+  std::size_t find_tag_of_point(std::size_t point) const {
     if (has_squares_ || parts_ > 1) return point;
     const auto cols = static_cast<std::size_t>(cols_);
     return point / cols / 2 * (cols / 2) + point % cols / 2;

@@ -32,8 +32,8 @@ std::vector<Eigen::Vector3d> make_board_points(const BoardProblem& problem) {
 
 }  // namespace
 
-std::optional<PrintEffect> compute_print_effect(const IntrinsicsSolution& solution, double print_sd,
-                                                const ImageRegion& region) {
+std::optional<PrintEffect> compute_aspect_error_effect(const IntrinsicsSolution& solution,
+                                                       double print_sd, const ImageRegion& region) {
   const double aspect_error = std::numbers::sqrt2 * print_sd;
   const Lens lens = solution.lens();
   BoardProblem problem = solution.problem;

@@ -117,7 +117,7 @@ std::vector<double> compute_held_out_rms_px(const IntrinsicsSolution& solution,
     apply_lens_edge_curvature(view, lens);
     view = held_out.lattice.with_warp(std::move(view), solution.problem.warp_m);
   }
-  const auto shifts = estimate_edge_shifts(views, lens);
+  const auto shifts = estimate_tag_edge_shifts(views, lens);
   std::vector<double> rms_px;
   for (std::size_t i = 0; i < views.size(); ++i) {
     correct_edge_shift(views[i], shifts[i]);

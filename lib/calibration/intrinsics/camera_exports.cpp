@@ -25,7 +25,7 @@ std::vector<double> make_camera_matrix(const Camera& camera) {
 }
 
 /// Returns the distortion coefficients in the order of OpenCV, which mrcal shares, padded with
-/// zeros to at least `least`.
+/// zeros to at least `min_count`.
 std::vector<double> pad_distortions(const Camera& camera, std::size_t min_count) {
   std::vector<double> values(camera.intrinsics.begin() + 4, camera.intrinsics.end());
   if (values.size() < min_count) values.resize(min_count, 0);

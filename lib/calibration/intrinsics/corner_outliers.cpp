@@ -16,7 +16,7 @@ constexpr std::size_t kNeighbors = 8;
 
 using Corners = std::vector<BoardLattice::Corner>;
 
-/// Returns the nearest corners on the board, without those in `out`.
+/// Returns the nearest corners on the board, without those in `is_outlier`.
 std::vector<std::size_t> find_nearest(const Corners& corners, const std::vector<bool>& is_outlier,
                                       std::size_t middle) {
   std::vector<std::pair<double, std::size_t>> away;

@@ -30,7 +30,7 @@ double compute_typical(std::span<const CornerError> errors, const Property& prop
 
 }  // namespace
 
-CornerVariance estimate_corner_variance(std::span<const CornerError> errors) {
+CornerVariance estimate_variance_components(std::span<const CornerError> errors) {
   constexpr int max_iterations = 10;
   constexpr double min_fraction = 0.002;  // of the mean square: no corner dominates
   // Starts with half of the variance from pixel noise. Started with the floor alone, one corner
@@ -64,14 +64,14 @@ CornerVariance estimate_corner_variance(std::span<const CornerError> errors) {
 
 CornerWeights::CornerWeights(std::span<const CornerError> known,
                              std::span<const CornerError> unknown)
-    : variance_(estimate_corner_variance(known)), mean_px2_(0) {
+    : variance_(estimate_variance_components(known)), mean_px2_(0) {
   for (const auto& [square_px2, sd_px] : known) {
     mean_px2_ += std::min(square_px2, kMaxSigmas * kMaxSigmas * variance_.at(sd_px)) /
                  static_cast<double>(known.size());
   }
   unknown_px2_ = mean_px2_;
   if (std::ranges::any_of(unknown, [](const auto& error) { return error.square_px2 > 0; })) {
-    unknown_px2_ = std::max(mean_px2_, estimate_corner_variance(unknown).at(0));
+    unknown_px2_ = std::max(mean_px2_, estimate_variance_components(unknown).at(0));
   }
 }
 

@@ -25,7 +25,7 @@ struct ShiftEquations {
   EdgeShift shift;
   bool is_valid = false;
 
-  /// Solves with priors: the terms of the shift are `usual`, with the given weights.
+  /// Solves with priors: the terms of the shift are `prior`, with the given weights.
   EdgeShift solve_with_prior(const Eigen::Vector4d& prior, const Eigen::Vector4d& weights) const {
     Square all = normal;
     Column sum = right;
@@ -71,7 +71,7 @@ ShiftEquations make_equations(const std::vector<BoardLattice::Corner>& corners, 
 
 }  // namespace
 
-std::vector<EdgeShift> estimate_edge_shifts(
+std::vector<EdgeShift> estimate_tag_edge_shifts(
     std::span<const std::vector<BoardLattice::Corner>> views, const Lens& lens, ShiftForm form) {
   // Corner noise of 0.05 px; shifts differ by 0.1 px from view to view and within a view.
   constexpr double weight = 0.25, none = 1e-6, all = 1e9;

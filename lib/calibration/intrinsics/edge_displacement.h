@@ -43,7 +43,7 @@ enum class ShiftForm { constant, varying };
 ///
 /// Use ShiftForm::constant as long as the warp of the board is unknown: a varying shift would
 /// absorb it.
-std::vector<EdgeShift> estimate_edge_shifts(
+std::vector<EdgeShift> estimate_tag_edge_shifts(
     std::span<const std::vector<BoardLattice::Corner>> views, const Lens& lens,
     ShiftForm form = ShiftForm::varying);
 

@@ -63,9 +63,9 @@ IntrinsicsSolution solve_intrinsics(const IntrinsicsInput& input) {
     if (!solver.start(focal_px)) continue;
     solver.initialize_symmetric();
     if (!solver.refine() || !solver.scale_regularization() || !solver.apply_edge_curvature() ||
-        !solver.correct_edge_shifts(ShiftForm::constant) || !solver.solve_board_warp() ||
+        !solver.correct_tag_edge_shifts(ShiftForm::constant) || !solver.solve_board_warp() ||
         !solver.reweight_corners() || !solver.apply_edge_curvature() ||
-        !solver.correct_edge_shifts(ShiftForm::varying) || !solver.reweight_corners() ||
+        !solver.correct_tag_edge_shifts(ShiftForm::varying) || !solver.reweight_corners() ||
         !solver.scale_regularization() || !solver.reject_outliers() ||
         !solver.scale_regularization() || !solver.align_frame_to_optical_axis()) {
       continue;

@@ -51,7 +51,7 @@ struct IntrinsicsSolution {
   };
   std::vector<Dropped> dropped;
   /// Mean shift of the tag edges towards the dark in each of `views`, px. The corners are corrected
-  /// for it (estimate_edge_shifts()).
+  /// for it (estimate_tag_edge_shifts()).
   std::vector<double> edge_shifts_px;
   /// RMS of the weighted residuals per axis, without outliers: sqrt(sum of squares / (2 corners)),
   /// px.
@@ -81,7 +81,7 @@ struct IntrinsicsSolution {
 ///   that fit no pose. Splined lenses: see below.
 /// 4. Corrects the corners of the tags for the edge curvature of this lens
 /// (apply_lens_edge_curvature()).
-/// 5. Corrects the shift of the tag edges, constant over a view (estimate_edge_shifts()), and
+/// 5. Corrects the shift of the tag edges, constant over a view (estimate_tag_edge_shifts()), and
 /// solves again,
 ///   at most twice.
 /// 6. Estimates the warp of the board (WarpChoice).

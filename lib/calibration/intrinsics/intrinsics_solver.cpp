@@ -184,13 +184,13 @@ bool IntrinsicsSolver::apply_edge_curvature() {
   return solve(solved_for_);
 }
 
-bool IntrinsicsSolver::correct_edge_shifts(ShiftForm form) {
+bool IntrinsicsSolver::correct_tag_edge_shifts(ShiftForm form) {
   constexpr int max_iterations = 2;
   constexpr double tolerance_px = 0.002;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
     auto views = input_.views;
     for (auto& view : views) view = input_.lattice.with_warp(std::move(view), problem_.warp_m);
-    const auto shifts = estimate_edge_shifts(views, lens(), form);
+    const auto shifts = estimate_tag_edge_shifts(views, lens(), form);
     if (std::all_of(shifts.begin(), shifts.end(), [](const EdgeShift& shift) {
           return shift.coefficients.lpNorm<Eigen::Infinity>() < tolerance_px;
         })) {
@@ -373,9 +373,10 @@ std::set<IntrinsicsSolver::CornerOfView> IntrinsicsSolver::find_displaced_corner
   for (const auto& [outlier, px] : deviations_px) {
     if (px <= limit_px) continue;
     const auto& corners = input_.views[outlier.first];
-    const std::size_t tag = input_.lattice.tag_index(corners[outlier.second].point);
+    const std::size_t tag = input_.lattice.find_tag_of_point(corners[outlier.second].point);
     for (std::size_t k = 0; k < corners.size(); ++k) {
-      if (input_.lattice.tag_index(corners[k].point) == tag) found.insert({outlier.first, k});
+      if (input_.lattice.find_tag_of_point(corners[k].point) == tag)
+        found.insert({outlier.first, k});
     }
   }
   // A view with many such corners is not improved by its other corners.

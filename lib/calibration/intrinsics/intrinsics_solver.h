@@ -31,9 +31,9 @@ class IntrinsicsSolver {
   /// Stages 4 and 7: applies apply_lens_edge_curvature() to all views and solves again.
   bool apply_edge_curvature();
   /// Stages 5 (ShiftForm::constant) and 7 (ShiftForm::varying): corrects the corners for
-  /// estimate_edge_shifts() and solves again, at most twice, until the terms of the shifts are
+  /// estimate_tag_edge_shifts() and solves again, at most twice, until the terms of the shifts are
   /// below 0.002 px.
-  bool correct_edge_shifts(ShiftForm form);
+  bool correct_tag_edge_shifts(ShiftForm form);
   /// Stage 6: estimates the warp of the board if WarpChoice permits it.
   bool solve_board_warp();
   /// Stage 7: weights the corners by their variances (CornerWeights) if standard deviations of some

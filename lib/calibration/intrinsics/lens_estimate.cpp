@@ -269,7 +269,7 @@ void add_uncertainty(const SplitViews& views, const std::optional<FisheyeFit>& f
   result.lattice = views.solved.lattice;
   result.sharpness = measure_sharpness(result.views, views.solved.imager_px);
   std::optional<PrintEffect> print;
-  if (print_sd > 0) print = compute_print_effect(solution, print_sd, result.report.region);
+  if (print_sd > 0) print = compute_aspect_error_effect(solution, print_sd, result.report.region);
   if (print) {
     CalibrationReport& report = result.report;
     result.print_px = print->rms_px;

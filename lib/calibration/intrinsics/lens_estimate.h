@@ -53,8 +53,9 @@ struct LensEstimate {
   /// Model that fits clearly better than the requested one, or equally well if the board is seen
   /// near a right angle off the axis.
   std::optional<LensModel> better_model = {};
-  /// Change of projections by one standard deviation of the board's print (compute_print_effect()),
-  /// RMS over the image, px; std::nullopt if Board::print_sd is 0 or the solve fails.
+  /// Change of projections by one standard deviation of the board's print
+  /// (compute_aspect_error_effect()), RMS over the image, px; std::nullopt if Board::print_sd is 0
+  /// or the solve fails.
   std::optional<double> print_px = {};
   /// Lattice of the corners in `solution`. Covariance of the intrinsics including the bias of the
   /// regularization and the print of the board; std::nullopt for splined lenses and if not finite.

@@ -83,7 +83,7 @@ class CornerTable {
     if (words.size() == 4) row.weight = parse_weight(line, fourth);
     if (x && y && *x >= 0 && *y >= 0 && row.weight > 0) {
       row.pixel = {*x, *y};
-      const std::string outside = describe_outside(*row.pixel, imager_px_);
+      const std::string outside = describe_outside_corner(*row.pixel, imager_px_);
       ++num_seen_;
       if (!outside.empty() && num_outside_++ == 0) first_outside_ = error(line, outside);
     }

@@ -37,7 +37,8 @@ Eigen::MatrixXd sum_by_tags(const Eigen::MatrixXd& by_residual, const Eigen::Vec
       Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(views * points), by_residual.cols());
   for (Eigen::Index i = 0; i < corners; ++i) {
     const auto corner = static_cast<std::size_t>(i);
-    const std::size_t tag = corner / points_per_view * points + lattice.tag_index(corner % points);
+    const std::size_t tag =
+        corner / points_per_view * points + lattice.find_tag_of_point(corner % points);
     sums.row(static_cast<Eigen::Index>(tag)) +=
         residuals_px.segment<2>(2 * i).transpose() * by_residual.middleRows<2>(2 * i);
   }

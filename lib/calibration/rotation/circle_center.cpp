@@ -96,7 +96,7 @@ void reject_gross_outliers(Trace& trace, double focal_px, std::vector<RotationOu
     for (const double one : off) squares.push_back(one * one);
     const double variance =
         std::max(robust_linear_variance(std::move(squares), freedom), rounding * rounding);
-    limit = std::sqrt(linear_outlier_bound(kOutlierSigmas, freedom) * variance);
+    limit = std::sqrt(compute_squared_outlier_bound_1d(kOutlierSigmas, freedom) * variance);
     std::vector<Eigen::Vector2d> near;
     near.reserve(off.size());
     for (std::size_t i = 0; i < off.size(); ++i) {
@@ -128,7 +128,8 @@ bool reject_worst(Trace& trace, const Circle& circle, double focal_px,
   const double variance =
       std::max(fit->rms * fit->rms * count / freedom, rounding * rounding) * (1 + 3 / count);
   const double distance = compute_distances(fit->circle, {trace.points[worst]}).front();
-  if (distance * distance <= student_bound(kOutlierSigmas, freedom) * variance) return false;
+  if (distance * distance <= compute_t_squared_bound(kOutlierSigmas, freedom) * variance)
+    return false;
   reject(trace, worst, distance * focal_px, outliers);
   return true;
 }

@@ -23,7 +23,7 @@ std::vector<double> collect_yaws(const RotationCaptures& rotation);
 std::vector<const double*> pointers_to(const std::vector<double>& values);
 
 /// Sets residual_px, outliers and used_observations of `result` from a fit.
-/// @pre the residual blocks of `fit` are the observations of `spot`, in the same order
+/// @pre the residual blocks of `fit` are the observations of `rotation`, in the same order
 void set_statistics(RotationFit& result, const RobustFit& fit, const RotationCaptures& rotation);
 
 }  // namespace vlp

@@ -11,7 +11,8 @@ namespace vlp {
 /// center", method `joint`). The model is that of eq. 9 with one angle per capture that all lamps
 /// share.
 ///
-/// Minimizes the squared distances of the lamps, in the image, from
+/// Minimizes the distances of the lamps in the image, in standard deviations, with a Cauchy loss
+/// and rejection of outliers (robust_fit.h), from
 ///   z_ik = c + e^{-jg_k} q_ih
 /// over
 ///   c     center

@@ -14,7 +14,7 @@
 
 namespace vlp {
 
-/// Position fixes of the captures that have one, with the index of their frame. A spot is the set
+/// Position fixes of the captures that have one, with the index of their frame. A pivot is the set
 /// of fixes at one height; each height may have another axis.
 struct PivotFixes {
   std::vector<std::size_t> frames;
@@ -22,32 +22,32 @@ struct PivotFixes {
   std::size_t num_pivots = 1;
 };
 
-/// Number of captures of a spot and the angular range of their yaws.
+/// Number of captures of a pivot and the angular range of their yaws.
 struct PivotArc {
   std::size_t captures;
   double arc_rad;
 };
 
-/// Smallest number of captures of a spot.
+/// Smallest number of captures of a pivot.
 inline constexpr std::size_t kMinCaptures = 3;
 
-/// Assigns the fixes to spots by their height, from the lowest height of the camera up. Changes
-/// RotationFix::spot and PivotFixes::spots. See RotationCaptures for the criterion.
+/// Assigns the fixes to pivots by their height, from the lowest height of the camera up. Changes
+/// RotationFix::pivot and PivotFixes::num_pivots. See RotationCaptures for the criterion.
 ///
 /// @param noise_m  standard deviation of the height of a fix
 void cluster_by_height(PivotFixes& fixes, double noise_m);
 
-/// Counts the captures of each spot and computes their angular ranges.
+/// Counts the captures of each pivot and computes their angular ranges.
 std::vector<PivotArc> compute_pivot_arcs(const PivotFixes& fixes);
 
-/// Returns `ok` if at least one spot determines a center, otherwise the reason why none does.
+/// Returns `ok` if at least one pivot determines a center, otherwise the reason why none does.
 RotationStatus find_status(const std::vector<PivotArc>& arcs);
 
-/// Removes spots with too few captures or too small an angular range. `arcs` is
+/// Removes pivots with too few captures or too small an angular range. `arcs` is
 /// compute_pivot_arcs(fixes).
 void reject_weak_pivots(PivotFixes& fixes, const std::vector<PivotArc>& arcs);
 
-/// Returns the upper median of the heights of a spot, as in RotationFix::height_m.
+/// Returns the upper median of the heights of a pivot, as in RotationFix::height_m.
 double compute_median_height(const PivotFixes& fixes, std::size_t pivot);
 
 /// Iterative search for the rotation in place; see RotationCaptures. Each iteration locates all

@@ -61,7 +61,7 @@ std::vector<PointDetection> collect_corners(const BoardDetection& seen) {
 }
 
 BoardDetector::BoardDetector(const Board& board) {
-  for (const BoardTag& tag : compute_board_layout(board)) ids_.insert(tag.id);
+  for (const BoardTag& tag : list_board_tags(board)) ids_.insert(tag.id);
   if (board.kind != BoardKind::chessboard) {
     const bool aruco = board.corner_squares || board.has_squares();
     finder_ = aruco ? make_aruco_finder(board) : make_apriltag_finder(board);
@@ -104,7 +104,7 @@ BoardDetection BoardDetector::detect_squares(const cv::Mat1b& levels) const {
       seen.tags.push_back(same.front());
     }
   }
-  seen.points = squares_->detect_beside(seen.tags, gray);
+  seen.points = squares_->detect_corners_near_markers(seen.tags, gray);
   return seen;
 }
 

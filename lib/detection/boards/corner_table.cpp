@@ -110,7 +110,8 @@ std::string describe_wrong_rows(const Board& board, std::span<const ImageCorners
 
 }  // namespace
 
-std::string describe_outside(const Eigen::Vector2d& pixel, const std::array<int, 2>& imager_px) {
+std::string describe_outside_corner(const Eigen::Vector2d& pixel,
+                                    const std::array<int, 2>& imager_px) {
   constexpr double edge = 0.5;  // half a pixel
   const auto [width, height] = imager_px;
   if (pixel.x() >= -edge && pixel.y() >= -edge && pixel.x() <= width - edge &&
@@ -166,7 +167,7 @@ class CornerTableReader {
     }
     const Eigen::Vector2d pixel(csv_.number(row, u_px_), csv_.number(row, v_px_));
     ++corners_;
-    if (const auto words = describe_outside(pixel, imager_px_); !words.empty()) {
+    if (const auto words = describe_outside_corner(pixel, imager_px_); !words.empty()) {
       if (outside_++ == 0) first_outside_ = csv_.error(row, u_px_, words);
     }
     const int corner = read_number(row);
@@ -229,7 +230,7 @@ std::vector<BoardView> read_corner_table(const std::filesystem::path& file, cons
       throw InputError(file, words);
   }
   std::set<int> ids;
-  for (const BoardTag& tag : compute_board_layout(board)) ids.insert(tag.id);
+  for (const BoardTag& tag : list_board_tags(board)) ids.insert(tag.id);
   std::vector<BoardView> views;
   for (ImageCorners& corners : images) {
     const std::string name = corners.image;

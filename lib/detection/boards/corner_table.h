@@ -36,7 +36,8 @@ void write_corner_table(const std::filesystem::path& file, std::span<const Board
                         const Board& board);
 
 /// Describes that a corner is outside the image; empty if it is inside.
-std::string describe_outside(const Eigen::Vector2d& pixel, const std::array<int, 2>& imager_px);
+std::string describe_outside_corner(const Eigen::Vector2d& pixel,
+                                    const std::array<int, 2>& imager_px);
 
 /// Returns true if more than 2 % of the corners are outside the image. Fewer may be outliers; more
 /// indicate an image of another size.

@@ -53,7 +53,7 @@ SquareCorners::SquareCorners(const Board& board)
       rows_(board.rows - 1),
       square_size_m_(board.square_size_m),
       margin_m_((board.square_size_m - board.tag_size_m) / 2),
-      layout_(compute_board_layout(board)) {}
+      layout_(list_board_tags(board)) {}
 
 std::vector<PointDetection> SquareCorners::refine(const std::vector<Guess>& guesses,
                                                   const GrayLevels& image) const {
@@ -116,8 +116,8 @@ std::vector<PointDetection> SquareCorners::detect_chessboard(const GrayLevels& i
   return corners.size() == guesses.size() ? corners : std::vector<PointDetection>();
 }
 
-std::vector<PointDetection> SquareCorners::detect_beside(const std::vector<TagDetection>& markers,
-                                                         const GrayLevels& image) const {
+std::vector<PointDetection> SquareCorners::detect_corners_near_markers(
+    const std::vector<TagDetection>& markers, const GrayLevels& image) const {
   constexpr std::size_t max_markers = 4;
   constexpr double adjacent = 0.8, near = 2.2;  // in squares
   constexpr double max_marker_error =

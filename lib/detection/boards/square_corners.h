@@ -26,8 +26,8 @@ class SquareCorners {
   std::vector<PointDetection> detect_chessboard(const GrayLevels& image) const;
 
   /// Detects the corners next to markers whose own corners are accurate to 1 to 2 px.
-  std::vector<PointDetection> detect_beside(const std::vector<TagDetection>& markers,
-                                            const GrayLevels& image) const;
+  std::vector<PointDetection> detect_corners_near_markers(const std::vector<TagDetection>& markers,
+                                                          const GrayLevels& image) const;
 
  private:
   /// Prediction of a corner: its pixel, the next corners along the row and the column, and a

@@ -19,9 +19,9 @@ namespace vlp {
 ///
 /// Edges. Each edge is fitted to the pixels next to it, from corner to corner, as a parabola,
 /// because the lens bends it (fit_edge()). The pixels are first those next to libapriltag's
-/// straight lines. At the rim of a wide lens these lines miss the corners by up to 4 px. An edge
-/// with a curvature above 0.5 px is therefore fitted again to the pixels next to the fitted curve.
-/// Above 1 px the curve has a cubic term.
+/// straight lines. At the rim of a wide lens these lines miss the corners by up to 4 px. If the
+/// sagitta of an edge exceeds 0.5 px, all four edges are therefore fitted again to the pixels next
+/// to the fitted curve. Above 1 px the curve has a cubic term.
 ///
 /// Limits. On rendered boards corners are accurate to 0.02 px, also for tags of 16 px and at the
 /// rim of a lens of 190 degrees. A tag keeps its corners if the fit of an edge fails. It also keeps
@@ -36,9 +36,9 @@ namespace vlp {
 /// and position of an edge are strongly correlated. At an exposure of 1.5 times white, a known blur
 /// improves the standard deviation of the position by a factor of 10. The known light of the bright
 /// side improves it by another factor of 2.5. Both change slowly over an image (EdgeField). Edges
-/// are therefore fitted again with the blur of the neighboring edges as a prior, and saturated
-/// edges once more with their light. The prior allows for the differences between edges that exceed
-/// their noise.
+/// are therefore fitted again with the blur of the neighboring edges as a prior, and in saturated
+/// images once more with their light. The prior allows for the differences between edges that
+/// exceed their noise.
 std::vector<double> refine_tag_edges(std::span<TagDetection> tags, const cv::Mat1b& image,
                                      const TagGeometry& print);
 

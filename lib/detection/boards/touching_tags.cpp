@@ -26,7 +26,7 @@ double shortest_edge_px(const TagDetection& tag) {
 }  // namespace
 
 TouchingTags::TouchingTags(const Board& board)
-    : layout_(compute_board_layout(board)),
+    : layout_(list_board_tags(board)),
       family_(make_tag_family(board.family)),
       border_bits_(board.border_bits),
       tag_size_m_(board.tag_size_m) {

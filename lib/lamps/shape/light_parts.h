@@ -8,7 +8,7 @@
 #include "lamps/image/background.h"
 #include "lamps/image/pixel_box.h"
 #include "lamps/shape/light.h"
-#include "lamps/shape/light_shape.h"
+#include "lamps/shape/light_center.h"
 
 namespace vlp {
 

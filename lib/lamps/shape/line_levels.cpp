@@ -63,8 +63,8 @@ LineLevels::LineLevels(const ImageView& lines, const std::vector<PixelRun>& chor
   const Stripes stripes = measure_stripes(signal);
   if (!(stripes.contrast >= kMinContrast)) return;
   period_lines_ = stripes.period_lines;
-  period_sd_ =
-      predict_period_sd(period_lines_, double(signal.size()) / kUsedHeight, 0) * period_lines_;
+  period_sd_ = predict_relative_period_sd(period_lines_, double(signal.size()) / kUsedHeight, 0) *
+               period_lines_;
 }
 
 std::optional<LineLevel> LineLevels::at(int line) const {

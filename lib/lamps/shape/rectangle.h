@@ -11,7 +11,7 @@
 #include "lamps/image/pixel_box.h"
 #include "lamps/image/pixel_runs.h"
 #include "lamps/shape/light.h"
-#include "lamps/shape/light_shape.h"
+#include "lamps/shape/light_center.h"
 
 namespace vlp {
 

@@ -9,7 +9,7 @@
 #include "lamps/image/background.h"
 #include "lamps/image/image_view.h"
 #include "lamps/shape/light.h"
-#include "lamps/shape/light_shape.h"
+#include "lamps/shape/light_center.h"
 
 namespace vlp {
 

@@ -9,7 +9,7 @@
 #include "geometry/types.h"
 #include "lamps/image/background.h"
 #include "lamps/image/image_view.h"
-#include "lamps/shape/light_shape.h"
+#include "lamps/shape/light_center.h"
 #include "lamps/shape/line_levels.h"
 
 namespace vlp {

@@ -24,7 +24,7 @@ double predict_lamp_period_sd(const Lamp& lamp, const StripeConditions& conditio
   const auto lines = compute_lines_on_lamp(lamp, conditions);
   if (!lines) return 0;
   const double period = 1 / (*lamp.frequency_hz * conditions.row_time_s);
-  return predict_period_sd(period, *lines, exposure_lines(conditions));
+  return predict_relative_period_sd(period, *lines, exposure_lines(conditions));
 }
 
 bool have_similar_duties(const Lamp& a, const Lamp& b) {
@@ -77,7 +77,7 @@ std::optional<double> compute_lines_on_lamp(const Lamp& lamp, const StripeCondit
   return size_m->minCoeff() * *conditions.focal_px / above_m;
 }
 
-double predict_period_sd(double period_lines, double lines, double exposure_lines) {
+double predict_relative_period_sd(double period_lines, double lines, double exposure_lines) {
   const double periods = kUsedHeight * lines / period_lines;
   if (periods < kMinPeriods) return std::numeric_limits<double>::infinity();
   constexpr double noise = 0.02, blunt_lines = 1.2;

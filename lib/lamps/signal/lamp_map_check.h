@@ -42,7 +42,7 @@ std::optional<double> compute_lines_on_lamp(const Lamp& lamp, const StripeCondit
 ///
 /// This is an upper bound of the error measured on square waves; periods of an integer number of
 /// scanlines have smaller errors. Returns infinity below kMinPeriods.
-double predict_period_sd(double period_lines, double lines, double exposure_lines);
+double predict_relative_period_sd(double period_lines, double lines, double exposure_lines);
 
 /// Returns whether two lamps cannot be distinguished: their frequencies differ by less than
 /// kLampDrift, and their duties are unknown or differ by less than twice kDutyMargin. Returns false

@@ -171,7 +171,7 @@ void print_bias(const MetricKind& kind, const StationRecordsOptions& options) {
   units.reserve(references.size());
   for (const auto& [unit, reference] : references) units.push_back(unit);
   const BiasStudy study = run_study([&] {
-    check_repetitions(known->records(), points, select_study_values(points, units));
+    check_runs_share_no_images(known->records(), points, select_study_values(points, units));
     return analyze_bias(values);
   });
   constexpr const char* head = "{:<20}{:>10}{:>6}{:>12}{:>12}{:>9}{:>9}   {}";
@@ -455,7 +455,8 @@ void print_capability(const StationRecordsOptions& options) {
     const auto points = load_judged_values(records, kind.name, filter);
     check_one_station(points, options);
     const auto gate = find_gate(kind.name, find_station(*known), records, points);
-    const auto found = compute_capability(extract_values(points), make_limits(kind, gate));
+    const auto found =
+        compute_capability(extract_values(points), make_tolerance_limits(kind, gate));
     if (!found) continue;
     const auto index = [](const CapabilityIndex& of) {
       return fmt::format("{:.2f} ({:.2f} to {:.2f})", of.value, of.low, of.high);
@@ -486,7 +487,7 @@ void print_study(const StationRecordsOptions& options) {
   const auto points = load_judged_values(records, options.metric, replace_any(filter));
   const auto values = select_study_values(points, options.units);
   const MeasurementStudy study = run_study([&] {
-    check_repetitions(records, points, values);
+    check_runs_share_no_images(records, points, values);
     return analyze_measurements(values);
   });
   const auto gate = find_gate(options.metric, find_station(*known), records, points);
@@ -521,7 +522,8 @@ void print_study(const StationRecordsOptions& options) {
   if (const auto categories = study.distinct_categories()) {
     fmt::print("distinct categories (ndc){:>21}\n", *categories);
   }
-  if (const auto percent_of_tolerance = study.percent_of_tolerance(make_limits(kind, gate))) {
+  if (const auto percent_of_tolerance =
+          study.percent_of_tolerance(make_tolerance_limits(kind, gate))) {
     fmt::print("measuring / tolerance (P/T){:>19.1f} %\n", *percent_of_tolerance);
   } else if (gate) {
     fmt::print("no P/T: the mean is not within the gate, {} {:.4g}\n", describe(kind.direction),

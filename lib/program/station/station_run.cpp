@@ -59,7 +59,7 @@ void finish_run(RunRecord measured, const std::vector<ReportPlot>& pictures, Spo
   std::optional<HookLock> lock;
   if (config.hook) {
     lock.emplace(spool.folder(), record.run);
-    record.events.push_back(make_hook_request(*config.hook, record.operator_name));
+    record.events.push_back(make_hook_requested_event(*config.hook, record.operator_name));
   }
   // After a kill in between, the golden unit is due too early, not too late.
   const bool golden_passed = record.kind == "golden" && record.passed();
@@ -152,7 +152,7 @@ RunRecord make_final_record(Unit& unit, const std::string& run, const StationRun
   if (record.invalid()) return record;  // images of an invalid run may be used again
   const auto earlier = spool.find_repeated_run(record);
   if (earlier && !earlier->empty()) {
-    reject_repetition(record, *earlier, options.station);
+    reject_reused_images(record, *earlier, options.station);
   } else if (!earlier) {
     const std::string unchecked =
         "the records are offline: whether an earlier run used the same images was not checked";

@@ -88,7 +88,7 @@ void write_refined_map(const std::filesystem::path& file, const LampMap& map,
 void add_max_mpx_option(CLI::App& app, double& max_mpx) {
   app.add_option("--max-mpx", max_mpx,
                  "Skip images of more than so many million pixels, unread (default: 200)")
-      ->check(finite_positive())
+      ->check(make_finite_positive_validator())
       ->check(CLI::Range(0.001, 1e6));
 }
 
@@ -112,7 +112,7 @@ void add_detect_options(CLI::App& app, CaptureOptions& options) {
   add_readout_option(app, options.frontend.readout);
   app.add_option("--exposure-s", options.frontend.exposure_s,
                  "Exposure of the images, for the check of the lamp map (default: short)")
-      ->check(finite_positive());
+      ->check(make_finite_positive_validator());
   add_max_mpx_option(app, options.frontend.max_mpx);
   add_threads_option(app, options.frontend.threads);
 }
@@ -125,7 +125,8 @@ std::optional<KnownMotion> MotionOptions::motion() const {
 }
 
 void add_motion_options(CLI::App& app, MotionOptions& options, const char* help) {
-  app.add_option("--max-speed-m-per-s", options.max_speed_m_per_s, help)->check(finite_positive());
+  app.add_option("--max-speed-m-per-s", options.max_speed_m_per_s, help)
+      ->check(make_finite_positive_validator());
   app.add_option("--max-yaw-rate-deg-per-s", options.max_yaw_rate_deg_per_s,
                  "With --max-speed-m-per-s: it turns so fast at most (default: 180); 0: not at all")
       ->check(finite_not_negative())

@@ -20,10 +20,10 @@ constexpr std::array<const char*, 4> kColors = {plot_colors::blue, plot_colors::
 std::string format_steps(std::vector<double> errors_m) {
   std::sort(errors_m.begin(), errors_m.end());
   const std::size_t count = errors_m.size(), steps = std::min(count, kMaxSteps);
-  std::string rows = data_row({0, 0});
+  std::string rows = format_data_row({0, 0});
   for (std::size_t i = 1; i <= steps; ++i) {
     const std::size_t rank = count * i / steps;
-    rows += data_row({1e3 * errors_m[rank - 1], 100 * double(rank) / double(count)});
+    rows += format_data_row({1e3 * errors_m[rank - 1], 100 * double(rank) / double(count)});
   }
   return rows;
 }
@@ -31,8 +31,8 @@ std::string format_steps(std::vector<double> errors_m) {
 /// Returns the data blocks of a curve: its steps and its two marks.
 std::string format_blocks(const CdfPlot::Curve& curve, const std::string& number) {
   return data_block("curve" + number, format_steps(curve.errors_m)) +
-         data_block("marks" + number,
-                    data_row({1e3 * curve.p50_m, 50}) + data_row({1e3 * curve.p90_m, 90}));
+         data_block("marks" + number, format_data_row({1e3 * curve.p50_m, 50}) +
+                                          format_data_row({1e3 * curve.p90_m, 90}));
 }
 
 std::string format_layer(const CdfPlot::Curve& curve, std::size_t i) {

@@ -9,7 +9,8 @@ namespace {
 
 std::string points(const std::string& name, const std::vector<Eigen::Vector2d>& errors_m) {
   std::string rows;
-  for (const auto& error_m : errors_m) rows += data_row({1e3 * error_m.x(), 1e3 * error_m.y()});
+  for (const auto& error_m : errors_m)
+    rows += format_data_row({1e3 * error_m.x(), 1e3 * error_m.y()});
   return data_block(name, rows);
 }
 
@@ -18,8 +19,8 @@ std::string points(const std::string& name, const std::vector<Eigen::Vector2d>& 
 std::string circle(const std::string& name, const Circle& circle_m) {
   const Eigen::Vector2d half(circle_m.radius, circle_m.radius);
   const std::vector<Eigen::Vector2d> corners{circle_m.center - half, circle_m.center + half};
-  return data_block(name, data_row({1e3 * circle_m.center.x(), 1e3 * circle_m.center.y(),
-                                    1e3 * circle_m.radius})) +
+  return data_block(name, format_data_row({1e3 * circle_m.center.x(), 1e3 * circle_m.center.y(),
+                                           1e3 * circle_m.radius})) +
          points(name + "_box", corners);
 }
 

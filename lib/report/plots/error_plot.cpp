@@ -83,22 +83,22 @@ struct Blocks {
 
   Blocks(const ErrorPlot& plot, std::size_t step, Scale& scale) {
     for (const std::size_t i :
-         select_thinned(compute_lengths_m(plot), step, step > 1 ? kFurthest : 0)) {
+         select_every_nth_and_largest(compute_lengths_m(plot), step, step > 1 ? kFurthest : 0)) {
       const Eigen::Vector2d& from_m = plot.fixes[i].truth_m;
       const double length_m = error_m(plot.fixes[i]), longest_m = scale.longest_m();
       Eigen::Vector2d arrow_m = scale.magnification * (plot.fixes[i].fix_m - from_m);
       if (length_m > longest_m) arrow_m *= longest_m / length_m;
       (length_m > longest_m ? cut : arrows) +=
-          data_row({from_m.x(), from_m.y(), arrow_m.x(), arrow_m.y()});
-      places += data_row({from_m.x(), from_m.y()});
+          format_data_row({from_m.x(), from_m.y(), arrow_m.x(), arrow_m.y()});
+      places += format_data_row({from_m.x(), from_m.y()});
       scale.extent.extend(from_m + arrow_m);
     }
     const std::size_t missing_step = thinning_step(plot.missing_m.size(), kMaxMissing);
     for (std::size_t i = 0; i < plot.missing_m.size(); i += missing_step) {
-      missing += data_row({plot.missing_m[i].x(), plot.missing_m[i].y()});
+      missing += format_data_row({plot.missing_m[i].x(), plot.missing_m[i].y()});
     }
     for (const Lamp& lamp : plot.lamps.lamps) {
-      lamps += data_row({lamp.position_m.x(), lamp.position_m.y(), double(lamp.id)});
+      lamps += format_data_row({lamp.position_m.x(), lamp.position_m.y(), double(lamp.id)});
     }
   }
   std::string text() const {

@@ -23,10 +23,10 @@ void draw_floor_plot(const std::filesystem::path& picture, const FloorPlot& plot
                      const LampMap& lamps) {
   std::string places, on_floor;
   for (const auto& place : plot.places) {
-    if (place.value) places += data_row({place.xy_m.x(), place.xy_m.y(), *place.value});
+    if (place.value) places += format_data_row({place.xy_m.x(), place.xy_m.y(), *place.value});
   }
   for (const Lamp& lamp : lamps.lamps) {
-    on_floor += data_row({lamp.position_m.x(), lamp.position_m.y(), double(lamp.id)});
+    on_floor += format_data_row({lamp.position_m.x(), lamp.position_m.y(), double(lamp.id)});
   }
   const std::string half = significant(plot.step_m / 2, kPlotDigits);
   const std::string commands =

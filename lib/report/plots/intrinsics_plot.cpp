@@ -18,7 +18,7 @@ std::string format_data(const IntrinsicsPlot& plot) {
   std::string corners, outliers, map;
   for (const auto& [seen_px, residual_px, outlier] : plot.corners) {
     (outlier ? outliers : corners) +=
-        data_row({seen_px.x(), seen_px.y(), residual_px.x(), residual_px.y()});
+        format_data_row({seen_px.x(), seen_px.y(), residual_px.x(), residual_px.y()});
   }
   const auto [width, height] = plot.imager_px;
   const auto cols = static_cast<std::size_t>(plot.cols), rows = plot.sd_px.size() / cols;
@@ -28,7 +28,7 @@ std::string format_data(const IntrinsicsPlot& plot) {
       const double u = (width - 1) * double(col) / double(cols - 1);
       const double sd_px = plot.sd_px[row * cols + col];
       map += std::isfinite(sd_px)
-                 ? data_row({u, v, sd_px})
+                 ? format_data_row({u, v, sd_px})
                  : significant(u, kPlotDigits) + " " + significant(v, kPlotDigits) + " NaN\n";
     }
     map += "\n";
@@ -129,8 +129,8 @@ std::string format_mtf50_map(const IntrinsicsPlot& plot) {
   for (std::size_t i = 0; i < plot.mtf50.size(); ++i) {
     if (!std::isfinite(plot.mtf50[i])) continue;
     const std::size_t col = i % cols, row = i / cols;
-    map += data_row({(2 * double(col) + 1) * half_u - 0.5, (2 * double(row) + 1) * half_v - 0.5,
-                     plot.mtf50[i]});
+    map += format_data_row({(2 * double(col) + 1) * half_u - 0.5,
+                            (2 * double(row) + 1) * half_v - 0.5, plot.mtf50[i]});
   }
   return data_block("mtf50", map) +
          "set title 'sharpness: MTF50 of lens and pixel'\n"

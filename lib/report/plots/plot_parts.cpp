@@ -20,7 +20,7 @@ std::string gnuplot_quoted(const std::string& text) {
   return quoted + "'";
 }
 
-std::string data_row(std::initializer_list<double> values) {
+std::string format_data_row(std::initializer_list<double> values) {
   std::string row;
   for (const double value : values) row.append(significant(value, kPlotDigits)).append(" ");
   return row + "\n";

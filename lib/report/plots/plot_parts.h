@@ -24,7 +24,7 @@ std::string gnuplot_quoted(const std::string& text);
 constexpr int kPlotDigits = 7;
 
 /// Returns a line of numbers.
-std::string data_row(std::initializer_list<double> values);
+std::string format_data_row(std::initializer_list<double> values);
 
 /// Returns rows as the data block `$name`.
 std::string data_block(const std::string& name, const std::string& rows);

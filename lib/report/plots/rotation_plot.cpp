@@ -28,12 +28,13 @@ Drawing make_drawing(const RotationPlot& plot) {
   Eigen::AlignedBox2d image, centers(plot.rotation_center_px);
   centers.extend(plot.principal_point_px);
   for (const auto& [lamp, places_px, center_px, radii_px] : plot.traces) {
-    for (const auto& place : places_px) places += data_row({place.x(), place.y(), double(lamp)});
-    ellipses +=
-        data_row({center_px.x(), center_px.y(), 2 * radii_px.x(), 2 * radii_px.y(), double(lamp)});
+    for (const auto& place : places_px)
+      places += format_data_row({place.x(), place.y(), double(lamp)});
+    ellipses += format_data_row(
+        {center_px.x(), center_px.y(), 2 * radii_px.x(), 2 * radii_px.y(), double(lamp)});
     // One label per lamp, although it has an ellipse at each height.
     if (labeled.insert(lamp).second) {
-      labels += data_row({center_px.x(), center_px.y(), double(lamp)});
+      labels += format_data_row({center_px.x(), center_px.y(), double(lamp)});
     }
     image.extend(center_px - radii_px).extend(center_px + radii_px);
     centers.extend(center_px);
@@ -46,8 +47,8 @@ Drawing make_drawing(const RotationPlot& plot) {
       "title 'rotation center'\n";
   const std::string commands =
       data_block("places", places) + data_block("ellipses", ellipses) +
-      data_block("labels", labels) + data_block("axis", data_row({axis.x(), axis.y()})) +
-      data_block("principal", data_row({principal.x(), principal.y()})) + plot_settings() +
+      data_block("labels", labels) + data_block("axis", format_data_row({axis.x(), axis.y()})) +
+      data_block("principal", format_data_row({principal.x(), principal.y()})) + plot_settings() +
       "set size ratio -1\n"
       "set xlabel 'u (px)'\n"
       "set ylabel 'v (px)'\n"

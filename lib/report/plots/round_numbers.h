@@ -13,7 +13,7 @@ namespace vlp {
 double round_below(double value);
 
 /// Returns consecutive numbers of that series, at least two. The first is the last one that does
-/// not exceed `least`, the last is the first one that is not below `most`.
+/// not exceed `lowest`, the last is the first one that is not below `highest`.
 /// @pre 0 < least <= most
 std::vector<double> round_numbers(double lowest, double highest);
 

@@ -28,8 +28,8 @@ std::string thinning_note(std::size_t count, std::size_t step) {
   return "every " + ordinal(step) + " of " + std::to_string(count) + " drawn";
 }
 
-std::vector<std::size_t> select_thinned(std::span<const double> values, std::size_t step,
-                                        std::size_t largest) {
+std::vector<std::size_t> select_every_nth_and_largest(std::span<const double> values,
+                                                      std::size_t step, std::size_t largest) {
   std::vector<std::size_t> all(values.size()), chosen;
   std::iota(all.begin(), all.end(), 0);
   for (std::size_t i = 0; i < values.size(); i += step) chosen.push_back(i);

@@ -32,7 +32,7 @@ struct LineFrame {
 /// Returns x and y in the world, meters along the commanded line, and millimeters to its left.
 std::string format_row(const LineFrame& frame, const Eigen::Vector2d& point_m) {
   const Eigen::Vector2d in_line_m = frame.to_line_frame(point_m);
-  return data_row({point_m.x(), point_m.y(), in_line_m.x(), 1e3 * in_line_m.y()});
+  return format_data_row({point_m.x(), point_m.y(), in_line_m.x(), 1e3 * in_line_m.y()});
 }
 
 /// Returns the plot command of commanded line, fixes and fitted line for these data columns.

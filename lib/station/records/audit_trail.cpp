@@ -174,7 +174,7 @@ class Contents {
 
 void lock_trail(soci::session& sql) { sql << "UPDATE vlp_schema SET version = version"; }
 
-TrailContent make_run_content(soci::session& sql, const std::string& run) {
+TrailContent make_run_digest_entry(soci::session& sql, const std::string& run) {
   // As read from the database, which can store a number differently than given.
   return {run, "", compute_digest(load_run(sql, run).value())};
 }
@@ -203,7 +203,7 @@ void append_to_trail(soci::session& sql, const std::vector<TrailContent>& conten
 void append_all_runs(soci::session& sql) {
   std::vector<TrailContent> contents;
   for (const std::string& run : load_run_ids(sql)) {
-    contents.push_back(make_run_content(sql, run));
+    contents.push_back(make_run_digest_entry(sql, run));
     const RunRecord kept = load_run(sql, run).value();
     for (const RunEvent& event : kept.events) contents.push_back(make_event_content(run, event));
   }

@@ -30,7 +30,7 @@ namespace vlp {
 struct TrailContent {
   std::string run, event, content;
 };
-TrailContent make_run_content(soci::session& sql, const std::string& run);
+TrailContent make_run_digest_entry(soci::session& sql, const std::string& run);
 TrailContent make_event_content(const std::string& run, const RunEvent& event);
 
 /// Locks the trail for this program until the end of its transaction. Slow work should be done

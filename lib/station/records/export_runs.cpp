@@ -106,7 +106,7 @@ std::string serialize(const nlohmann::ordered_json& json) {
 
 }  // namespace
 
-std::string make_hook_json(const RunRecord& run) {
+std::string format_hook_json(const RunRecord& run) {
   nlohmann::ordered_json json;
   json["event"] = voided(run) != nullptr ? "voided" : "verdict";
   json.update(to_json(run));

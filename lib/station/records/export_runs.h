@@ -12,7 +12,7 @@ namespace vlp {
 
 /// Returns a run as a JSON object for the hook: "event" ("verdict", or "voided" for a voided run),
 /// then the members written by write_runs().
-std::string make_hook_json(const RunRecord& run);
+std::string format_hook_json(const RunRecord& run);
 
 /// Writes runs atomically, in the format of the file's extension. Throws InputError, also for
 /// another extension.

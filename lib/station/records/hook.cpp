@@ -235,14 +235,14 @@ bool is_same_file(int descriptor, const std::filesystem::path& file) {
 
 }  // namespace
 
-RunEvent make_hook_request(const Hook& hook, const std::string& operator_name) {
+RunEvent make_hook_requested_event(const Hook& hook, const std::string& operator_name) {
   return make_event(kHookRequested, printable_line(fmt::format("{}", fmt::join(hook.command, " "))),
                     operator_name);
 }
 
 RunEvent run_hook(const Hook& hook, const RunRecord& record, const HookLock& lock) {
   std::array<int, 2> pipe{};
-  const Descriptor input(make_memory_file(make_hook_json(record)));
+  const Descriptor input(make_memory_file(format_hook_json(record)));
   if (input.get() < 0 || ::pipe2(pipe.data(), O_CLOEXEC) != 0) {
     return failed("cannot be started: " + std::generic_category().message(errno));
   }

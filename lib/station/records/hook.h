@@ -12,7 +12,7 @@ namespace vlp {
 
 /// Makes the event that a hook is to run, which is recorded together with the run. It identifies
 /// hooks that did not finish.
-RunEvent make_hook_request(const Hook& hook, const std::string& operator_name);
+RunEvent make_hook_requested_event(const Hook& hook, const std::string& operator_name);
 
 /// Returns true if a hook was requested for a run, at its verdict or when it was voided, and has
 /// not succeeded since.
@@ -41,7 +41,7 @@ class HookLock {
   bool held_ = true;
 };
 
-/// Runs the hook with make_hook_json() of the run on its stdin, and returns the event of its
+/// Runs the hook with format_hook_json() of the run on its stdin, and returns the event of its
 /// result. Sets SIGCHLD to its default.
 ///
 ///   kHookDone    the last line of its output

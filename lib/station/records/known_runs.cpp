@@ -49,7 +49,7 @@ void check_void_permission(const StationConfig& station, const std::string& oper
 KnownRuns::KnownRuns(StationConfig station) : station_(std::move(station)) {
   spool_.emplace(station_->spool, station_->records);
   spool_->deliver();
-  offline_reason_ = spool_->offline_reason();  // not waited for twice
+  offline_reason_ = spool_->last_offline_reason();  // not waited for twice
   if (offline_reason_.empty()) open(station_->records);
   if (!offline_reason_.empty() && waiting().empty()) throw_unavailable();
 }
@@ -74,7 +74,7 @@ void KnownRuns::open(const std::string& where) {
 }
 
 void KnownRuns::throw_unavailable() {
-  const bool has_notice = spool_ && !spool_->offline_reason().empty();
+  const bool has_notice = spool_ && !spool_->last_offline_reason().empty();
   throw RecordsUnavailable(has_notice ? spool_->notice() : offline_reason_, offline_reason_);
 }
 
@@ -214,7 +214,7 @@ bool complete_voiding(KnownRuns& known, RunRecord& record, const std::string& wh
   }
   if (!lock || is_hook_informed(record)) return is_any_done;
   Spool& spool = *known.spool();
-  record.events.push_back(make_hook_request(*station.hook, who));
+  record.events.push_back(make_hook_requested_event(*station.hook, who));
   spool.keep(record);
   spool.deliver();
   result.problem = call_hook(*station.hook, record, *lock, spool);
@@ -253,7 +253,7 @@ VoidedRun void_run(KnownRuns& known, const std::string& run, const std::string& 
     return result;
   }
   Spool& spool = *known.spool();
-  if (lock) record.events.push_back(make_hook_request(*station->hook, who));
+  if (lock) record.events.push_back(make_hook_requested_event(*station->hook, who));
   spool.keep(record);
   if (is_own_station && record.kind == "golden") invalidate_golden_note(*station, record.run);
   result.files_problem = rename_files(own_station, record);

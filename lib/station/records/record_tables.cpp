@@ -135,7 +135,7 @@ int load_table_version(soci::session& sql) {
 
 const int kSchemaVersion = static_cast<int>(kMigrations.size()) + 1;
 
-bool has_record_tables(soci::session& sql) {
+bool has_current_tables(soci::session& sql) {
   // Versions only increase. Takes no lock, so that read-only users can call it.
   return load_table_version(sql) == kSchemaVersion;
 }

@@ -6,12 +6,12 @@
 
 namespace vlp {
 
-/// Current version of the tables, the number of migrations, stored in vlp_schema.
+/// Current version of the tables, the number of migrations plus one, stored in vlp_schema.
 extern const int kSchemaVersion;
 
 /// Returns true if the tables have the current version. Takes no lock. Throws as
 /// make_record_tables().
-bool has_record_tables(soci::session& sql);
+bool has_current_tables(soci::session& sql);
 
 /// Advisory lock of PostgreSQL for creating and migrating tables ("vlp"). Older programs do not
 /// take it. If two programs start with an empty database at the same time, one of them can

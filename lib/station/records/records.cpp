@@ -376,7 +376,7 @@ Records::Records(const std::string& where) : database_(std::make_unique<Database
   const bool are_there = database_->run([&](ConnectionWatchdog& watch) {
     configure_connection(database_->sql, database_->timeout_s);
     watch.on_progress();
-    return has_record_tables(database_->sql);
+    return has_current_tables(database_->sql);
   });
   if (!are_there)
     database_->run([&](ConnectionWatchdog&) { make_record_tables(database_->sql); },
@@ -408,7 +408,7 @@ void Records::keep(const RunRecord& record) {
     if (insert.get_affected_rows() > 0) {
       insert_metrics(sql, record, watch);
       insert_images(sql, record, watch);
-      added.push_back(make_run_content(sql, record.run));
+      added.push_back(make_run_digest_entry(sql, record.run));
     } else if (const auto kept = load_run_header(sql, record.run);
                !kept || !same_texts(*kept, record)) {
       throw InputError(database_->name, "has another run " + record.run);

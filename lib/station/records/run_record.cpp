@@ -60,14 +60,14 @@ const RunEvent* voided(const RunRecord& record) {
   return event == record.events.end() ? nullptr : &*event;
 }
 
-std::string void_command(const std::string& run, const std::filesystem::path& station_file) {
+std::string format_void_command(const std::string& run, const std::filesystem::path& station_file) {
   return fmt::format("vlp-station void {} --station {} --operator NAME --reason WHY", run,
                      station_file.string());
 }
 
 std::string describe_owner(const ImageOwner& owner, const std::filesystem::path& station_file) {
   return fmt::format("camera {}, run {}: if its serial was wrong, '{}' frees its images",
-                     owner.camera, owner.run, void_command(owner.run, station_file));
+                     owner.camera, owner.run, format_void_command(owner.run, station_file));
 }
 
 bool repeats_images(const RunRecord& run, const RunRecord& earlier) {

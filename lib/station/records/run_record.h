@@ -83,7 +83,7 @@ struct ImageOwner {
 };
 
 /// Returns the command that voids a run of the station of this file, with all its options.
-std::string void_command(const std::string& run, const std::filesystem::path& station_file);
+std::string format_void_command(const std::string& run, const std::filesystem::path& station_file);
 
 /// Describes the owner of an image, and how to free it if the owner's serial was wrong.
 std::string describe_owner(const ImageOwner& owner, const std::filesystem::path& station_file);

@@ -137,7 +137,7 @@ std::string make_notice(const InputError& error) {
 
 }  // namespace
 
-std::string format_run(const SpooledRun& spooled) {
+std::string serialize_run(const SpooledRun& spooled) {
   const RunRecord run = printable_run(spooled.run);
   Json json;
   json["format"] = kRunFormat;
@@ -183,7 +183,7 @@ SpooledRun read_run(const fs::path& file) {
 Spool::Spool(fs::path folder, std::string records)
     : folder_(std::move(folder)),
       where_(std::move(records)),
-      name_(printable_line(make_database_identity(where_))) {}
+      name_(printable_line(make_records_database_id(where_))) {}
 
 Spool::~Spool() = default;
 
@@ -198,7 +198,7 @@ void Spool::open() {
 
 /// Runs an action on the records. Returns the reason if it failed; empty on success.
 template <typename Action>
-std::string Spool::run_on_records(const Action& action) {
+std::string Spool::try_on_records(const Action& action) {
   try {
     open();
     action(*records_);
@@ -235,7 +235,7 @@ void Spool::prepare() {
   } catch (const RecordsOffline& error) {
     return suspend_access(error);
   }
-  problem_ = run_on_records([](Records& records) { records.check_writable(); });
+  problem_ = try_on_records([](Records& records) { records.check_writable(); });
   if (problem_.empty()) deliver();
 }
 
@@ -244,9 +244,9 @@ void Spool::keep(const RunRecord& run) {
     make_folder(folder_);
     const std::string name = file_name(run);
     known_.erase(folder_ / name);  // possibly a different run of the same name
-    SharedFolder(folder_).replace(name, format_run({run, name_}));
+    SharedFolder(folder_).replace(name, serialize_run({run, name_}));
   } catch (const InputError& error) {
-    const std::string refused = run_on_records([&](Records& records) { records.keep(run); });
+    const std::string refused = try_on_records([&](Records& records) { records.keep(run); });
     if (refused.empty()) return;
     throw InputError(folder_,
                      fmt::format("neither here can a run be kept ({}) nor in the records ({})",
@@ -273,7 +273,7 @@ void Spool::deliver() {
     }
     if (spooled.records != name_) continue;
     const std::string refused =
-        run_on_records([&](Records& records) { records.keep(spooled.run); });
+        try_on_records([&](Records& records) { records.keep(spooled.run); });
     if (!offline_reason_.empty()) return;
     if (refused.empty()) {
       fs::remove(file, gone);
@@ -383,14 +383,14 @@ std::optional<RunRecord> Spool::find(const std::string& run) {
   }
   if (!here.empty()) return here.front();
   std::optional<RunRecord> found;
-  if (may_access_records()) run_on_records([&](Records& records) { found = records.find(run); });
+  if (may_access_records()) try_on_records([&](Records& records) { found = records.find(run); });
   return found;
 }
 
 std::vector<std::string> Spool::find_open_hooks(const std::string& station) {
   std::vector<std::string> kept;
   if (may_access_records())
-    run_on_records([&](Records& records) { kept = records.find_open_hooks(station); });
+    try_on_records([&](Records& records) { kept = records.find_open_hooks(station); });
   std::set<std::string> runs(kept.begin(), kept.end());
   for (const RunRecord& run : waiting()) {
     if (!station.empty() && run.station != station) continue;
@@ -416,7 +416,7 @@ ImageOwner Spool::find_owner(const std::string& sha256, const std::string& other
   const auto query_records = [&](Records& records) {
     owner = records.find_owner(sha256, other_than_camera);
   };
-  if (!may_access_records() || !run_on_records(query_records).empty()) ++num_unchecked_;
+  if (!may_access_records() || !try_on_records(query_records).empty()) ++num_unchecked_;
   return owner;
 }
 
@@ -441,7 +441,7 @@ std::optional<std::string> Spool::find_repeated_run(const RunRecord& run) {
       return;
     }
   };
-  if (!may_access_records() || !run_on_records(query_records).empty()) return std::nullopt;
+  if (!may_access_records() || !try_on_records(query_records).empty()) return std::nullopt;
   return repeated;
 }
 
@@ -453,7 +453,7 @@ std::string Spool::find_golden_run(const std::string& sha256) {
   }
   std::string run;
   const auto query_records = [&](Records& records) { run = records.find_golden_run(sha256); };
-  if (!may_access_records() || !run_on_records(query_records).empty()) ++num_unchecked_;
+  if (!may_access_records() || !try_on_records(query_records).empty()) ++num_unchecked_;
   return run;
 }
 

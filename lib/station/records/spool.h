@@ -15,7 +15,7 @@
 
 namespace vlp {
 
-/// Run and make_database_identity() of the records that it belongs to.
+/// Run and make_records_database_id() of the records that it belongs to.
 struct SpooledRun {
   RunRecord run;
   std::string records;
@@ -25,7 +25,7 @@ struct SpooledRun {
 ///
 /// Each run waits as a complete file of the spool: RUN.json, or RUN.EVENT.json with later events
 /// (`vlp-run/1`). It is delivered only to the records that it belongs to
-/// (make_database_identity()), so that stations with different records can share a folder.
+/// (make_records_database_id()), so that stations with different records can share a folder.
 ///
 /// No run is lost if a program is killed at any time. Files are written atomically and removed
 /// after the run is committed. No run is stored twice, because records store a run once by its id.
@@ -67,13 +67,13 @@ class Spool {
   void suspend_access(const InputError& error);
   const std::filesystem::path& folder() const { return folder_; }
   /// Returns the reason why the records were offline at the last access; empty if they were online.
-  const std::string& offline_reason() const { return offline_reason_; }
+  const std::string& last_offline_reason() const { return offline_reason_; }
 
   /// Returns the runs that wait for these records, in chronological order. Skips files that are no
   /// runs.
   std::vector<RunRecord> waiting();
   /// Returns a run that waits for any records, or that the records contain; otherwise std::nullopt,
-  /// also if the records do not answer (away()).
+  /// also if the records do not answer.
   std::optional<RunRecord> find(const std::string& run);
   /// Returns Records::find_open_hooks() of the waiting runs and, if online, of the records.
   std::vector<std::string> find_open_hooks(const std::string& station);
@@ -91,7 +91,7 @@ class Spool {
   void read();
   void open();
   template <typename Action>
-  std::string run_on_records(const Action& action);
+  std::string try_on_records(const Action& action);
   bool may_access_records() const;
   /// Counts the runs that wait for these records.
   std::size_t count_waiting() const;
@@ -100,7 +100,7 @@ class Spool {
   std::string with_remarks(const std::string& first) const;
 
   std::filesystem::path folder_;
-  /// Connection string, and its make_database_identity(), which the files of runs contain.
+  /// Connection string, and its make_records_database_id(), which the files of runs contain.
   std::string where_, name_;
   std::unique_ptr<Records> records_;
   /// Reason why the records are offline; why they did not accept a run; a file that read() could
@@ -117,9 +117,9 @@ class Spool {
 /// Serializes a run as `vlp-run/1`: a JSON object with "records", the texts of run_fields(),
 /// "figures", "images" and "events". Figures with a guard band have "uncertainty" and "guard_k".
 /// Invalid text is written as by printable().
-std::string format_run(const SpooledRun& spooled);
-/// Reads a run in the format of format_run(). A missing text of run_fields() is empty, as in files
-/// of older programs. Throws InputError with the file, also if it contains no run.
+std::string serialize_run(const SpooledRun& spooled);
+/// Reads a run in the format of serialize_run(). A missing text of run_fields() is empty, as in
+/// files of older programs. Throws InputError with the file, also if it contains no run.
 SpooledRun read_run(const std::filesystem::path& file);
 
 }  // namespace vlp

@@ -32,7 +32,7 @@ EstimateTest test_estimate(double value, double standard_error, double dof) {
   EstimateTest estimate{value, standard_error, dof, 0, 1, value, value};
   if (standard_error > 0) {
     estimate.t = value / standard_error;
-    estimate.p = t_two_tails(estimate.t, dof);
+    estimate.p = compute_two_tailed_p(estimate.t, dof);
     const double half = t_quantile(kLevel, dof) * standard_error;
     estimate.low = value - half;
     estimate.high = value + half;
@@ -118,9 +118,10 @@ void draw_bias(const std::filesystem::path& picture, const std::string& title,
                const std::vector<ReferenceValue>& values, const BiasStudy& study) {
   std::string data, means, line;
   for (const auto& [unit, reference, value] : values) {
-    data += data_row({reference, value - reference});
+    data += format_data_row({reference, value - reference});
   }
-  for (const UnitBias& unit : study.units) means += data_row({unit.reference, unit.bias.value});
+  for (const UnitBias& unit : study.units)
+    means += format_data_row({unit.reference, unit.bias.value});
   std::string commands = data_block("data", data) + data_block("means", means) + plot_settings() +
                          "set xlabel 'reference'\nset ylabel " +
                          gnuplot_quoted(title + ", measured - reference") +
@@ -133,7 +134,7 @@ void draw_bias(const std::filesystem::path& picture, const std::string& title,
     for (int i = 0; i <= parts; ++i) {
       const double at = first + (last - first) * i / parts;
       const double bias = study.linearity->bias_at(at), band = study.linearity->band_at(at);
-      line += data_row({at, bias, bias - band, bias + band});
+      line += format_data_row({at, bias, bias - band, bias + band});
     }
     commands += data_block("line", line);
     plotted = ", $line using 1:2 with lines" + colored(plot_colors::green) +

@@ -171,7 +171,7 @@ void draw_trend(const std::filesystem::path& picture, const std::string& title,
   for (const ChartAlarm& each : alarms) alarm[each.index] = true;
   std::string data, alarm_points;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const std::string row = data_row({double(i + 1), values[i]});
+    const std::string row = format_data_row({double(i + 1), values[i]});
     data += row;
     if (alarm[i]) alarm_points += row;
   }

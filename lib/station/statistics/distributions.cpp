@@ -25,7 +25,7 @@ double f_upper_tail(double x, double dof_above, double dof_below) {
   return cdf(complement(boost::math::fisher_f(dof_above, dof_below), x));
 }
 
-double t_two_tails(double t, double dof) {
+double compute_two_tailed_p(double t, double dof) {
   return 2 * cdf(complement(boost::math::students_t(dof), std::abs(t)));
 }
 

@@ -16,9 +16,9 @@ double chi_square_quantile(double probability, double dof);
 double f_upper_tail(double x, double dof_above, double dof_below);
 
 /// Returns P(|T| > |t|) of Student's t. Precondition: t is finite, dof > 0.
-double t_two_tails(double t, double dof);
-/// Returns the quantile t > 0 with t_two_tails(t, dof) = `both_tails`. Precondition: 0 < both_tails
-/// < 1, dof > 0.
+double compute_two_tailed_p(double t, double dof);
+/// Returns the quantile t > 0 with compute_two_tailed_p(t, dof) = `both_tails`. Precondition: 0 <
+/// both_tails < 1, dof > 0.
 double t_quantile(double both_tails, double dof);
 
 }  // namespace vlp

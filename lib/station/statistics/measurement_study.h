@@ -30,9 +30,9 @@ struct AnovaRow {
 ///   e^2 = MS_e,                           interaction^2 = (MS_i - MS_e) / r,
 ///   station^2 = (MS_s - MS_i) / (p r),    unit^2 = (MS_u - MS_i) / (o r),
 ///
-/// or 0 if negative. The interaction is not significant if chance exceeds F = MS_i / MS_e in 5 % of
-/// studies or more. It is then pooled with the error: MS_e = (SS_i + SS_e) / (dof_i + dof_e), which
-/// also replaces MS_i. All results below are standard deviations.
+/// or 0 if negative. The interaction is not significant if chance exceeds F = MS_i / MS_e in more
+/// than 5 % of studies. It is then pooled with the error: MS_e = (SS_i + SS_e) / (dof_i + dof_e),
+/// which also replaces MS_i. All results below are standard deviations.
 struct MeasurementStudy {
   std::size_t units = 0, stations = 0, repeats = 0;
   AnovaRow unit, station, interaction, error;

@@ -63,7 +63,7 @@ std::optional<double> find_gate(const std::string& metric, const StationConfig* 
   return std::nullopt;
 }
 
-ToleranceLimits make_limits(const MetricKind& kind, std::optional<double> gate) {
+ToleranceLimits make_tolerance_limits(const MetricKind& kind, std::optional<double> gate) {
   if (kind.direction == Direction::at_least) return {gate, std::nullopt};
   return {std::nullopt, gate};
 }
@@ -89,8 +89,8 @@ std::vector<StudyValue> select_study_values(const std::vector<TrendPoint>& point
   return values;
 }
 
-void check_repetitions(Records& records, const std::vector<TrendPoint>& points,
-                       const std::vector<StudyValue>& values) {
+void check_runs_share_no_images(Records& records, const std::vector<TrendPoint>& points,
+                                const std::vector<StudyValue>& values) {
   std::map<std::string, std::vector<RunRecord>> runs_of_unit;
   for (const StudyValue& value : values) runs_of_unit[value.unit];
   for (const TrendPoint& point : points) {

@@ -36,7 +36,7 @@ void check_one_station(const std::vector<TrendPoint>& points);
 /// run. Returns std::nullopt if there is none.
 std::optional<double> find_gate(const std::string& metric, const StationConfig* station,
                                 Records& records, const std::vector<TrendPoint>& points);
-ToleranceLimits make_limits(const MetricKind& kind, std::optional<double> gate);
+ToleranceLimits make_tolerance_limits(const MetricKind& kind, std::optional<double> gate);
 
 /// Returns the values of the named units; those of all units with two runs or more if `units` is
 /// empty. Throws std::invalid_argument for units without a value.
@@ -44,8 +44,8 @@ std::vector<StudyValue> select_study_values(const std::vector<TrendPoint>& point
                                             const std::vector<std::string>& units);
 /// Throws std::invalid_argument that names two runs of one of the units that use the same images,
 /// because such runs do not show repeatability. Ignores runs without images.
-void check_repetitions(Records& records, const std::vector<TrendPoint>& points,
-                       const std::vector<StudyValue>& values);
+void check_runs_share_no_images(Records& records, const std::vector<TrendPoint>& points,
+                                const std::vector<StudyValue>& values);
 /// Returns the values of reference units with their known values. Throws as select_study_values().
 std::vector<ReferenceValue> select_reference_values(
     const std::vector<TrendPoint>& points, const std::map<std::string, double>& references);

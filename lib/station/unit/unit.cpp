@@ -189,7 +189,7 @@ void Unit::process_files(StationStep step, const std::vector<fs::path>& files) {
 void Unit::add_image(StationStep step, UnitImage image) {
   UnitStep& state = at(step);
   const std::string name = image.seen.name();
-  remove_image(step, name);  // it was overwritten
+  forget_image(step, name);  // it was overwritten
   if (image.is_used()) reject_redundant(step, image);
   const bool used = image.is_used();
   const bool fault = !used && !image.is_redundant() && !state.done();
@@ -220,7 +220,7 @@ void Unit::reject_redundant(StationStep step, UnitImage& image) const {
 
 /// Removes an image and the results that depend on it. Images that were redundant because of it are
 /// used again.
-void Unit::remove_image(StationStep step, const std::string& name) {
+void Unit::forget_image(StationStep step, const std::string& name) {
   UnitStep& state = at(step);
   const auto image = state.images.find(name);
   if (image == state.images.end()) return;
@@ -244,7 +244,7 @@ void Unit::remove(StationStep step, const std::string& name) {
   UnitStep& state = at(step);
   std::erase_if(state.waiting, [&](const fs::path& file) { return file.filename() == name; });
   if (state.images.contains(name)) state.num_consecutive_rejections = 0;
-  remove_image(step, name);
+  forget_image(step, name);
 }
 
 void Unit::discard(StationStep step, const std::string& name) {

@@ -98,7 +98,7 @@ class Unit {
   void add_image(StationStep step, UnitImage image);
   void count_rejections(StationStep step);
   void reject_redundant(StationStep step, UnitImage& image) const;
-  void remove_image(StationStep step, const std::string& name);
+  void forget_image(StationStep step, const std::string& name);
   void reset_after(StationStep step);
   bool has_sufficient_images(StationStep step) const;
   StepResult solve(StationStep step, bool all_in) const;

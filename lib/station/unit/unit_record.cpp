@@ -9,7 +9,7 @@
 
 #include "captures/digest.h"
 #include "rig/calibration_text.h"
-#include "station/unit/unit_verdict.h"
+#include "station/unit/unit_causes.h"
 
 namespace vlp {
 
@@ -44,13 +44,13 @@ RunRecord make_unit_record(const Unit& unit, const std::string& run,
   return record;
 }
 
-void reject_repetition(RunRecord& record, const std::string& earlier,
-                       const std::filesystem::path& station_file) {
+void reject_reused_images(RunRecord& record, const std::string& earlier,
+                          const std::filesystem::path& station_file) {
   record.verdict = to_string(Verdict::invalid);
   record.causes = fmt::format(
       "all images are those of run {}, which is no repetition: take new ones, or '{}' if that run "
       "should not count\n{}",
-      earlier, void_command(earlier, station_file), record.causes);
+      earlier, format_void_command(earlier, station_file), record.causes);
 }
 
 }  // namespace vlp

@@ -14,8 +14,8 @@ namespace vlp {
 RunRecord make_unit_record(const Unit& unit, const std::string& run, const ProgramVersion& program);
 
 /// Makes a judged run of a unit INVALID because `earlier`, another judged run of the unit, used all
-/// of its images. Such a run is no repetition and would count twice.
-void reject_repetition(RunRecord& record, const std::string& earlier,
-                       const std::filesystem::path& station_file);
+/// of its images: it would count twice. The caller has compared the images.
+void reject_reused_images(RunRecord& record, const std::string& earlier,
+                          const std::filesystem::path& station_file);
 
 }  // namespace vlp

@@ -94,12 +94,12 @@ void WatchedRun::begin(Spool& spool) {
                                  run_, finished_->camera));
   }
   if (!finished_ && is_stored) {
-    throw InputError(folder_,
-                     fmt::format("run {} is kept, but its record cannot be read ({}): "
-                                 "begin again when it can, or move the folder away",
-                                 run_,
-                                 spool.offline_reason().empty() ? "the records do not have it"
-                                                                : spool.offline_reason()));
+    throw InputError(
+        folder_, fmt::format("run {} is kept, but its record cannot be read ({}): "
+                             "begin again when it can, or move the folder away",
+                             run_,
+                             spool.last_offline_reason().empty() ? "the records do not have it"
+                                                                 : spool.last_offline_reason()));
   }
   if (!finished_) return;  // the run continues
   publish_run(*finished_, {}, unit_.config().results);

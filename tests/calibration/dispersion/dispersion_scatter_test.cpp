@@ -66,7 +66,7 @@ TEST(FitDispersion, CovarianceMatchesScatterWithoutGivenNoise) {
   expect_consistent(station, exact, DispersionMethod::camera, false);
 }
 
-TEST(FitDispersion, CovarianceMatchesScatterForHalfRotation) {
+TEST(FitDispersion, CovarianceMatchesScatterFor135Degrees) {
   Station station(0.01);
   auto exact = station.captures(24, true, {0.003, 0.001}, 0.1);
   exact.resize(10);

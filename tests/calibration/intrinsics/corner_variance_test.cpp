@@ -32,7 +32,7 @@ TEST(EstimateCornerVariance, MatchesSimulatedVariance) {
   for (const auto& [rest_px, scale] :
        {std::pair{0.02, 1.2}, {0.0, 1.0}, {0.05, 0.0}, {0.2, 1.0}, {0.005, 2.0}}) {
     const CornerVariance truth{rest_px * rest_px, scale * scale};
-    const CornerVariance found = estimate_corner_variance(simulate_errors(truth, random));
+    const CornerVariance found = estimate_variance_components(simulate_errors(truth, random));
     for (const double sd_px : {0.01, 0.03, 0.1}) {
       EXPECT_NEAR(std::sqrt(found.at(sd_px) / truth.at(sd_px)), 1, 0.08)
           << rest_px << " " << scale << " " << sd_px;
@@ -45,7 +45,7 @@ TEST(EstimateCornerVariance, IsRobustToOutliers) {
   const CornerVariance truth{1e-4, 1};
   auto errors = simulate_errors(truth, random);
   for (std::size_t i = 0; i < errors.size(); i += 100) errors[i].square_px2 = 4;
-  const CornerVariance found = estimate_corner_variance(errors);
+  const CornerVariance found = estimate_variance_components(errors);
   for (const double sd_px : {0.01, 0.1}) {
     EXPECT_NEAR(std::sqrt(found.at(sd_px) / truth.at(sd_px)), 1, 0.15);
   }
@@ -57,7 +57,7 @@ TEST(EstimateCornerVariance, IsRobustToOneWrongDeviation) {
   for (const double sd_px : {0.5, 1.0, 1e9}) {
     auto errors = simulate_errors(truth, random);
     errors[3].sd_px = sd_px;
-    const CornerVariance found = estimate_corner_variance(errors);
+    const CornerVariance found = estimate_variance_components(errors);
     for (const double known_px : {0.01, 0.1}) {
       EXPECT_NEAR(std::sqrt(found.at(known_px) / truth.at(known_px)), 1, 0.08) << sd_px;
     }
@@ -66,7 +66,7 @@ TEST(EstimateCornerVariance, IsRobustToOneWrongDeviation) {
 
 TEST(EstimateCornerVariance, ReturnsMeanSquareForEqualDeviations) {
   const std::vector<CornerError> errors{{4e-4, 0.01}, {1e-4, 0.01}, {1e-4, 0.01}};
-  EXPECT_NEAR(estimate_corner_variance(errors).at(0.01), 2e-4, 1e-9);
+  EXPECT_NEAR(estimate_variance_components(errors).at(0.01), 2e-4, 1e-9);
 }
 
 /// Returns corners of 16 views with known standard deviations, ten times as large at the rim of the

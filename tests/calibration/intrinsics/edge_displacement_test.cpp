@@ -43,10 +43,11 @@ class EstimateEdgeShifts : public testing::TestWithParam<double> {
 
 TEST_P(EstimateEdgeShifts, ReturnsShiftOfEachView) {
   const auto input = make_input(shrunk_views(6, 0, 0.3));
-  const auto shifts = estimate_edge_shifts(input.views, synthetic_lens());
+  const auto shifts = estimate_tag_edge_shifts(input.views, synthetic_lens());
   ASSERT_EQ(shifts.size(), 6U);
   for (const EdgeShift& shift : shifts) EXPECT_NEAR(shift.at(shift.middle), 0.3, 0.005);
-  const auto none = estimate_edge_shifts(make_input(shrunk_views(6, 0, 0)).views, synthetic_lens());
+  const auto none =
+      estimate_tag_edge_shifts(make_input(shrunk_views(6, 0, 0)).views, synthetic_lens());
   ASSERT_EQ(none.size(), 6U);
   for (const EdgeShift& shift : none) EXPECT_NEAR(shift.at(shift.middle), 0, 1e-6);
 }
@@ -113,7 +114,7 @@ TEST(EdgeShift, IsZeroForTouchingSquares) {
   const SyntheticViews views{synthetic_board(true), synthetic_lens()};
   Random random(3);
   const auto input = views.input(4, random, 0.1);
-  const auto shifts = estimate_edge_shifts(input.views, views.lens);
+  const auto shifts = estimate_tag_edge_shifts(input.views, views.lens);
   ASSERT_EQ(shifts.size(), 4U);
   for (const EdgeShift& shift : shifts) EXPECT_TRUE(shift.coefficients.isZero(0));
 }

@@ -81,7 +81,7 @@ TEST(ProjectionUncertainty, MatchesScatterWithCorrelatedTagErrors) {
       for (auto& corner : view) {
         const double u = random.normal(), v = random.normal();
         corner.pixel +=
-            errors_px.try_emplace(input.lattice.tag_index(corner.point), 0.1 * u, 0.1 * v)
+            errors_px.try_emplace(input.lattice.find_tag_of_point(corner.point), 0.1 * u, 0.1 * v)
                 .first->second;
       }
     }

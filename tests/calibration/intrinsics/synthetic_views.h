@@ -90,7 +90,7 @@ struct SyntheticViews {
                       Random& random, double noise_px) const {
     const Eigen::Vector2d field_m = tag_field_m(board);
     BoardDetection seen;
-    for (const BoardTag& place : compute_board_layout(board)) {
+    for (const BoardTag& place : list_board_tags(board)) {
       TagDetection tag{place.id, {}};
       bool whole = true;
       for (std::size_t k = 0; k < 4; ++k) {

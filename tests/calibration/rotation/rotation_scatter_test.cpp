@@ -268,7 +268,7 @@ TEST(FitRotationAxis, CovarianceMatchesScatter) {
   expect_consistent(tilted_scene({0, 0}), fit_rotation_axis, true);
 }
 
-TEST(FitRotationAxis, CovarianceMatchesScatterForHalfRotation) {
+TEST(FitRotationAxis, CovarianceMatchesScatterFor135Degrees) {
   RotationScene scene = tilted_scene({0, 0});
   scene.arc_rad = 3;
   expect_consistent(scene, fit_rotation_axis, true);

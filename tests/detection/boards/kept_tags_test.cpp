@@ -49,7 +49,7 @@ class BoardDetectorYield : public testing::TestWithParam<Pictures> {
     std::set<int> ids;
     for (const TagDetection& tag : finder.find(image)) ids.insert(tag.id);
     std::set<int> of_board;
-    for (const BoardTag& tag : compute_board_layout(board)) {
+    for (const BoardTag& tag : list_board_tags(board)) {
       if (ids.contains(tag.id)) of_board.insert(tag.id);
     }
     return of_board;

@@ -95,7 +95,7 @@ TEST(SquareCorners, DetectsAllCornersOfOpencvCharucoBoard) {
     SCOPED_TRACE(board.rows);
     const cv::Mat image = drawn_by_opencv(board);
     const BoardDetection seen = BoardDetector(board).detect(image);
-    EXPECT_EQ(seen.tags.size(), compute_board_layout(board).size());
+    EXPECT_EQ(seen.tags.size(), list_board_tags(board).size());
     EXPECT_TRUE(seen.foreign.empty());
     expect_all_corners(board, seen);
   }
@@ -121,10 +121,10 @@ TEST(SquareCorners, RejectsCornersNextToMisreadMarker) {
   cv::GaussianBlur(smoothed, smoothed, {}, 1);
   const GrayLevels gray{image, smoothed};
   BoardDetection seen = BoardDetector(board).detect(image);
-  ASSERT_EQ(seen.tags.size(), compute_board_layout(board).size());
+  ASSERT_EQ(seen.tags.size(), list_board_tags(board).size());
   for (const double off_px : {30.0, 1e12}) {
     for (auto& corner_px : seen.tags[7].corners_px) corner_px.x() += off_px;
-    const auto points = SquareCorners(board).detect_beside(seen.tags, gray);
+    const auto points = SquareCorners(board).detect_corners_near_markers(seen.tags, gray);
     EXPECT_GE(points.size(), 8U);
     EXPECT_LT(points.size(), seen.points.size());
     for (const PointDetection& point : points) {

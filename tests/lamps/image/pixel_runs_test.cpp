@@ -76,7 +76,7 @@ TEST(FindPixelRuns, BridgesGapsAtTileBorders) {
   }
 }
 
-TEST(FindPixelRuns, SeparatesRunsAcrossDarkTile) {
+TEST(FindPixelRuns, SeparatesRunsWithDarkTileBetween) {
   EXPECT_THAT(find_pixel_runs(image_view(row_with({{60, 64}, {128, 131}})), 100),
               ElementsAre(vlp::PixelRun{0, 60, 64}, vlp::PixelRun{0, 128, 131}));
 }

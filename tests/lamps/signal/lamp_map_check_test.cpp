@@ -17,7 +17,7 @@ Lamp lamp(int id, double frequency_hz, std::optional<double> duty = 0.5) {
   return {id, {double(id), 0, 1.6}, make_disc(0.18), frequency_hz, duty};
 }
 
-/// Returns the ratio of the RMS error of many measured periods to predict_period_sd().
+/// Returns the ratio of the RMS error of many measured periods to predict_relative_period_sd().
 double measured_over_stated(double period, double lines, double exposure_lines) {
   Random random(5);
   constexpr int draws = 300;
@@ -28,7 +28,7 @@ double measured_over_stated(double period, double lines, double exposure_lines) 
         measure_stripes(noisy_square_wave(used, period, 0.5, exposure_lines, 0.02, random));
     squares += std::pow(stripes.period_lines / period - 1, 2);
   }
-  return std::sqrt(squares / draws) / predict_period_sd(period, lines, exposure_lines);
+  return std::sqrt(squares / draws) / predict_relative_period_sd(period, lines, exposure_lines);
 }
 
 TEST(PredictPeriodSd, MatchesMeasuredErrors) {
@@ -53,7 +53,7 @@ TEST(PredictPeriodSd, BoundsErrorsForIntegerPeriods) {
 }
 
 TEST(PredictPeriodSd, ReturnsInfinityForTooFewPeriods) {
-  EXPECT_EQ(predict_period_sd(40, 50, 1), std::numeric_limits<double>::infinity());
+  EXPECT_EQ(predict_relative_period_sd(40, 50, 1), std::numeric_limits<double>::infinity());
 }
 
 TEST(ComputeLinesOnLamp, ComputesNumberOfLines) {
@@ -122,7 +122,7 @@ TEST(ExplainMissingRoom, ListsTenRoomsAtMost) {
 }
 
 /// Nearly all lamps just above the reported limit are identified.
-TEST(FindAmbiguousLamps, MatchesIdentificationByFrequency) {
+TEST(FindAmbiguousLamps, NeededDifferenceSufficesForIdentification) {
   StripeConditions conditions = kConditions;
   conditions.exposure_s.reset();
   const auto pairs = find_ambiguous_lamps({{lamp(1, 2500), lamp(2, 2501)}}, conditions);

@@ -203,7 +203,7 @@ TEST(ChooseRowTime, ReportsReasonWithoutRowTime) {
   EXPECT_NE(result.problem, "");
 }
 
-TEST(GroupPeriods, ReturnsOneGroupForEachPeriod) {
+TEST(GroupPeriods, GroupsRepeatedPeriodsAndIgnoresSingleOnes) {
   Random random(4);
   std::vector<MeasuredPeriod> lights;
   add(lights, 2000, 40, 0.003, random);

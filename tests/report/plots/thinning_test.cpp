@@ -22,9 +22,9 @@ TEST(ThinningStep, LimitsCountAndReportsStep) {
 
 TEST(Thinned, KeepsLargestValuesInOrder) {
   const std::vector<double> values = {1, 9, 2, 3, 9, 8, 0};
-  EXPECT_THAT(select_thinned(values, 3, 2), ElementsAre(0, 1, 3, 4, 6));
-  EXPECT_THAT(select_thinned(values, 3, 0), ElementsAre(0, 3, 6));
-  EXPECT_THAT(select_thinned({}, 3, 2), ElementsAre());
+  EXPECT_THAT(select_every_nth_and_largest(values, 3, 2), ElementsAre(0, 1, 3, 4, 6));
+  EXPECT_THAT(select_every_nth_and_largest(values, 3, 0), ElementsAre(0, 3, 6));
+  EXPECT_THAT(select_every_nth_and_largest({}, 3, 2), ElementsAre());
 }
 
 }  // namespace

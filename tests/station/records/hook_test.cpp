@@ -53,7 +53,7 @@ TEST_F(RunHook, PassesRunOnStdinInHookFolder) {
   EXPECT_EQ(event.what, kHookDone);
   EXPECT_EQ(event.text, "label 7");
   const std::string seen = TemporaryFolder::read_content(folder / "seen.json");
-  EXPECT_EQ(seen, make_hook_json(judged_run()));
+  EXPECT_EQ(seen, format_hook_json(judged_run()));
   const auto json = nlohmann::json::parse(seen);
   EXPECT_EQ(json["verdict"], "PASS");
   EXPECT_EQ(json["figures"]["rms_px"]["met"], true);
@@ -158,7 +158,7 @@ TEST_F(RunHook, IsOpenUntilHookSucceeds) {
   RunRecord run = judged_run();
   EXPECT_FALSE(is_hook_open(run));
   EXPECT_EQ(hook_problem(run), "");
-  run.events.push_back(make_hook_request({{"label", "it"}, {}, 1}, "Ann"));
+  run.events.push_back(make_hook_requested_event({{"label", "it"}, {}, 1}, "Ann"));
   EXPECT_EQ(run.events.back().text, "label it");
   EXPECT_THAT(run.events.back().who, testing::MatchesRegex("Ann [(][^@]+@[^@]*[)]"));
   EXPECT_TRUE(is_hook_open(run));

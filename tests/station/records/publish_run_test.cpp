@@ -88,7 +88,7 @@ TEST(PublishRun, WritesNothingOutsideResults) {
   EXPECT_TRUE(fs::is_empty(folder / "elsewhere"));
 }
 
-TEST(CheckResults, OverwritesNoTargetOfSymbolicLink) {
+TEST(CheckResults, ReplacesSymbolicLinkAndKeepsItsTarget) {
   const TemporaryFolder folder;
   const fs::path mine = folder.file("mine.txt", "mine");
   fs::create_directories(folder / "results/0001");

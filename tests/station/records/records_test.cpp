@@ -537,7 +537,7 @@ TEST(WriteRuns, MatchesJsonSchemasOfRunsAndSpool) {
   std::vector<std::filesystem::path> waiting;
   for (const RunRecord& run :
        {make_sample_record(numbered_run_id(1), "a", 0.25), golden, invalid}) {
-    waiting.push_back(folder.file(run.camera + ".json", format_run({run, "records.db"})));
+    waiting.push_back(folder.file(run.camera + ".json", serialize_run({run, "records.db"})));
   }
   EXPECT_EQ(problems_by_schema("run", waiting), "");
 }

@@ -320,7 +320,7 @@ TEST(Spool, KeepsRunsWhenServerStops) {
   connected.keep(numbered_run(-3));
   EXPECT_LT(measure_seconds([&] { connected.deliver(); }), 1);
   EXPECT_FALSE(connected.find("another"));
-  EXPECT_THAT(connected.offline_reason(), HasSubstr("has not answered for 2 s"));
+  EXPECT_THAT(connected.last_offline_reason(), HasSubstr("has not answered for 2 s"));
   EXPECT_THAT(connected.state(),
               AllOf(StartsWith("kept here, 1 waiting: "), HasSubstr("has not answered for 2 s")));
   Spool fresh = spool();

@@ -43,7 +43,8 @@ TEST(ReadRun, ReturnsWrittenRun) {
   for (const RunField& field : run_fields()) run.*field.text += "\"\\ \xc3\xbc{}";
   for (std::string* lines : {&run.causes, &run.calibration}) lines->append("\n\tof lines\n");
   run.images[1].refused = "too dark";
-  const auto [read, records] = read_run(folder.file("run.json", format_run({run, "records.db"})));
+  const auto [read, records] =
+      read_run(folder.file("run.json", serialize_run({run, "records.db"})));
   EXPECT_EQ(records, "records.db");
   for (const RunField& field : run_fields()) EXPECT_EQ(read.*field.text, run.*field.text);
   ASSERT_THAT(read.metrics, SizeIs(run.metrics.size()));
@@ -67,13 +68,14 @@ TEST(ReadRun, AcceptsNamesThatAreInvalidText) {
   const TemporaryFolder folder;
   RunRecord run = numbered_run(1);
   run.images[0].name = "\xff\x1b[31m.png";
-  EXPECT_EQ(read_run(folder.file("run.json", format_run({run, "records.db"}))).run.images[0].name,
-            "\\xff\\x1b[31m.png");
+  EXPECT_EQ(
+      read_run(folder.file("run.json", serialize_run({run, "records.db"}))).run.images[0].name,
+      "\\xff\\x1b[31m.png");
 }
 
 TEST(ReadRun, ThrowsWithFileForInvalidRun) {
   const TemporaryFolder folder;
-  const std::string text = format_run({numbered_run(1), "records.db"});
+  const std::string text = serialize_run({numbered_run(1), "records.db"});
   for (const std::string& bad :
        {std::string("{}\n"), std::string("[]\n"), text.substr(0, text.size() / 2) + "\n",
         std::string(text).replace(text.find("vlp-run/1"), 9, "vlp-run/2"),
@@ -89,7 +91,7 @@ TEST(ReadRun, RejectsIdsOfOtherFolders) {
   run.camera = "../..";
   const auto refusal = [&] {
     return rejection_message([&] {
-      read_run(folder.file("bad.json", format_run({run, "records.db"})));
+      read_run(folder.file("bad.json", serialize_run({run, "records.db"})));
     });
   };
   EXPECT_THAT(refusal(), HasSubstr("its run or camera is no id"));
@@ -259,7 +261,7 @@ TEST(Spool, RetriesUnreadableFile) {
   const TemporaryFolder folder;
   const std::string where = (folder / "away/records.db").string();
   Spool spool(folder / "spool", where);
-  const std::string text = format_run({numbered_run(1), make_database_identity(where)});
+  const std::string text = serialize_run({numbered_run(1), make_records_database_id(where)});
   fs::create_directory(folder / "spool");
   folder.file("spool/1.json", text.substr(0, text.size() / 2));
   EXPECT_THAT(spool.waiting(), IsEmpty());

@@ -57,9 +57,9 @@ TEST_F(RunMetrics, FindGateReturnsGateOfStationOrLastRun) {
   station.gates = {{"rms_px", 0.7}};
   EXPECT_EQ(find_gate("rms_px", &station, records, judged()), 0.7);
   EXPECT_FALSE(find_gate("tilt_deg", &station, records, judged()));
-  EXPECT_EQ(make_limits(find_run_metric("rms_px"), 0.7).upper, 0.7);
-  EXPECT_FALSE(make_limits(find_run_metric("rms_px"), 0.7).lower);
-  EXPECT_EQ(make_limits(find_run_metric("coverage"), 0.7).lower, 0.7);
+  EXPECT_EQ(make_tolerance_limits(find_run_metric("rms_px"), 0.7).upper, 0.7);
+  EXPECT_FALSE(make_tolerance_limits(find_run_metric("rms_px"), 0.7).lower);
+  EXPECT_EQ(make_tolerance_limits(find_run_metric("coverage"), 0.7).lower, 0.7);
 }
 
 TEST_F(RunMetrics, CheckOneStationThrowsForTwoStations) {
@@ -97,12 +97,13 @@ TEST_F(RunMetrics, CheckRepetitionsThrowsForSameImages) {
   const auto points = judged();
   const auto values = select_study_values(points, {});
   ASSERT_THAT(values, SizeIs(2));
-  EXPECT_THAT(
-      rejection_message<std::invalid_argument>([&] { check_repetitions(records, points, values); }),
-      HasSubstr("runs " + numbered_run_id(1) + " and " + numbered_run_id(3) +
-                " of camera a have the same images, which is no repetition"));
-  EXPECT_EQ(rejection_message<std::invalid_argument>(
-                [&] { check_repetitions(records, points, select_study_values(points, {"b"})); }),
+  EXPECT_THAT(rejection_message<std::invalid_argument>(
+                  [&] { check_runs_share_no_images(records, points, values); }),
+              HasSubstr("runs " + numbered_run_id(1) + " and " + numbered_run_id(3) +
+                        " of camera a have the same images, which is no repetition"));
+  EXPECT_EQ(rejection_message<std::invalid_argument>([&] {
+              check_runs_share_no_images(records, points, select_study_values(points, {"b"}));
+            }),
             "");
 }
 

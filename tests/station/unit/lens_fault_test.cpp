@@ -99,7 +99,7 @@ struct OtherCamera : LensFault {
   PlacedCaptures reference, check;
 };
 
-TEST_F(OtherCamera, IsNotReportedForTiltedUnit) {
+TEST_F(OtherCamera, IsEmptyForTiltedUnit) {
   ASSERT_GT(check.frames.size(), 10U);
   set_camera(Lens(calibration.camera.lens_model, calibration.camera.intrinsics),
              Eigen::AngleAxisd(0.005, Eigen::Vector3d(1, 2, 0).normalized()).toRotationMatrix());

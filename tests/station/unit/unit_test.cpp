@@ -6,8 +6,8 @@
 
 #include "station/records/unit_report.h"
 #include "station/unit/station_screen.h"
+#include "station/unit/unit_causes.h"
 #include "station/unit/unit_record.h"
-#include "station/unit/unit_verdict.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {
@@ -170,7 +170,7 @@ TEST(RejectRepetition, ReportsEarlierRun) {
   RunRecord record;
   record.set_verdict({});
   ASSERT_TRUE(record.passed());
-  reject_repetition(record, "R1", "station.yaml");
+  reject_reused_images(record, "R1", "station.yaml");
   EXPECT_TRUE(record.invalid());
   EXPECT_EQ(record.first_cause(),
             "all images are those of run R1, which is no repetition: take new ones, or "

@@ -65,14 +65,14 @@ TEST_F(WatchedRunTest, PutsAwayItsOwnFolderOnly) {
   {
     const WatchedRun run(unit, spool);
     replace_by_link("captures/0001");
-    EXPECT_THAT(rejection_message([&] { run.put_away(); }),
+    EXPECT_THAT(rejection_message([&] { run.move_away(); }),
                 HasSubstr("0001: was moved or replaced while it was in use"));
     EXPECT_TRUE(fs::is_symlink(run.folder()));
   }
   fs::remove(folder / "captures/0001");
   fs::rename(folder / "moved", folder / "captures/0001");
   const WatchedRun again(unit, spool);
-  again.put_away();
+  again.move_away();
   EXPECT_TRUE(fs::exists(folder / ("captures/0001." + again.run())));
 }
 

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "lamps/shape/light_shape.h"
+#include "lamps/shape/light_center.h"
 
 #include <gtest/gtest.h>
 
