@@ -114,9 +114,9 @@ int main(int argc, char** argv) {
       "Everything that captures share, solved together: the camera's tilt and lever arm, the\n"
       "lamps' places, the lens within what its calibration leaves open, with their joint\n"
       "covariance, from any sets of captures: turns on a spot, known places, drives, heights.\n"
-      "captures.csv in a set's folder tells what is known: spot (captures of one name were taken\n"
-      "turning on one spot), x_m, y_m, z_m with place (camera or axis: whose place it is) and\n"
-      "place_sd_m; vx_m_per_s, vy_m_per_s, yaw_rate_rad_per_s with velocity_sd_m_per_s (of the\n"
+      "captures.csv in a set's folder tells what is known: pivot (captures of one name were taken\n"
+      "turning on one spot), x_m, y_m, z_m with reference_point (camera or axis) and\n"
+      "position_sd_m; vx_m_per_s, vy_m_per_s, yaw_rate_rad_per_s with velocity_sd_m_per_s (of the\n"
       "camera, in its level frame). A set called rotation is a turn on the spot.\n\n"
       "Example, from the project's folder:\n"
       "  build/bin/vlp-adjust datasets/example/detections.csv \\\n"
@@ -146,8 +146,8 @@ int main(int argc, char** argv) {
   app.add_option("--map-sd-m", options.map_sd_m,
                  "Standard deviation per axis of lamps whose survey states none")
       ->check(vlp::finite_not_negative());
-  app.add_option("--place-sd-m", options.place_sd_m,
-                 "Standard deviation per axis of places that state none, those of truth.csv too")
+  app.add_option("--position-sd-m", options.place_sd_m,
+                 "Standard deviation per axis of positions that state none, those of truth.csv too")
       ->check(vlp::make_finite_positive_validator());
   app.add_option("--lens-sd-px", options.lens_sd_px,
                  "Of a lens whose calibration states no covariance: by how much each of its "

@@ -89,7 +89,8 @@ int calibrate(int argc, char** argv) {
       ->option_text("STEP ...");
   add_threads_option(app, how.frontend.threads);
   app.add_flag(
-      "--each", [](std::int64_t) { throw CLI::ValidationError("--each", "stands alone"); },
+      "--batch-stdin",
+      [](std::int64_t) { throw CLI::ValidationError("--batch-stdin", "stands alone"); },
       "Alone: do what stdin says, a line of JSON for each session; see apps/vlp-calibrate.md");
   app.footer("Gates:\n" + gate_descriptions(session_metrics()));
   return run_app(app, argc, argv, [&] { run(options); });
@@ -99,7 +100,7 @@ int calibrate(int argc, char** argv) {
 }  // namespace vlp
 
 int main(int argc, char** argv) {
-  if (argc != 2 || std::string_view(argv[1]) != "--each") return vlp::calibrate(argc, argv);
+  if (argc != 2 || std::string_view(argv[1]) != "--batch-stdin") return vlp::calibrate(argc, argv);
   CLI::App app("", vlp::kName);
   return vlp::run_app(app, 1, argv, [] {
     vlp::prepare_tag_family("tag36h11");  // family of most boards

@@ -25,7 +25,7 @@ namespace vlp {
 namespace {
 
 const std::map<std::string, DispersionMethod> kMethods{{"camera", DispersionMethod::camera},
-                                                       {"paper", DispersionMethod::paper}};
+                                                       {"chen-guan", DispersionMethod::paper}};
 const std::map<std::string, DispersionCircle> kCircles{{"mean", DispersionCircle::mean},
                                                        {"enclosing", DispersionCircle::enclosing}};
 
@@ -38,7 +38,7 @@ struct Options {
   std::string method = "camera", circle = "mean", of = "camera";
 };
 
-/// Reads the table of the captures, without their places if --station gives them.
+/// Reads the table of the captures, without their reference points if --reference-point gives them.
 CapturesTable read_captures_table(const Options& options) {
   CapturesTable captures;
   if (!options.captures.empty()) {
@@ -58,13 +58,13 @@ KnownPlaces find_places(const Options& options, const std::vector<Frame>& frames
   KnownPlaces places = collect_known_places(frames, captures, station_m,
                                             options.of == "axis" ? PlaceOf::axis : PlaceOf::camera);
   if (places.captures.empty() && captures.empty()) {
-    throw std::invalid_argument("where is the station? Give --station or --captures");
+    throw std::invalid_argument("where is the station? Give --reference-point or --captures");
   }
   const std::string table = options.captures.empty() ? options.images.images : options.captures;
   if (places.captures.empty()) {
     throw InputError(table,
                      "tells no place of these captures: it needs x_m and y_m, and the names of the "
-                     "images; or give --station");
+                     "images; or give --reference-point");
   }
   if (places.without > 0) {
     spdlog::warn("{} of {} captures left out: {} does not tell their place", places.without,
@@ -106,7 +106,7 @@ int main(int argc, char** argv) {
       "Example, from the project's folder:\n"
       "  build/bin/vlp-dispersion datasets/example/station.csv \\\n"
       "    --lamps datasets/example/lamps.yaml \\\n"
-      "    --calibration datasets/example/calibration.yaml --station 0.1 0 \\\n"
+      "    --calibration datasets/example/calibration.yaml --reference-point 0.1 0 \\\n"
       "    -o calibration.yaml\n",
       "vlp-dispersion");
   vlp::Options options;
@@ -114,11 +114,13 @@ int main(int argc, char** argv) {
                            {"A folder of images taken at the station, or their detections.csv",
                             "Calibration of the camera; its rotation_center is applied",
                             "Where to write the calibration with its dispersion"});
-  auto* station = app.add_option("--station", options.station_m, "Where the camera is in the world")
-                      ->check(vlp::finite())
-                      ->option_text("X_M Y_M");
-  app.add_option("--of", options.of,
-                 "Whose place --station is: the camera's (default), or that of the axis it turns "
+  auto* station =
+      app.add_option("--reference-point", options.station_m, "Where the camera is in the world")
+          ->check(vlp::finite())
+          ->option_text("X_M Y_M");
+  app.add_option("--position-of", options.of,
+                 "Whose position --reference-point is: the camera's (default), or that of the axis "
+                 "it turns "
                  "about, a lever arm away")
       ->needs(station)
       ->check(CLI::IsMember({"camera", "axis"}))
@@ -129,10 +131,11 @@ int main(int argc, char** argv) {
       ->excludes(station);
   app.add_option(
          "--method", options.method,
-         "camera (default): captures at different yaws; paper: the circle's center, captures "
+         "camera (default): captures at different yaws; chen-guan: the circle's center, captures "
          "at one yaw, lamp map and station supposed right")
-      ->check(CLI::IsMember({"camera", "paper"}))
-      ->option_text("camera|paper");
+      ->check(vlp::present_value())
+      ->check(CLI::IsMember({"camera", "chen-guan"}))
+      ->option_text("camera|chen-guan");
   app.add_option("--circle", options.circle,
                  "The dispersion circle: around the mean fix (default), or the smallest enclosing")
       ->check(CLI::IsMember({"mean", "enclosing"}))

@@ -321,7 +321,8 @@ int main(int argc, char** argv) {
       "    --lamps datasets/example/lamps.yaml \\\n"
       "    --calibration datasets/example/calibration.yaml -o fixes.csv\n"
       "  build/bin/vlp-evaluate fixes.csv --truth datasets/example/truth.csv \\\n"
-      "    --gate mean_mm=0.2,p90_mm=0.4 --gate missing=0 --json evaluation.json \\\n"
+      "    --gate mean_mm=0.2,p90_mm=0.4 --gate missing_fraction=0 \\\n"
+      "    --json evaluation.json \\\n"
       "    --calibration datasets/example/calibration.yaml \\\n"
       "    --lamps datasets/example/lamps.yaml --report report.html\n",
       vlp::kName);

@@ -139,8 +139,8 @@ std::vector<Gate> parse_gates(const Options& options) {
 /// Returns true if a gate of the lens fails, not only gates of the views.
 bool has_failed_lens_gate(const std::vector<CheckedMetric>& gates) {
   return std::ranges::any_of(gates, [](const CheckedMetric& gate) {
-    return !gate.passed() &&
-           (gate.name == "rms_px" || gate.name == "uncertainty_px" || gate.name == "halves_px");
+    return !gate.passed() && (gate.name == "rms_px" || gate.name == "expected_max_error_px" ||
+                              gate.name == "split_half_px");
   });
 }
 
@@ -259,11 +259,11 @@ void add_solve_options(CLI::App& app, Options& options) {
          "Solve for how the board bends (default: auto, when the corners show it)")
       ->check(CLI::IsMember({"auto", "on", "off"}))
       ->option_text("auto|on|off");
-  app.add_option(
-         "--gate", options.gates,
-         "Change a gate: rms_px=1, uncertainty_px=2 (worst where the board was seen), halves_px=1 "
-         "(rms, between the lenses of two halves of the views), coverage=0.4 (of the image), "
-         "views=6 (that differ), board_tilt_deg=20 (between two views)")
+  app.add_option("--gate", options.gates,
+                 "Change a gate: rms_px=1, expected_max_error_px=2 (of a projection where the "
+                 "lens is known), split_half_px=1 (rms, between the lenses of two halves of the "
+                 "views), coverage=0.4 (of the image), "
+                 "views=6 (that differ), board_tilt_deg=20 (between two views)")
       ->delimiter(',')
       ->option_text("NAME=VALUE,...");
 }

@@ -52,10 +52,11 @@ UnitErrors stated_errors(const Options& options, const LampMap& lamps,
                          const Calibration& calibration) {
   UnitErrors unit(lamps, calibration);
   if (!unit.common().stated()) {
-    throw InputError(options.calibration,
-                     "states no errors of its own, and " + options.lamps +
-                         " no sd_m: state them with --center-px, --tilt-deg, --lamp-map-mm in "
-                         "place of --stated, or calibrate again");
+    throw InputError(
+        options.calibration,
+        "states no errors of its own, and " + options.lamps +
+            " no sd_m: state them with --principal-point-px, --tilt-deg, --lamp-map-mm in "
+            "place of --from-calibration, or calibrate again");
   }
   constexpr std::array<const char*, kCommonErrorSources.size()> names{"lens", "zenith", "offset",
                                                                       "lamp map"};
@@ -116,7 +117,7 @@ void run(const Options& options) {
     throw Undetermined(
         "the lamps in view tell motion and lean nowhere on this floor: a lean that is not known "
         "needs four lamps, or three that leave one place only; lower the camera, widen the lens, "
-        "add lamps, or state what is known (--lean-sd-deg, --max-speed-m-per-s)");
+        "add lamps, or state what is known (--roll-pitch-sd-deg, --max-speed-m-per-s)");
   }
   if (!summary) {
     throw Undetermined(
@@ -135,7 +136,7 @@ void add_options(CLI::App& app, Options& options) {
   app.add_option("--lamps", options.lamps, "Lamp map, lamps.yaml")->required();
   add_room_option(app, options.room);
   app.add_option("--calibration", options.calibration,
-                 "Calibration; its camera part is used, with --stated all of it")
+                 "Calibration; its camera part is used, with --from-calibration all of it")
       ->required();
   app.add_option("--height-m", options.height_m, "Height of the camera in the world")
       ->required()
@@ -144,7 +145,7 @@ void add_options(CLI::App& app, Options& options) {
                  "Standard deviation of each lamp's pixel, per axis")
       ->required()
       ->check(make_finite_positive_validator());
-  auto* center = app.add_option("--center-px", options.center_px,
+  auto* center = app.add_option("--principal-point-px", options.center_px,
                                 "... of the image center, per axis (default 0)")
                      ->check(finite_not_negative());
   auto* tilt = app.add_option("--tilt-deg", options.tilt_deg,
@@ -153,7 +154,7 @@ void add_options(CLI::App& app, Options& options) {
   auto* lamp_map = app.add_option("--lamp-map-mm", options.lamp_map_mm,
                                   "... of each lamp's position, per axis (default 0)")
                        ->check(finite_not_negative());
-  app.add_flag("--stated", options.stated,
+  app.add_flag("--from-calibration", options.stated,
                "In place of these three: what the calibration states of lens, zenith and offset, "
                "and the map (sd_m) or the calibration of the lamps")
       ->excludes(center)
@@ -163,7 +164,7 @@ void add_options(CLI::App& app, Options& options) {
                      "What it costs that the camera may drive, so fast at most, and that its "
                      "velocity is estimated "
                      "(default: it stands; odometry good to S m/s: twice S)");
-  app.add_option("--lean-sd-deg", options.lean_sd_deg,
+  app.add_option("--roll-pitch-sd-deg", options.lean_sd_deg,
                  "What it costs that roll and pitch are known to this standard deviation, and "
                  "estimated; 90: not at all (default: known)")
       ->check(finite_not_negative());
@@ -187,7 +188,8 @@ void add_options(CLI::App& app, Options& options) {
 int main(int argc, char** argv) {
   CLI::App app(
       "The theoretical limit of positioning over a floor, and the error budget: what pixel noise,\n"
-      "image center, tilt and lamp map each do to a fix; or, with --stated, what a calibration "
+      "image center, tilt and lamp map each do to a fix; or, with --from-calibration, what a "
+      "calibration "
       "and\n"
       "its lamp map say of their own errors, and so what to improve first. With that pixel noise\n"
       "no method reaches better from one image of a level camera.\n\n"

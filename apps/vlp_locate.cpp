@@ -56,7 +56,7 @@ CapturesTable read_captures_table(const Options& options) {
       (options.one_lamp || options.inclination_sigma_deg || options.height_sd_m ||
        options.yaw_rate_sd_deg_per_s || options.window_size > 1)) {
     throw std::invalid_argument(
-        "--one-lamp, --inclination-sigma-deg, --height-sd-m, --yaw-rate-sd-deg-per-s and --frames "
+        "--one-lamp, --inclination-sigma-deg, --height-sd-m, --yaw-rate-sd-deg-per-s and --window "
         "need captures.csv: give --captures");
   }
   const auto any_capture = [&](const auto& has) {
@@ -67,10 +67,10 @@ CapturesTable read_captures_table(const Options& options) {
     if (!options.motion.max_speed_m_per_s &&
         !any_capture([](const Capture& capture) { return capture.velocity_m_per_s.has_value(); })) {
       throw std::invalid_argument(
-          "--frames needs --max-speed-m-per-s, or velocities in captures.csv");
+          "--window needs --max-speed-m-per-s, or velocities in captures.csv");
     }
     if (!any_capture([](const Capture& capture) { return capture.time_s.has_value(); })) {
-      throw std::invalid_argument("--frames needs time_s in captures.csv");
+      throw std::invalid_argument("--window needs time_s in captures.csv");
     }
   }
   if (options.yaw_sd_deg &&
@@ -174,7 +174,7 @@ void add_sensor_options(CLI::App& app, Options& options) {
       "captures.csv says, or else it stands)");
   add_yaw_rate_sd_option(app, options.yaw_rate_sd_deg_per_s);
   app.add_option(
-         "--lean-sd-deg", options.lean_sd_deg,
+         "--roll-pitch-sd-deg", options.lean_sd_deg,
          "The camera leans by an unknown angle, of this standard deviation about level: roll "
          "and pitch are estimated from each image of three lamps or more; 90: by any "
          "(default: level, or as captures.csv says)")
@@ -186,7 +186,7 @@ void add_sensor_options(CLI::App& app, Options& options) {
          "--one-lamp")
       ->check(make_finite_positive_validator());
   app.add_option(
-         "--frames", options.window_size,
+         "--window", options.window_size,
          "Captures to fix together, with one velocity, where captures.csv has time_s within "
          "0.2 s (default: 1)")
       ->check(CLI::Range(1, 2));

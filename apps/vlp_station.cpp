@@ -136,8 +136,9 @@ void add_commands_of_a_run(CLI::App& app, StationRecordsOptions& options) {
 
 /// Adds the commands that check or change records and results.
 void add_upkeep(CLI::App& app, StationRecordsOptions& options) {
-  CLI::App* clean = app.add_subcommand(
-      "clean", "What of the runs is kept no longer ('keep' in station.yaml); records stay");
+  CLI::App* clean = app.add_subcommand("clean",
+                                       "Lists or deletes images and results of old runs "
+                                       "('retention' in station.yaml); records stay");
   clean->add_option("--station", options.station, "The station, station.yaml")->required();
   clean->add_flag("--delete", options.remove, "Delete it (default: only tell)");
   CLI::App* verify_records = add_records_location(
@@ -145,7 +146,7 @@ void add_upkeep(CLI::App& app, StationRecordsOptions& options) {
       "Whether the records are as they were kept: what was changed, removed or added by hand, by "
       "name; exit code 1 when there is any",
       options);
-  verify_records->add_option("--noted", options.expected_digest,
+  verify_records->add_option("--expected-digest", options.expected_digest,
                              "The last digest that an earlier verify-records told: the trail has "
                              "to have it still");
   CLI::App* voided = add_records_location(

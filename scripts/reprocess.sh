@@ -7,7 +7,7 @@
 #   scripts/reprocess.sh ARCHIVE RESULTS [--gates FILE] [--previous RESULTS]
 #                        [--cores N] [--profile slurm] [--session-gates FILE]
 #                        [--row-time-s S] [--readout rows|columns]
-#                        [--shard-size N] [--keep N] [--look files|folders]
+#                        [--shard-size N] [--keep N] [--scan files|folders]
 #                        [--rebuild-catalogue]
 #   scripts/reprocess.sh --diff RESULTS CAMERA/SESSION [KEY | OTHER_RESULTS]
 #
@@ -39,7 +39,7 @@
 # --shard-size N   sessions in a job at most (default 50)
 # --keep N         results that a session had before, of which so many stay in
 #                  former/ (default 1)
-# --look           at what, to see that a session changed: at its files, or at
+# --scan           at what, to see that a session changed: at its files, or at
 #                  its folders, tables and YAML files, to which an image that
 #                  is written over in place looks the same. Default: files; in
 #                  an archive of more than 10,000 sessions folders, and files
@@ -76,16 +76,16 @@ folders=() plan=() profile=''
 cores=$(($(nproc) + 1))
 while [ $# -gt 0 ]; do
   case $1 in
-    --gates | --session-gates | --previous | --shard-size | --keep | --look | --cores | --profile | --row-time-s | --readout)
+    --gates | --session-gates | --previous | --shard-size | --keep | --scan | --cores | --profile | --row-time-s | --readout)
       [ $# -gt 1 ] || usage "$1 wants a value"
       case $1 in
         --cores | --shard-size) [[ $2 =~ ^[1-9][0-9]*$ ]] || usage "$1: should be a number from 1" ;;
         --keep) [[ $2 =~ ^[0-9]+$ ]] || usage "$1: should be a number" ;;
-        --look) [[ $2 =~ ^(files|folders)$ ]] || usage "$1: should be files or folders" ;;
+        --scan) [[ $2 =~ ^(files|folders)$ ]] || usage "$1: should be files or folders" ;;
         --row-time-s) [[ $2 =~ ^[0-9.]+(e-?[0-9]+)?$ ]] || usage "$1: should be seconds" ;;
         --readout) [[ $2 =~ ^(rows|columns)$ ]] || usage "$1: should be rows or columns" ;;
       esac ;;&
-    --gates | --session-gates | --previous | --shard-size | --keep | --look) plan+=("$1" "$2"); shift ;;
+    --gates | --session-gates | --previous | --shard-size | --keep | --scan) plan+=("$1" "$2"); shift ;;
     --row-time-s | --readout) plan+=("--camera-option=$1" "--camera-option=$2"); shift ;;
     --rebuild-catalogue) plan+=("$1") ;;
     --cores) cores=$2; shift ;;
@@ -94,6 +94,7 @@ while [ $# -gt 0 ]; do
       [ -e "$profile/config.yaml" ] || usage "--profile $2: neither of ours nor a folder with config.yaml"
       shift ;;
     -h | --help) sed -n '5,/^set/p' "$0" | sed '$d; s/^# \{0,1\}//'; exit ;;
+    --look | --look=*) usage "option '--look' is now called '--scan'" ;;
     -*) usage "unknown option $1" ;;
     *) folders+=("${1%/}") ;;
   esac

@@ -117,9 +117,9 @@ measured() {  # LABEL NAME CHECK
 }
 
 for lamps in 2 3; do
-  calibrate paper-$lamps -$lamps circle paper dispersion-one-yaw
+  calibrate paper-$lamps -$lamps circle chen-guan dispersion-one-yaw
   calibrate exact-$lamps -$lamps axis camera dispersion
-  calibrate blurred-$lamps -$lamps circle paper dispersion-one-yaw -blurred
+  calibrate blurred-$lamps -$lamps circle chen-guan dispersion-one-yaw -blurred
 done
 calibrate exact "" axis camera dispersion
 vlp rotation "$out/rotation.csv" --method lamps --lamps "$out/lamps.yaml" \

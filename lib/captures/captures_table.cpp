@@ -39,8 +39,8 @@ struct Pair {
 CapturesTable read_captures(const std::filesystem::path& file) {
   const CsvTable csv(file);
   const auto image = csv.required("image");
-  const auto place = csv.optional("place"), place_sd = csv.optional("place_sd_m"),
-             spot = csv.optional("spot");
+  const auto place = csv.optional("reference_point"), place_sd = csv.optional("position_sd_m"),
+             spot = csv.optional("pivot");
   const Pair lean(csv, "roll_rad", "pitch_rad"), velocity(csv, "vx_m_per_s", "vy_m_per_s");
   const auto velocity_sd = csv.optional("velocity_sd_m_per_s");
   CapturesTable table;
@@ -57,7 +57,7 @@ CapturesTable read_captures(const std::filesystem::path& file) {
     if (place && !csv.text(row, *place).empty()) {
       const std::string_view whose = csv.text(row, *place);
       if (whose != "camera" && whose != "axis") {
-        throw csv.error(row, *place, "should be camera or axis: whose place it is");
+        throw csv.error(row, *place, "should be camera or axis: the point whose position is given");
       }
       capture.place = whose == "axis" ? PlaceOf::axis : PlaceOf::camera;
     }

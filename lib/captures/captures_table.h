@@ -19,7 +19,8 @@ enum class PlaceOf { camera, axis };
 /// Known properties of a capture besides its image.
 struct Capture {
   std::optional<double> time_s;
-  /// Known position of the camera or of the axis of rotation (`place`); the yaw is the camera's.
+  /// Known position of the camera or of the axis of rotation (`reference_point`); the yaw is the
+  /// camera's.
   std::optional<double> x_m, y_m, z_m, yaw_rad;
   PlaceOf place = PlaceOf::camera;
   /// Standard deviation of the position per axis, if known.
@@ -38,12 +39,12 @@ struct Capture {
 /// Captures by image name.
 using CapturesTable = std::map<std::string, Capture>;
 
-/// Reads `captures.csv`. Columns: image, then any of time_s, x_m, y_m, z_m, yaw_rad, place,
-/// place_sd_m, spot, roll_rad, pitch_rad, vx_m_per_s, vy_m_per_s, yaw_rate_rad_per_s,
-/// velocity_sd_m_per_s. A field may be empty.
+/// Reads `captures.csv`. Columns: image, then any of time_s, x_m, y_m, z_m, yaw_rad,
+/// reference_point, position_sd_m, pivot, roll_rad, pitch_rad, vx_m_per_s, vy_m_per_s,
+/// yaw_rate_rad_per_s, velocity_sd_m_per_s. A field may be empty.
 /// @throws InputError as CsvTable; if an image occurs twice; if only one of roll_rad and pitch_rad,
-/// or of the velocities, is given; if a place is neither camera nor axis; if a standard deviation
-/// is negative or has no velocity
+/// or of the velocities, is given; if a reference point is neither camera nor axis; if a standard
+/// deviation is negative or has no velocity
 CapturesTable read_captures(const std::filesystem::path& file);
 
 /// Reads the captures.csv of a folder; returns an empty table if there is none. Throws InputError.

@@ -11,6 +11,7 @@
 
 #include "captures/csv_formula.h"
 #include "rig/file.h"
+#include "rig/renamed.h"
 #include "rig/yaml_text.h"
 
 namespace vlp {
@@ -115,7 +116,13 @@ CsvTable::Column CsvTable::required(std::string_view name) const {
 
 std::optional<CsvTable::Column> CsvTable::optional(std::string_view name) const {
   const auto found = std::find(header_.begin(), header_.end(), name);
-  if (found == header_.end()) return std::nullopt;
+  if (found == header_.end()) {
+    const std::string_view former = find_former_name(NameKind::column, name);
+    if (!former.empty() && std::ranges::find(header_, former) != header_.end()) {
+      throw InputError(file_, 1, "", "column " + describe_renaming(former, name));
+    }
+    return std::nullopt;
+  }
   return Column{static_cast<std::size_t>(found - header_.begin())};
 }
 

@@ -28,7 +28,8 @@ class CsvTable {
   struct Column {
     std::size_t index;
   };
-  /// Returns a column. Throws InputError if it is missing.
+  /// Returns a column. Throws InputError if it is missing, or, also if it is optional, if the table
+  /// has it under its former name.
   Column required(std::string_view name) const;
   std::optional<Column> optional(std::string_view name) const;
 

@@ -63,7 +63,7 @@ Json to_json(const BiasAndScatter& statistics) {
   return {{"stations", statistics.stations.size()},
           {"fixes", statistics.fixes},
           {"bias_mm", kMmKeys.factor * statistics.bias_m},
-          {"scatter_mm", kMmKeys.factor * statistics.scatter_m},
+          {"repeatability_mm", kMmKeys.factor * statistics.scatter_m},
           {"list", list}};
 }
 
@@ -110,7 +110,7 @@ Json to_json(const std::vector<CheckedMetric>& gates) {
                     {"unit", gate.unit},
                     {"value", gate.value ? Json(*gate.value) : Json(nullptr)},
                     {"limit", gate.limit.value()},
-                    {"asked", describe(gate.direction)},
+                    {"direction", describe(gate.direction)},
                     {"passed", gate.passed()}});
   }
   return list;
@@ -125,7 +125,7 @@ std::string to_json(const Evaluation& evaluation, const std::vector<CheckedMetri
             {"against", evaluation.reference},
             {"captures", evaluation.captures},
             {"fixes", evaluation.fixes},
-            {"missing_share", evaluation.missing_fraction()},
+            {"missing_fraction", evaluation.missing_fraction()},
             {"missing", evaluation.missing},
             {"horizontal", to_json(evaluation.horizontal_m, kMmKeys)}};
   if (const auto& intervals = evaluation.intervals_m) {
@@ -142,7 +142,8 @@ std::string to_json(const Evaluation& evaluation, const std::vector<CheckedMetri
   if (evaluation.yaw_rad) json["yaw"] = to_json(*evaluation.yaw_rad, kDegKeys);
   if (evaluation.stations) json["repeated"] = to_json(*evaluation.stations);
   if (evaluation.fit) json["fitted_line"] = to_json(*evaluation.fit);
-  if (evaluation.normalized_errors) json["stated_ratio"] = to_json(*evaluation.normalized_errors);
+  if (evaluation.normalized_errors)
+    json["normalized_error_rms"] = to_json(*evaluation.normalized_errors);
   if (evaluation.limit) {
     json["limit"] = {{"ratio", evaluation.limit->horizontal},
                      {"limit_rms_mm", kMmKeys.factor * evaluation.limit->limit_m},

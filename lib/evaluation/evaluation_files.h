@@ -20,10 +20,10 @@ namespace vlp {
 ///   height, yaw   with bias
 ///   repeated      bias and scatter of stations with two fixes or more, and the list of stations
 ///   fitted_line   of --line; jitter, angle, ends
-///   stated_ratio  errors / reported standard deviation
+///   normalized_error_rms  errors / reported standard deviation
 ///   limit         errors / theoretical limit, and whether they are below it
 ///   comparison    verdict, pairs, difference, and the smallest difference that matters
-///   gates         name, unit, value, limit, asked ("at most" or "at least"), passed
+///   gates         name, unit, value, limit, direction ("at most" or "at least"), passed
 ///   passed        true if all gates are passed
 std::string to_json(const Evaluation& evaluation, const std::vector<CheckedMetric>& gates);
 

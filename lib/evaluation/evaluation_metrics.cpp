@@ -29,13 +29,14 @@ std::vector<Metric> collect_metrics(const Evaluation& evaluation) {
   add_mm("rms_mm", errors_m.rms);
   if (const auto& stations = evaluation.stations) {
     add_mm("bias_mm", stations->bias_m);
-    add_mm("scatter_mm", stations->scatter_m);
+    add_mm("repeatability_mm", stations->scatter_m);
   }
   if (evaluation.height_m) add_mm("height_rms_mm", evaluation.height_m->sizes.rms);
   if (evaluation.yaw_rad) add("yaw_rms_deg", deg_from_rad(evaluation.yaw_rad->sizes.rms));
-  add("missing", evaluation.missing_fraction());
-  if (evaluation.normalized_errors) add("stated_ratio", evaluation.normalized_errors->horizontal);
-  if (evaluation.limit) add("limit_ratio", evaluation.limit->horizontal);
+  add("missing_fraction", evaluation.missing_fraction());
+  if (evaluation.normalized_errors)
+    add("normalized_error_rms", evaluation.normalized_errors->horizontal);
+  if (evaluation.limit) add("crlb_ratio", evaluation.limit->horizontal);
   if (const auto& fit = evaluation.fit) {
     add_mm("fitted_mean_mm", fit->distances_m.mean);
     add_mm("fitted_p90_mm", fit->distances_m.p90);

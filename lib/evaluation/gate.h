@@ -75,7 +75,7 @@ std::vector<Gate> read_gates(const YamlValue& value, const std::vector<MetricKin
 
 /// Reads `vlp-gates/1`:
 ///   format: vlp-gates/1
-///   gates: {mean_mm: 1, p90_mm: 2, missing: 0}
+///   gates: {mean_mm: 1, p90_mm: 2, missing_fraction: 0}
 std::vector<Gate> read_gates(const std::filesystem::path& file,
                              const std::vector<MetricKind>& known);
 

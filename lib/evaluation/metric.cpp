@@ -6,6 +6,8 @@
 #include <array>
 #include <cmath>
 
+#include "rig/renamed.h"
+
 namespace vlp {
 namespace {
 
@@ -19,12 +21,12 @@ constexpr std::array kMetricKinds{
     MetricKind{"focal_percent", "%", MetricSource::station,
                "difference of the focal length from the nominal one",
                "wrong lens: another focal length than the type's"},
-    MetricKind{"center_px", "px", MetricSource::station,
+    MetricKind{"principal_point_px", "px", MetricSource::station,
                "distance of the image center from the nominal one", "the lens is decentered"},
-    MetricKind{"nominal_px", "px", MetricSource::station,
+    MetricKind{"nominal_difference_px", "px", MetricSource::station,
                "worst difference of the projection from the nominal one, but for a turn",
                "the lens is not of the type"},
-    MetricKind{"board_bend_mm", "mm", MetricSource::station,
+    MetricKind{"board_warp_mm", "mm", MetricSource::station,
                "how far the middle of the board is from flat", "the board is bent",
                Direction::at_most, kMaxLimit, false},
     MetricKind{"mtf50_asymmetry", "", MetricSource::lens,
@@ -61,12 +63,12 @@ constexpr std::array kMetricKinds{
                "board.yaml), rms over the image",
                "the board is not printed accurately enough"},
     MetricKind{
-        "uncertainty_px", "px", MetricSource::lens,
+        "expected_max_error_px", "px", MetricSource::lens,
         "expected largest error of a projection over the region where the lens is known, from "
         "the noise of the corners and from the board's print (board_print_px)",
         "the lens is not known well enough: other board views, or a more accurate board",
         Direction::at_most, kMaxLimit, false},
-    MetricKind{"halves_px", "px", MetricSource::lens,
+    MetricKind{"split_half_px", "px", MetricSource::lens,
                "difference of the lenses of every other view, rms per axis",
                "two halves of the board views give two lenses"},
     MetricKind{"coverage", "", MetricSource::lens, "share of the image in which there are corners",
@@ -101,13 +103,13 @@ constexpr std::array kMetricKinds{
     MetricKind{"dispersion_offset_px", "px", MetricSource::dispersion,
                "length of the dispersion's offset",
                "the fixes at the station turn with the camera"},
-    MetricKind{"world_mm", "mm", MetricSource::dispersion,
+    MetricKind{"world_offset_mm", "mm", MetricSource::dispersion,
                "offset of the fixes that does not turn with the camera",
                "the station or its lamp map is off", Direction::at_most, kMaxLimit, false},
-    MetricKind{"check_fixes", "", MetricSource::station,
+    MetricKind{"check_fix_fraction", "", MetricSource::station,
                "share of the check captures that have a fix", "captures of the check have no fix",
                Direction::at_least, 1},
-    MetricKind{"check_lamps", "", MetricSource::station,
+    MetricKind{"check_lamp_inlier_fraction", "", MetricSource::station,
                "share of the lamps seen in the check captures that the fixes rest on",
                "lamps contradict their map", Direction::at_least, 1},
     MetricKind{"check_lamps_seen", "", MetricSource::station,
@@ -138,9 +140,10 @@ constexpr std::array kMetricKinds{
         "bias_mm", "mm", MetricSource::evaluation,
         "what the fixes of a station share; needs a truth and stations with two fixes or more",
         kFixesCause},
-    MetricKind{"scatter_mm", "mm", MetricSource::evaluation,
-               "of fixes within stations; needs a truth and stations with two fixes or more",
-               kFixesCause},
+    MetricKind{
+        "repeatability_mm", "mm", MetricSource::evaluation,
+        "scatter of the fixes within stations; needs a truth and stations with two fixes or more",
+        kFixesCause},
     MetricKind{
         "height_rms_mm", "mm", MetricSource::evaluation,
         "root mean square of the height errors; needs z_m in the truth or the path",
@@ -148,14 +151,15 @@ constexpr std::array kMetricKinds{
     MetricKind{"yaw_rms_deg", "deg", MetricSource::evaluation,
                "root mean square of the yaw errors; needs yaw_rad in the truth",
                "the yaws are worse than was asked for", Direction::at_most, 180},
-    MetricKind{"missing", "", MetricSource::evaluation,
+    MetricKind{"missing_fraction", "", MetricSource::evaluation,
                "share of the captures without a fix, from 0 to 1", "captures have no fix",
                Direction::at_most, 1},
-    MetricKind{"stated_ratio", "", MetricSource::evaluation,
-               "horizontal errors / stated sd; needs a truth and sd columns",
+    MetricKind{"normalized_error_rms", "", MetricSource::evaluation,
+               "horizontal errors / stated sd, rms; needs a truth and sd columns",
                "the fixes claim to be better than they are"},
-    MetricKind{"limit_ratio", "", MetricSource::reference,
-               "horizontal errors / theoretical limit; needs --lamps, --calibration, --noise-px",
+    MetricKind{"crlb_ratio", "", MetricSource::reference,
+               "horizontal errors / theoretical limit (CRLB), rms; needs --lamps, --calibration, "
+               "--noise-px",
                kFixesCause},
     MetricKind{"fitted_mean_mm", "mm", MetricSource::reference,
                "mean distance of the fitted line; needs --line", kFixesCause},
@@ -190,6 +194,11 @@ std::optional<MetricKind> metric_kind(const std::string& name) {
   const auto kind = std::find_if(kMetricKinds.begin(), kMetricKinds.end(),
                                  [&](const MetricKind& each) { return each.name == name; });
   return kind == kMetricKinds.end() ? std::nullopt : std::optional(*kind);
+}
+
+std::string present_metric_name(const std::string& name) {
+  const std::string_view present = find_present_name(NameKind::metric, name);
+  return present.empty() ? name : std::string(present);
 }
 
 std::optional<double> find_metric_value(const std::vector<Metric>& metrics,

@@ -79,7 +79,8 @@ std::vector<Gate> propose_gates(const EvaluationInput& input, const Evaluation& 
       errors, [](const FixError& error) { return error.yaw_rad; }, input.threads);
   if (yaw_rad) add("yaw_rms_deg", evaluation.yaw_rad->sizes.rms, yaw_rad->rms, degrees);
   constexpr double millionth = 1e-6;  // resolution of the written limit
-  gates.push_back({"missing", millionth * std::ceil(evaluation.missing_fraction() / millionth)});
+  gates.push_back(
+      {"missing_fraction", millionth * std::ceil(evaluation.missing_fraction() / millionth)});
   return gates;
 }
 

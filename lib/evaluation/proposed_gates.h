@@ -20,7 +20,7 @@ namespace vlp {
 /// their intervals are too narrow.
 ///
 /// The margin is at least 1 % and 1 um (0.001 degrees), and limits are rounded up to three digits.
-/// The limit of `missing` is the measured fraction, rounded up to a millionth.
+/// The limit of `missing_fraction` is the measured fraction, rounded up to a millionth.
 std::vector<Gate> propose_gates(const EvaluationInput& input, const Evaluation& evaluation);
 
 /// Formats gates as a file `vlp-gates/1`, with the value each is derived from as a comment.

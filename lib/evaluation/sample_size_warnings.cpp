@@ -22,12 +22,13 @@ std::string describe_few(std::size_t clusters, const std::string& resampling_uni
 std::string make_missing_fixes_warning(const Evaluation& evaluation,
                                        const std::vector<CheckedMetric>& gates) {
   const std::size_t missing = evaluation.captures - evaluation.fixes;
-  const bool has_gate = std::any_of(
-      gates.begin(), gates.end(), [](const CheckedMetric& gate) { return gate.name == "missing"; });
+  const bool has_gate = std::any_of(gates.begin(), gates.end(), [](const CheckedMetric& gate) {
+    return gate.name == "missing_fraction";
+  });
   if (gates.empty() || missing == 0 || has_gate) return "";
   return std::to_string(missing) + " of " + std::to_string(evaluation.captures) +
          (missing == 1 ? " captures has" : " captures have") +
-         " no fix, and no gate 'missing' asks";
+         " no fix, and no gate 'missing_fraction' asks";
 }
 
 std::string make_limit_warning(const Evaluation& evaluation) {

@@ -10,9 +10,9 @@
 
 namespace vlp {
 
-/// Returns, for example, "393 of 432 captures have no fix, and no gate 'missing' asks". Returns an
-/// empty text if every capture has a fix or if a gate limits `missing`. Empty without gates, too,
-/// as no run passes then.
+/// Returns, for example, "393 of 432 captures have no fix, and no gate 'missing_fraction' asks".
+/// Returns an empty text if every capture has a fix or if a gate limits `missing_fraction`. Empty
+/// without gates, too, as no run passes then.
 std::string make_missing_fixes_warning(const Evaluation& evaluation,
                                        const std::vector<CheckedMetric>& gates);
 

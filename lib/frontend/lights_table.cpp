@@ -64,7 +64,7 @@ std::string_view to_string(LightKind kind) {
     case LightKind::steady:
       return "steady";
     case LightKind::formless:
-      return "formless";
+      return "no_outline";
   }
   return {};
 }
@@ -140,15 +140,15 @@ std::string describe_light(const Light& light) {
       fmt::format(", {} {:.0f} % {}, contrast {:.2f}", outline_name(light), 100 * light.roundness,
                   traits_of(light.shape).is_round ? "round" : "straight", stripes.contrast);
   if (!(stripes.period_lines > 0)) return line;
-  return line + fmt::format(", {:.1f} periods of {:.2f} lines, clarity {:.2f}, coherence {:.2f}",
-                            stripes.periods, stripes.period_lines, stripes.clarity,
-                            light.coherence);
+  return line + fmt::format(
+                    ", {:.1f} periods of {:.2f} lines, periodicity_r2 {:.2f}, coherence {:.2f}",
+                    stripes.periods, stripes.period_lines, stripes.periodicity_r2, light.coherence);
 }
 
 void write_lights(const std::filesystem::path& file, std::span<const Observation> images) {
   CsvWriter csv(file, {"image", "kind", "reason", "lamp", "u_px", "v_px", "sigma_px", "radius_px",
-                       "outline", "rise_px", "roundness", "contrast", "period_lines", "periods",
-                       "clarity", "coherence", "duty"});
+                       "outline", "edge_rise_px", "inlier_fraction", "contrast", "period_lines",
+                       "periods", "periodicity_r2", "coherence", "duty"});
   const auto number_if = [](bool there, double value) { return there ? fixed(value, 4) : ""; };
   for (const Observation& image : images) {
     for (const Light& light : image.lights) {
@@ -160,7 +160,7 @@ void write_lights(const std::filesystem::path& file, std::span<const Observation
                number_if(form, light.sigma_px), fixed(light.radius_px, 4), outline_name(light),
                number_if(form, light.rise_px), number_if(form, light.roundness),
                number_if(form, stripes.contrast), number_if(striped, stripes.period_lines),
-               number_if(striped, stripes.periods), number_if(striped, stripes.clarity),
+               number_if(striped, stripes.periods), number_if(striped, stripes.periodicity_r2),
                number_if(striped, light.coherence), number_if(striped, stripes.duty)});
     }
   }

@@ -38,9 +38,9 @@ std::string describe(LightReason reason);
 std::string describe_light(const Light& light);
 
 /// Writes `lights.csv` atomically, one row per light. Columns: image, kind, reason (to_string()
-/// both), lamp, u_px, v_px, sigma_px, radius_px, outline (edge, rim, glow or shape), rise_px,
-/// roundness, contrast, period_lines, periods, clarity, coherence, duty; see Light and Stripes.
-/// Cells are empty for a light without lamp, stripes or outline.
+/// both), lamp, u_px, v_px, sigma_px, radius_px, outline (edge, rim, glow or shape), edge_rise_px,
+/// inlier_fraction, contrast, period_lines, periods, periodicity_r2, coherence, duty; see Light and
+/// Stripes. Cells are empty for a light without lamp, stripes or outline.
 /// @throws InputError if the file cannot be written
 void write_lights(const std::filesystem::path& file, std::span<const Observation> images);
 

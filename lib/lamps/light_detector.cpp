@@ -111,7 +111,7 @@ std::optional<LightReason> find_steady_reason(const Light& light) {
     return light.clipped > min_clipped ? LightReason::overexposed : LightReason::steady;
   }
   if (!(stripes.periods >= kMinPeriods)) return LightReason::too_few_periods;
-  if (!(stripes.clarity >= min_clarity)) return LightReason::no_clear_period;
+  if (!(stripes.periodicity_r2 >= min_clarity)) return LightReason::no_clear_period;
   if (!(light.coherence >= kMinCoherence)) return LightReason::no_clear_period;
   return std::nullopt;
 }

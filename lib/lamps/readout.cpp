@@ -17,7 +17,7 @@ double compute_readout_evidence(std::span<const Light> lights) {
   double sum = 0;
   for (const Light& light : lights) {
     if (!is_modulated(light)) continue;
-    sum += light.stripes.clarity * light.stripes.contrast * light.roundness;
+    sum += light.stripes.periodicity_r2 * light.stripes.contrast * light.roundness;
   }
   return sum;
 }

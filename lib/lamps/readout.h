@@ -16,8 +16,8 @@ namespace vlp {
 
 /// Evidence of images for each readout direction.
 struct ReadoutEvidence {
-  /// Sum over the modulated lights detected with readout along rows, and along columns, of clarity
-  /// times contrast times roundness, each from 0 to 1.
+  /// Sum over the modulated lights detected with readout along rows, and along columns, of
+  /// periodicity times contrast times roundness, each from 0 to 1.
   double rows = 0, columns = 0;
 
   /// Returns the readout direction with the larger evidence. Returns std::nullopt if this evidence

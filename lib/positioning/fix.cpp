@@ -33,7 +33,7 @@ constexpr std::array<Entry, 13> kStatuses{{
      "two poses fit the lamps: another lamp would tell, or a known height or inclination"},
     {FixStatus::inconsistent, "inconsistent",
      "the lamps contradict each other: a wrong identity, another room's lamp map, or a camera that "
-     "leans, which a fix with the lean free would show (--lean-sd-deg)"},
+     "leans, which a fix with the lean free would show (--roll-pitch-sd-deg)"},
     {FixStatus::mirrored_map, "mirrored_map",
      "the lamps fit the map's mirror image: it is drawn as seen from below, or identities are "
      "swapped"},

@@ -24,6 +24,7 @@
 
 #include "program/help_formatter.h"
 #include "program/reference.h"
+#include "rig/renamed.h"
 
 namespace vlp {
 namespace {
@@ -64,12 +65,26 @@ CLI::Validator number_check(const std::string& name, bool (*accepts)(double)) {
       "");
 }
 
-/// Returns the unknown options on the command line, separated by commas.
-std::string unknown_options(const CLI::App& app) {
+/// Returns true if the program, or the command that was given, has an option.
+bool has_option(const CLI::App& app, const std::string& name) {
+  const auto commands = app.get_subcommands();
+  return app.get_option_no_throw(name) != nullptr ||
+         std::ranges::any_of(commands, [&](const CLI::App* command) {
+           return command->get_option_no_throw(name) != nullptr;
+         });
+}
+
+/// Describes the unknown options of the command line; returns an empty string if there are none.
+std::string describe_unknown_options(const CLI::App& app) {
   std::string names;
-  for (const std::string& word : app.remaining()) {
+  for (const std::string& word : app.remaining(true)) {
     if (!word.starts_with("--")) continue;
-    names.append(names.empty() ? "" : ", ").append(word);
+    const std::string name = word.substr(0, word.find('='));
+    const std::string present(find_present_name(NameKind::option, name));
+    if (!present.empty() && has_option(app, present)) {
+      return "option " + describe_renaming(name, present);
+    }
+    names.append(names.empty() ? "unknown: " : ", ").append(word);
   }
   return names;
 }
@@ -130,6 +145,15 @@ CLI::Validator make_ending_validator(const std::string& ending) {
   return CLI::Validator(
       [ending](const std::string& name) {
         return name.ends_with(ending) ? std::string() : "the file's name should end in " + ending;
+      },
+      "");
+}
+
+CLI::Validator present_value() {
+  return CLI::Validator(
+      [](const std::string& text) {
+        const std::string_view present = find_present_name(NameKind::value, text);
+        return present.empty() ? std::string() : describe_renaming(text, present);
       },
       "");
 }
@@ -196,12 +220,12 @@ int run_app(CLI::App& app, int argc, char** argv, const std::function<void()>& r
   } catch (const CLI::Success& success) {  // --help, --version
     return check_stdout(app.exit(success));
   } catch (const CLI::ParseError& error) {
-    const auto unknown =
-        unknown_options(app);  // a misspelled option is more informative than a missing one
+    const auto unknown = describe_unknown_options(
+        app);  // a misspelled option is more informative than a missing one
     if (const auto problem = command_problem(app); !problem.empty()) {
       spdlog::error("{}; see {} --help", problem, app.get_name());
     } else if (!unknown.empty()) {
-      spdlog::error("unknown: {}; see {} --help", unknown, app.get_name());
+      spdlog::error("{}; see {} --help", unknown, app.get_name());
     } else {
       spdlog::error("{}; see {} --help", error.what(), app.get_name());
     }

@@ -37,6 +37,9 @@ CLI::Validator finite();
 CLI::Validator make_finite_positive_validator();
 CLI::Validator finite_not_negative();
 
+/// Returns a validator that rejects the former name of a value and names the present one.
+CLI::Validator present_value();
+
 /// Returns a validator that accepts file names with this ending.
 CLI::Validator make_ending_validator(const std::string& ending);
 /// Returns a validator that accepts file names of plots: .png or .svg.

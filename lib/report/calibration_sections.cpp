@@ -63,12 +63,12 @@ std::string intrinsics_table(const IntrinsicsReport& report) {
                   {"outliers", std::to_string(report.outliers)},
                   {"residual, rms per axis", significant(report.rms_px, 3) + " px"}};
   }
-  if (report.uncertainty_px) {
+  if (report.expected_max_error_px) {
     table.rows.push_back({"largest error of the projection that is to be expected",
-                          significant(*report.uncertainty_px, 3) + " px"});
+                          significant(*report.expected_max_error_px, 3) + " px"});
   }
   if (!report.region_px.empty()) {
-    table.rows.push_back({"known", "where the board was seen, region_px; elsewhere not"});
+    table.rows.push_back({"known", "where the board was seen, valid_region_px; elsewhere not"});
   }
   if (report.board_warp_m) {
     const auto& [x_m, y_m] = *report.board_warp_m;

@@ -104,13 +104,13 @@ IntrinsicsReport read_intrinsics_report(YamlMap map, std::size_t intrinsics) {
     const auto warp = value->numbers(2);
     report.board_warp_m = {warp[0], warp[1]};
   }
-  if (const auto value = map.optional("uncertainty_px")) {
-    report.uncertainty_px = value->number_within(0, kInfinity, "px");
+  if (const auto value = map.optional("expected_max_error_px")) {
+    report.expected_max_error_px = value->number_within(0, kInfinity, "px");
   }
   if (const auto value = map.optional("covariance")) {
     report.covariance = read_joint_covariance(*value, intrinsics);
   }
-  if (const auto value = map.optional("region_px")) {
+  if (const auto value = map.optional("valid_region_px")) {
     for (const YamlValue& corner : value->list()) {
       const auto pixel = corner.numbers(2);
       report.region_px.emplace_back(pixel[0], pixel[1]);
@@ -143,14 +143,14 @@ RotationCenter read_rotation_center(YamlMap map, std::size_t intrinsics) {
     if (!center.lever_arm_m) throw value->error("is of no lever_arm_m");
     center.lever_arm_covariance = read_covariance(*value);
   }
-  if (const auto value = map.optional("by_intrinsics")) {
+  if (const auto value = map.optional("jacobian_intrinsics")) {
     center.by_intrinsics = read_matrix(*value, 2, intrinsics);
   }
-  if (const auto value = map.optional("lever_arm_by_zenith")) {
+  if (const auto value = map.optional("lever_arm_jacobian_zenith")) {
     if (!center.lever_arm_m) throw value->error("is of no lever_arm_m");
     center.lever_arm_by_zenith = read_matrix(*value, 2, 2);
   }
-  if (const auto value = map.optional("lever_arm_by_intrinsics")) {
+  if (const auto value = map.optional("lever_arm_jacobian_intrinsics")) {
     if (!center.lever_arm_m) throw value->error("is of no lever_arm_m");
     center.lever_arm_by_intrinsics = read_matrix(*value, 2, intrinsics);
   }
@@ -177,10 +177,10 @@ Dispersion read_dispersion(YamlMap map, std::size_t intrinsics) {
   if (const auto value = map.optional("covariance")) {
     dispersion.covariance = read_covariance(*value);
   }
-  if (const auto value = map.optional("by_intrinsics")) {
+  if (const auto value = map.optional("jacobian_intrinsics")) {
     dispersion.by_intrinsics = read_matrix(*value, 2, intrinsics);
   }
-  if (const auto value = map.optional("by_zenith")) {
+  if (const auto value = map.optional("jacobian_zenith")) {
     dispersion.by_zenith = read_matrix(*value, 2, 2);
   }
   if (const auto value = map.optional("by_lamps")) {

@@ -50,7 +50,7 @@ struct IntrinsicsReport {
   std::optional<std::array<double, 2>> board_warp_m;
   /// Expected maximum error of a projection over the region. Infinite if the lens has no ray there;
   /// infinity is not written to files.
-  std::optional<double> uncertainty_px;
+  std::optional<double> expected_max_error_px;
   /// Covariance of the intrinsics, in their order. Splined lenses: none, or only fx, fy, cx, cy.
   /// The same applies to all derivatives by the intrinsics below.
   std::optional<MatrixX> covariance = {};

@@ -13,7 +13,8 @@ namespace vlp {
 
 /// Returns the number of intrinsics with reported errors, which later steps propagate: all
 /// intrinsics. Splined lenses: 4, for fx, fy, cx, cy, since few corners determine each control
-/// point. Errors of the control points are only included in IntrinsicsReport::uncertainty_px.
+/// point. Errors of the control points are only included in
+/// IntrinsicsReport::expected_max_error_px.
 Eigen::Index count_reported_intrinsics(const Camera& camera);
 
 /// Returns the normalized point of the zenith.

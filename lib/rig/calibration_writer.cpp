@@ -56,12 +56,12 @@ void emit_intrinsics_report(YAML::Emitter& out, const IntrinsicsReport& report) 
   emit_number(out, "rms_px", report.rms_px);
   if (report.board_warp_m) emit_numbers(out, "board_warp_m", *report.board_warp_m);
   // Infinite if the lens has no ray, which YAML cannot represent; a gate reports it.
-  if (report.uncertainty_px && std::isfinite(*report.uncertainty_px)) {
-    emit_number(out, "uncertainty_px", *report.uncertainty_px);
+  if (report.expected_max_error_px && std::isfinite(*report.expected_max_error_px)) {
+    emit_number(out, "expected_max_error_px", *report.expected_max_error_px);
   }
   if (report.covariance) emit_joint_covariance(out, *report.covariance);
   if (!report.region_px.empty()) {
-    out << YAML::Key << "region_px" << YAML::Value << YAML::Flow << YAML::BeginSeq;
+    out << YAML::Key << "valid_region_px" << YAML::Value << YAML::Flow << YAML::BeginSeq;
     for (const Eigen::Vector2d& corner : report.region_px) {
       emit_row(out, std::array{corner.x(), corner.y()});
     }
@@ -87,12 +87,12 @@ void emit_rotation_center(YAML::Emitter& out, const RotationCenter& center) {
   if (center.lever_arm_covariance) {
     emit_covariance(out, "lever_arm_covariance", *center.lever_arm_covariance);
   }
-  if (center.by_intrinsics) emit_matrix(out, "by_intrinsics", *center.by_intrinsics);
+  if (center.by_intrinsics) emit_matrix(out, "jacobian_intrinsics", *center.by_intrinsics);
   if (center.lever_arm_by_zenith) {
-    emit_matrix(out, "lever_arm_by_zenith", *center.lever_arm_by_zenith);
+    emit_matrix(out, "lever_arm_jacobian_zenith", *center.lever_arm_by_zenith);
   }
   if (center.lever_arm_by_intrinsics) {
-    emit_matrix(out, "lever_arm_by_intrinsics", *center.lever_arm_by_intrinsics);
+    emit_matrix(out, "lever_arm_jacobian_intrinsics", *center.lever_arm_by_intrinsics);
   }
   out << YAML::EndMap;
 }
@@ -117,8 +117,8 @@ void emit_dispersion(YAML::Emitter& out, const Dispersion& dispersion) {
   emit_numbers(out, "center_m", dispersion.center_m);
   emit_integer(out, "captures", dispersion.captures);
   if (dispersion.covariance) emit_covariance(out, "covariance", *dispersion.covariance);
-  if (dispersion.by_intrinsics) emit_matrix(out, "by_intrinsics", *dispersion.by_intrinsics);
-  if (dispersion.by_zenith) emit_covariance(out, "by_zenith", *dispersion.by_zenith);
+  if (dispersion.by_intrinsics) emit_matrix(out, "jacobian_intrinsics", *dispersion.by_intrinsics);
+  if (dispersion.by_zenith) emit_covariance(out, "jacobian_zenith", *dispersion.by_zenith);
   if (!dispersion.by_lamps.empty()) emit_uncertain_lamps(out, dispersion.by_lamps);
   out << YAML::EndMap;
 }

@@ -12,6 +12,7 @@
 #include <yaml-cpp/eventhandler.h>
 
 #include "rig/file.h"
+#include "rig/renamed.h"
 #include "rig/yaml_text.h"
 
 namespace vlp {
@@ -147,12 +148,27 @@ std::optional<YamlValue> YamlMap::optional(const std::string& key) {
     const std::size_t line = is_null ? entry.line : entry.value->line;
     return YamlValue(entry.value, file_, prefix_.empty() ? key : prefix_ + "." + key, line);
   }
+  check_renamed(key);
   return std::nullopt;
 }
 
 bool YamlMap::has(const std::string& key) const {
-  return std::any_of(entries_.begin(), entries_.end(),
-                     [&](const Entry& entry) { return entry.key == key; });
+  const bool found = std::any_of(entries_.begin(), entries_.end(),
+                                 [&](const Entry& entry) { return entry.key == key; });
+  if (!found) check_renamed(key);
+  return found;
+}
+
+/// Throws InputError if an entry has the former name of `key`, which may be that of a metric.
+void YamlMap::check_renamed(std::string_view key) const {
+  for (const NameKind kind : {NameKind::key, NameKind::metric}) {
+    const std::string_view former = find_former_name(kind, key);
+    for (const Entry& entry : entries_) {
+      if (!former.empty() && entry.key == former) {
+        throw error(entry.line, "key " + describe_renaming(former, key));
+      }
+    }
+  }
 }
 
 YamlValue YamlMap::required(const std::string& key) {
@@ -165,6 +181,7 @@ YamlValue YamlMap::required(const std::string& key) {
 void YamlMap::finish() const {
   for (const Entry& entry : entries_) {
     if (std::find(known_.begin(), known_.end(), entry.key) != known_.end()) continue;
+    for (const std::string& name : known_) check_renamed(name);
     std::string names;
     for (const std::string& name : known_) names += (names.empty() ? "" : ", ") + name;
     throw error(entry.line,

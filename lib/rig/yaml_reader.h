@@ -69,6 +69,7 @@ class YamlMap {
  public:
   YamlMap(const YamlPart& node, const std::filesystem::path* file, std::string key);
 
+  /// The readers of keys also throw InputError if the mapping has the key under its former name.
   bool has(const std::string& key) const;
   YamlValue required(const std::string& key);
   std::optional<YamlValue> optional(const std::string& key);
@@ -80,6 +81,7 @@ class YamlMap {
 
  private:
   InputError error(std::size_t line, const std::string& problem) const;
+  void check_renamed(std::string_view key) const;
 
   struct Entry {
     std::string key;

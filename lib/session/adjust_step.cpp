@@ -49,7 +49,7 @@ std::optional<KnownPlace> make_known_place(const Capture& capture, const AdjustS
     return std::nullopt;
   }
   if (!(*sd_m > 0)) {
-    throw InputError(set.name, "a place_sd_m of 0 is that of no measurement: state what it is");
+    throw InputError(set.name, "a position_sd_m of 0 is that of no measurement: state what it is");
   }
   return KnownPlace{capture.place, {*capture.x_m, *capture.y_m}, capture.z_m, *sd_m};
 }
@@ -101,10 +101,10 @@ AdjustmentInput make_adjustment_input(const AdjustStepInput& input, AdjustStepRe
       all.captures.push_back(std::move(capture));
     }
     if (without_sd > 0) {
-      result.warnings.push_back(
-          fmt::format("{}: the places of {} captures are left out: they have no place_sd_m; state "
-                      "it, or give --place-sd-m",
-                      set.name, without_sd));
+      result.warnings.push_back(fmt::format(
+          "{}: the places of {} captures are left out: they have no position_sd_m; state "
+          "it, or give --position-sd-m",
+          set.name, without_sd));
     }
   }
   return all;
@@ -123,14 +123,14 @@ void add_warnings(AdjustStepResult& result, const MapErrors& map_errors) {
   }
   for (const auto& place : found.places) {
     if (!place.wrong) continue;
-    result.warnings.push_back(
-        fmt::format("{}: the place is {:.1f} mm from where the captures were taken, and is left "
-                    "out{}",
-                    place.name, 1e3 * place.residual_m.norm(),
-                    place.of == PlaceOf::camera
-                        ? ": is it the camera's, and not that of the axis it turns about (place: "
-                          "axis)?"
-                        : ""));
+    result.warnings.push_back(fmt::format(
+        "{}: the place is {:.1f} mm from where the captures were taken, and is left "
+        "out{}",
+        place.name, 1e3 * place.residual_m.norm(),
+        place.of == PlaceOf::camera
+            ? ": is it the camera's, and not that of the axis it turns about (reference_point: "
+              "axis)?"
+            : ""));
   }
   if (found.lens_contradicted) {
     result.warnings.push_back(

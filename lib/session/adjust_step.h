@@ -19,7 +19,8 @@ struct AdjustSet {
   std::string name;
   std::vector<Frame> frames;
   CapturesTable captures;
-  /// Captures without a `spot` are a rotation in place, grouped by height as in RotationCaptures.
+  /// True if captures without a `pivot` are one rotation in place, grouped by height as in
+  /// RotationCaptures.
   bool turn = false;
 };
 

@@ -96,7 +96,8 @@ void warn_of_lever_arm(DispersionResult& result, const KnownPlaces& places, cons
     return;
   result.warnings.push_back(fmt::format(
       "the offset is that of the lever arm, {:.1f} mm: the places are those of the axis, and fixes "
-      "would be {:.1f} mm wrong; say so: place: axis in captures.csv, or --of axis",
+      "would be {:.1f} mm wrong; say so: reference_point: axis in captures.csv, or --position-of "
+      "axis",
       1e3 * arm_m.norm(), 1e3 * displacement_m.norm()));
 }
 
@@ -223,7 +224,7 @@ DispersionResult solve_dispersion(const LampCaptures& input, const KnownPlaces& 
   result.metrics = {{"dispersion_mm", millimeters * fit.dispersion.radius_m},
                     {"dispersion_offset_px", fit.dispersion.offset_px.norm()}};
   if (const auto& world_m = fit.world_offset_m) {
-    result.metrics.push_back({"world_mm", millimeters * world_m->norm()});
+    result.metrics.push_back({"world_offset_mm", millimeters * world_m->norm()});
   }
   if (of_axis) {
     add_lever_arm_covariance(result.fit.dispersion, input,

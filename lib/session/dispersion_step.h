@@ -40,7 +40,7 @@ struct DispersionResult : StepResult {
 /// fix; without a lever arm the result is undetermined. Warns of an offset that equals the lever
 /// arm, which results if places of the axis are labeled as places of the camera.
 ///
-/// Metrics: dispersion_mm, dispersion_offset_px, and world_mm if the world offset is known.
+/// Metrics: dispersion_mm, dispersion_offset_px, and world_offset_mm if the world offset is known.
 /// Failures: wrong_map, wrong_place, undetermined.
 /// @pre at least one capture
 DispersionResult solve_dispersion(const LampCaptures& input, const KnownPlaces& places,

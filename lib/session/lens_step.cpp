@@ -102,11 +102,11 @@ LensResult solve_lens(LensInput input, HistoryEntry entry) {
 
 std::vector<Metric> collect_lens_metrics(const LensEstimate& lens) {
   std::vector<Metric> metrics{{"rms_px", lens.solution.rms_px},
-                              {"uncertainty_px", lens.report.uncertainty_worst_px},
+                              {"expected_max_error_px", lens.report.uncertainty_worst_px},
                               {"coverage", lens.coverage.covered_fraction},
                               {"views", static_cast<double>(lens.solution.views.size())},
                               {"board_tilt_deg", deg_from_rad(lens.coverage.tilt_rad)}};
-  if (lens.report.halves) metrics.push_back({"halves_px", lens.report.halves->rms_px});
+  if (lens.report.halves) metrics.push_back({"split_half_px", lens.report.halves->rms_px});
   if (lens.print_px) metrics.push_back({"board_print_px", *lens.print_px});
   if (const auto& sharpness = lens.sharpness) {
     metrics.insert(metrics.end(), {{"mtf50", sharpness->mean_mtf50},
@@ -120,8 +120,8 @@ std::vector<Metric> collect_lens_metrics(const LensEstimate& lens) {
 }
 
 std::vector<Gate> default_lens_gates() {
-  return {{"rms_px", 1},     {"uncertainty_px", 2}, {"halves_px", 1},
-          {"coverage", 0.4}, {"views", 6},          {"board_tilt_deg", 20}};
+  return {{"rms_px", 1}, {"expected_max_error_px", 2}, {"split_half_px", 1}, {"coverage", 0.4},
+          {"views", 6},  {"board_tilt_deg", 20}};
 }
 
 }  // namespace vlp

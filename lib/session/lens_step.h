@@ -37,9 +37,10 @@ struct LensResult : StepResult {
 /// Failures: wrong_board, undetermined. Throws std::invalid_argument as BoardLattice does.
 LensResult solve_lens(LensInput input, HistoryEntry entry);
 
-/// Returns the metrics rms_px, uncertainty_px, coverage, views and board_tilt_deg, and if available
+/// Returns the metrics rms_px, expected_max_error_px, coverage, views and board_tilt_deg, and if
+/// available
 ///
-///   halves_px                           if both halves of the views could be solved
+///   split_half_px                       if both halves of the views could be solved
 ///   board_print_px                      for a board with print_sd
 ///   mtf50, mtf50_worst_ratio, mtf50_asymmetry, black_ratio, local_loss, local_shadow
 ///                                       from the edges of AprilTags
@@ -48,9 +49,9 @@ std::vector<Metric> collect_lens_metrics(const LensEstimate& lens);
 /// Returns the default limits of collect_lens_metrics(), chosen from rendered and real boards of
 /// 800 to 4000 px.
 ///
-///   rms_px <= 1            larger: blurred images or the wrong lens model
-///   uncertainty_px <= 2    larger: too few views, or too similar ones
-///   halves_px <= 1         larger: too few views, or too similar ones
+///   rms_px <= 1                  larger: blurred images or the wrong lens model
+///   expected_max_error_px <= 2   larger: too few views, or too similar ones
+///   split_half_px <= 1           larger: too few views, or too similar ones
 ///   coverage >= 0.4, views >= 6, board_tilt_deg >= 20
 ///
 /// The last three require a tilted board in several places over most of the image, which the

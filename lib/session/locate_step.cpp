@@ -362,7 +362,7 @@ void mark_outside_region(LocateResult& result, const LocateInput& input) {
   }
   if (outside == 0) return;
   result.warnings.push_back(fmt::format(
-      "{} of {} fixes rest on lamps where no board was seen (region_px of the calibration; "
+      "{} of {} fixes rest on lamps where no board was seen (valid_region_px of the calibration; "
       "outside_region of the fixes says which): the lens may be wrong there; add views of the "
       "board there",
       outside, fixes));
@@ -409,7 +409,7 @@ void warn_of_rejected_lamps(LocateResult& result, const LocateInput& input,
                                            input.frames[i].image, id));
     }
   }
-  for (const auto& [id, count] : captures) result.lamps_left_out.push_back({id, count});
+  for (const auto& [id, count] : captures) result.rejected_lamps.push_back({id, count});
   if (unknown > 0) {
     result.warnings.push_back(
         fmt::format("{} detections of lamps that are not in the map, left out", unknown));

@@ -90,7 +90,7 @@ Json make_metrics_json(const SessionResult& result) {
       for (const CheckedMetric& gate : step.result.gates) {
         if (gate.name != name) continue;
         const Json of_gate = to_json(gate);
-        for (const char* key : {"limit", "asked", "met"}) metric[key] = of_gate.at(key);
+        for (const char* key : {"limit", "direction", "passed"}) metric[key] = of_gate.at(key);
       }
       metrics.push_back(std::move(metric));
     }
@@ -116,7 +116,7 @@ std::string format_session_json(const SessionResult& result, const SessionOption
     const Json of_step = to_json(step.result);
     Json entry{{"name", step.name}, {"failure", of_step.at("failure")}};
     for (const char* key :
-         {"why", "warnings", "notes", "skipped", "lamps_left_out", "lamp_offsets"}) {
+         {"message", "warnings", "notes", "skipped", "rejected_lamps", "lamp_offsets"}) {
       if (!of_step.at(key).empty() && of_step.at(key) != "") entry[key] = of_step.at(key);
     }
     json["steps"].push_back(std::move(entry));

@@ -32,8 +32,8 @@ Eigen::Vector2d parse_vector(const Json& json) {
 StepResult parse_result(const Json& json) {
   StepResult result;
   const auto failure = step_failure_from_name(json.at("failure").get<std::string>());
-  result.fail(failure.value_or(StepFailure::bad_input), json.at("why").get<std::string>(),
-              json.at("subject").get<std::string>());
+  result.fail(failure.value_or(StepFailure::bad_input), json.at("message").get<std::string>(),
+              json.at("file").get<std::string>());
   for (const Json& metric : json.at("metrics")) {
     result.metrics.push_back(
         {metric.at("name").get<std::string>(), number_or_nan(metric.at("value"))});
@@ -44,8 +44,8 @@ StepResult parse_result(const Json& json) {
     result.skipped.push_back(
         {image.at("image").get<std::string>(), image.at("reason").get<std::string>()});
   }
-  for (const Json& lamp : json.at("lamps_left_out")) {
-    result.lamps_left_out.push_back({lamp.at("lamp").get<int>(), lamp.at("captures").get<int>()});
+  for (const Json& lamp : json.at("rejected_lamps")) {
+    result.rejected_lamps.push_back({lamp.at("lamp").get<int>(), lamp.at("captures").get<int>()});
   }
   for (const Json& lamp : json.at("lamp_offsets")) {
     result.lamp_offsets.push_back({lamp.at("lamp").get<int>(), lamp.at("captures").get<int>(),
@@ -63,19 +63,19 @@ Json to_json(const CheckedMetric& gate) {
           {"unit", gate.unit},
           {"value", gate.value ? Json(*gate.value) : Json(nullptr)},
           {"limit", gate.limit ? Json(*gate.limit) : Json(nullptr)},
-          {"asked", describe(gate.direction)},
-          {"met", gate.passed()}};
+          {"direction", describe(gate.direction)},
+          {"passed", gate.passed()}};
 }
 
 Json to_json(const StepResult& result) {
   Json json{{"failure", to_string(result.failure)},
-            {"why", result.why},
-            {"subject", result.subject.string()},
+            {"message", result.why},
+            {"file", result.subject.string()},
             {"metrics", Json::array()},
             {"warnings", result.warnings},
             {"notes", result.notes},
             {"skipped", Json::array()},
-            {"lamps_left_out", Json::array()},
+            {"rejected_lamps", Json::array()},
             {"lamp_offsets", Json::array()}};
   for (const auto& [name, value] : result.metrics) {
     json["metrics"].push_back({{"name", name}, {"value", number_or_null(value)}});
@@ -83,8 +83,8 @@ Json to_json(const StepResult& result) {
   for (const auto& [image, reason] : result.skipped) {
     json["skipped"].push_back({{"image", image}, {"reason", reason}});
   }
-  for (const auto& [lamp, captures] : result.lamps_left_out) {
-    json["lamps_left_out"].push_back({{"lamp", lamp}, {"captures", captures}});
+  for (const auto& [lamp, captures] : result.rejected_lamps) {
+    json["rejected_lamps"].push_back({{"lamp", lamp}, {"captures", captures}});
   }
   for (const auto& [lamp, captures, map_m, offset_m, sd_m] : result.lamp_offsets) {
     json["lamp_offsets"].push_back(

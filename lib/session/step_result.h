@@ -34,7 +34,7 @@ struct SkippedImage {
 };
 
 /// Number of captures in which a lamp was rejected because the other lamps contradict it.
-struct LampLeftOut {
+struct RejectedLamp {
   int lamp;
   int captures;
 };
@@ -53,7 +53,7 @@ struct StepResult {
   /// Warnings of possible errors in the result; notes of decisions; details for a closer analysis.
   std::vector<std::string> warnings = {}, notes = {}, details = {};
   std::vector<SkippedImage> skipped = {};
-  std::vector<LampLeftOut> lamps_left_out = {};
+  std::vector<RejectedLamp> rejected_lamps = {};
   std::vector<LampOffset> lamp_offsets = {};
   /// Calibration with the part of this step; default for steps without one.
   Calibration calibration = {};

@@ -87,7 +87,7 @@ LampShots read_lamp_captures(YamlMap& map, const Scene& scene, const Room& room)
   const auto rate = map.optional("turn_rate_deg_per_s");
   captures.turn_rate_rad_per_s =
       rate ? rad_from_deg(rate->number_within(-720, 720, "degrees per second")) : 0;
-  if (const auto lean = map.optional("lean")) read_roll_pitch(lean->map(), captures);
+  if (const auto lean = map.optional("roll_pitch")) read_roll_pitch(lean->map(), captures);
   const auto repeat = map.optional("repeat");
   captures.repeat = repeat ? repeat->integer_within(1, kMaxCaptures) : 1;
   const auto known = map.optional("known");
@@ -107,7 +107,8 @@ BoardViews read_board_views(YamlMap map) {
   views.distance_m = read_range(map.required("distance_m"), 1e-3, 100, "m");
   views.tilt_rad = rad_from_deg(map.required("tilt_deg").number_within(0, 80, "degrees"));
   views.roll_rad = rad_from_deg(map.required("roll_deg").number_within(0, 180, "degrees"));
-  views.spread = map.required("spread").number_within(0, 1, "(of the way to the image's edge)");
+  views.spread =
+      map.required("field_coverage").number_within(0, 1, "(of the way to the image's edge)");
   views.velocity_m_per_s.setZero();
   if (const auto velocity = map.optional("velocity_m_per_s")) {
     views.velocity_m_per_s = Eigen::Vector3d(velocity->numbers(3).data());

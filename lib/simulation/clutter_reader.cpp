@@ -24,7 +24,7 @@ Reflection read_reflection(YamlMap map, const std::vector<SceneLamp>& lamps, con
                                  [&](const SceneLamp& each) { return each.id == wanted; });
   if (lamp == lamps.end()) throw id.error("there is no lamp " + std::to_string(wanted));
   Reflection reflection{read_glow(map, room), std::size_t(lamp - lamps.begin())};
-  reflection.glow.edge_share = 0;
+  reflection.glow.rim_to_center_ratio = 0;
   map.finish();
   return reflection;
 }
@@ -49,7 +49,7 @@ Panel read_place(YamlMap& map) {
 /// Reads a panel with its radiance; further keys of the map may follow.
 Panel read_lit_panel(YamlMap& map) {
   Panel panel = read_place(map);
-  panel.radiance_e_per_s = read_radiance(map, "radiance_e_per_s");
+  panel.electron_rate_e_per_s = read_radiance(map, "electron_rate_e_per_s");
   return panel;
 }
 

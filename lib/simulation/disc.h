@@ -8,12 +8,12 @@
 
 namespace vlp {
 
-/// Disc around the origin with the radiance 1 - (1 - edge_share) (r / radius)^2. An ellipse with
-/// axes along x and y is a disc in units of its half axes.
+/// Disc around the origin with the radiance 1 - (1 - rim_to_center_ratio) (r / radius)^2. An
+/// ellipse with axes along x and y is a disc in units of its half axes.
 class Disc {
  public:
-  Disc(const Eigen::Vector2d& half_axes_m, double edge_share)
-      : half_axes_m_(half_axes_m), fall_(1 - edge_share) {}
+  Disc(const Eigen::Vector2d& half_axes_m, double rim_to_center_ratio)
+      : half_axes_m_(half_axes_m), fall_(1 - rim_to_center_ratio) {}
 
   Eigen::Vector2d hit(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const {
     return plane_hit(origin, direction).cwiseQuotient(half_axes_m_);

@@ -14,11 +14,11 @@ namespace {
 constexpr double kHaloLengths = 8;
 
 double compute_wall_fraction(const Recess& recess, double radius_m, const Eigen::Vector2d& at_m) {
-  if (!recess.dark_side) return recess.reflector_share;
+  if (!recess.dark_side) return recess.reflector_ratio;
   const DarkSide& dark = *recess.dark_side;
   const Eigen::Vector2d towards(std::cos(dark.azimuth_rad), std::sin(dark.azimuth_rad));
   const double position = std::clamp((1 + at_m.dot(towards) / radius_m) / 2, 0.0, 1.0);
-  return recess.reflector_share + position * (dark.reflector_share - recess.reflector_share);
+  return recess.reflector_ratio + position * (dark.reflector_ratio - recess.reflector_ratio);
 }
 
 /// Returns the added fraction from the chips around a point of the disc. Chips further away add
@@ -83,8 +83,9 @@ void add_downlight(const PixelRays& rays, const PixelWindow& window,
   cv::Mat1f inside = window.image(0);
   add_shape(rays, window, glow_from_camera, Disc(*glow.shape.size_m / 2, 1), 1, inside);
   if (!glow.recess) {
-    add_shape(rays, window, glow_from_camera, Disc(*glow.shape.size_m / 2, glow.edge_share),
-              glow.radiance_e_per_s, image);
+    add_shape(rays, window, glow_from_camera,
+              Disc(*glow.shape.size_m / 2, glow.rim_to_center_ratio), glow.electron_rate_e_per_s,
+              image);
   }
   for (int line = window.line_begin; line < window.line_end; ++line) {
     const Eigen::Isometry3d pose = glow_from_camera(line);
@@ -107,7 +108,7 @@ void add_downlight(const PixelRays& rays, const PixelWindow& window,
       fraction += part * compute_hot_spot_fraction(glow.hot_spots, at_m);
       if (glow.halo && eye_m.z() < 0)
         fraction += (1 - part) * compute_halo_fraction(*glow.halo, radius_m, at_m);
-      image(row, column) += static_cast<float>(glow.radiance_e_per_s * fraction);
+      image(row, column) += static_cast<float>(glow.electron_rate_e_per_s * fraction);
     }
   }
 }

@@ -138,7 +138,7 @@ class LampFrame {
     }
     for (const Panel& occluder : clutter.occluders) {
       const cv::Mat1f hidden = compute_coverage(occluder);
-      image = image.mul(1 - hidden) + occluder.radiance_e_per_s * hidden;
+      image = image.mul(1 - hidden) + occluder.electron_rate_e_per_s * hidden;
     }
     optics_.spread(image, {-rays_.margin_px(), -rays_.margin_px()});
     optics_.add_veil(image);
@@ -200,7 +200,7 @@ class LampFrame {
     cv::Mat1f target = window.crop(image, rays_.margin_px());
     for (int line = window.line_begin; line < window.line_end; ++line) {
       const int row = line - window.line_begin;
-      target.row(row) += (panel.radiance_e_per_s - ceiling_radiance(line)) * cover.row(row);
+      target.row(row) += (panel.electron_rate_e_per_s - ceiling_radiance(line)) * cover.row(row);
     }
   }
   /// Returns the fraction of each pixel that a panel covers.
@@ -226,10 +226,11 @@ class LampFrame {
   void draw(const Glow& glow, const PixelWindow& window, cv::Mat1f target) const {
     if (!traits_of(glow.shape.kind).is_round) {
       const Panel panel = make_bounding_panel(glow);
-      if (glow.edge_share == 1) return draw(panel, glow.radiance_e_per_s, window, target);
+      if (glow.rim_to_center_ratio == 1)
+        return draw(panel, glow.electron_rate_e_per_s, window, target);
       cv::Mat1f patch = window.image(0);
-      draw(panel, glow.radiance_e_per_s, window, patch);
-      fade(panel, glow.edge_share, window, patch);
+      draw(panel, glow.electron_rate_e_per_s, window, patch);
+      fade(panel, glow.rim_to_center_ratio, window, patch);
       target += patch;
       return;
     }
@@ -241,11 +242,12 @@ class LampFrame {
       add_downlight(rays_, window, glow_from_camera, glow, target);
       return;
     }
-    add_shape(rays_, window, glow_from_camera, Disc(*glow.shape.size_m / 2, glow.edge_share),
-              glow.radiance_e_per_s, target);
+    add_shape(rays_, window, glow_from_camera,
+              Disc(*glow.shape.size_m / 2, glow.rim_to_center_ratio), glow.electron_rate_e_per_s,
+              target);
   }
   /// Applies the falloff of Glow towards the edges of a panel, evaluated at each pixel's center.
-  void fade(const Panel& panel, double edge_share, const PixelWindow& window,
+  void fade(const Panel& panel, double rim_to_center_ratio, const PixelWindow& window,
             cv::Mat1f& patch) const {
     const TargetFromCamera panel_from_camera = target_from_camera(panel_from_world(panel));
     const Eigen::Array2d size_m(panel.edge_a_m.norm(), panel.edge_b_m.norm());
@@ -258,7 +260,7 @@ class LampFrame {
             rays_.corner(line, place) + rays_.corner(line + 1, place + 1);
         const Eigen::Vector2d at_m = plane_hit(pose.translation(), pose.linear() * middle);
         const Eigen::Array2d off = 2 * at_m.array() / size_m - 1;
-        const Eigen::Array2d left = (1 - (1 - edge_share) * off.square()).max(0);
+        const Eigen::Array2d left = (1 - (1 - rim_to_center_ratio) * off.square()).max(0);
         value *= static_cast<float>(left.prod());
       }
     }

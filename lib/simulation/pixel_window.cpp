@@ -61,7 +61,7 @@ Panel make_bounding_panel(const Glow& glow) {
     return world_from_shape(glow.shape, glow.position_m, {x, y});
   };
   const Eigen::Vector3d corner_m = at(-1, -1);
-  return {corner_m, at(1, -1) - corner_m, at(-1, 1) - corner_m, glow.radiance_e_per_s};
+  return {corner_m, at(1, -1) - corner_m, at(-1, 1) - corner_m, glow.electron_rate_e_per_s};
 }
 
 std::vector<Eigen::Vector3d> outline_of(const Glow& glow) {

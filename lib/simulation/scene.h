@@ -25,7 +25,7 @@ namespace vlp {
 /// Darkening of a reflector towards one side.
 struct DarkSide {
   /// Fraction of the source's radiance at the rim in the direction of the azimuth.
-  double reflector_share;
+  double reflector_ratio;
   /// Azimuth in the world, from x to y.
   double azimuth_rad;
 };
@@ -44,12 +44,12 @@ struct DarkSide {
 /// with the angle b between p and s. Walls are dark between source and rim and, for oblique views,
 /// on the far side. The side next to the camera, where the source appears, keeps its light.
 ///
-/// w0 is reflector_share. With a dark side, w0 varies linearly with the component of p along the
-/// azimuth: from reflector_share at p = -D / 2 to that of the dark side at D / 2.
+/// w0 is reflector_ratio. With a dark side, w0 varies linearly with the component of p along the
+/// azimuth: from reflector_ratio at p = -D / 2 to that of the dark side at D / 2.
 struct Recess {
   double depth_m;
   double source_diameter_m;
-  double reflector_share;
+  double reflector_ratio;
   std::optional<DarkSide> dark_side;
   /// Exponents of the equation. source_power 2 is a Gaussian source; rim_power 0 are evenly lit
   /// walls; beam_power 0 is a source of equal radiance in all directions.
@@ -96,15 +96,15 @@ struct RandomChips {
 
 /// Horizontal light with the shape of a lamp. At the fraction r of the distance from the center to
 /// the outline, a round one has the radiance
-///   radiance (1 - (1 - edge_share) r^2)
+///   radiance (1 - (1 - rim_to_center_ratio) r^2)
 /// to which the chips of a disc add. A disc with a recess is the rim of the recess and has the
 /// radiance of Recess instead. Other shapes have one such factor for each of their axes. Only discs
 /// have a recess, chips, hot spots or a halo.
 struct Glow {
   Eigen::Vector3d position_m;
   LampShape shape;
-  double radiance_e_per_s;
-  double edge_share;
+  double electron_rate_e_per_s;
+  double rim_to_center_ratio;
   std::optional<Recess> recess = {};
   std::optional<Halo> halo = {};
   std::optional<Chips> chips = {};
@@ -140,7 +140,7 @@ struct Reflection {
 struct Panel {
   Eigen::Vector3d corner_m;
   Eigen::Vector3d edge_a_m, edge_b_m;
-  double radiance_e_per_s;
+  double electron_rate_e_per_s;
 };
 
 /// Light of the building that is in no lamp map: dimmed by a square wave, or on the mains.

@@ -13,7 +13,7 @@ namespace vlp {
 
 SceneBoard read_scene_board(YamlMap map) {
   SceneBoard board;
-  const YamlValue print_value = map.required("print");
+  const YamlValue print_value = map.required("pattern");
   YamlMap print = print_value.map();
   board.print = read_board(print);
   print.finish();

@@ -21,11 +21,11 @@ Recess read_recess(YamlMap map, const Glow& rim) {
   if (recess.source_diameter_m > 2 * rim.radius_m()) {
     throw source.error("is larger than the rim, diameter_m");
   }
-  recess.reflector_share = read_fraction(map, "reflector_share");
+  recess.reflector_ratio = read_fraction(map, "reflector_ratio");
   if (const auto dark = map.optional("dark_side")) {
     YamlMap keys = dark->map();
     recess.dark_side =
-        DarkSide{read_fraction(keys, "reflector_share"),
+        DarkSide{read_fraction(keys, "reflector_ratio"),
                  rad_from_deg(keys.required("azimuth_deg").number_within(-360, 360, "degrees"))};
     keys.finish();
   }
@@ -44,7 +44,7 @@ Recess read_recess(YamlMap map, const Glow& rim) {
 
 Chips read_chips(YamlMap map, const Glow& disc) {
   Chips chips;
-  chips.fraction = read_fraction(map, "share");
+  chips.fraction = read_fraction(map, "fraction");
   const YamlValue pitch = map.required("pitch_m");
   chips.pitch_m = pitch.number_within(1e-3, 10, "m");
   if (chips.pitch_m > 2 * disc.radius_m()) throw pitch.error("is larger than the disc, diameter_m");
@@ -76,7 +76,7 @@ Glow read_glow(YamlMap& map, const Room& room) {
   const YamlValue position = map.required("position_m");
   Glow glow{read_point(position), read_shape(map), 0, 1};
   if (!glow.shape.size_m) map.required("diameter_m");
-  glow.radiance_e_per_s = read_radiance(map, "radiance_e_per_s");
+  glow.electron_rate_e_per_s = read_radiance(map, "electron_rate_e_per_s");
   const Eigen::Array3d at = glow.position_m.array();
   if ((at < room.min_m.array()).any() || (at > room.max_m.array()).any()) {
     throw position.error("is outside the room");
@@ -89,8 +89,8 @@ void read_profile(YamlMap& map, Glow& glow) {
   if (const auto recess = map.optional("recess")) {
     glow.recess = read_recess(recess->map(), glow);
   } else {
-    glow.edge_share =
-        map.required("edge_share").number_within(0, 2, "(of the radiance at the center)");
+    glow.rim_to_center_ratio =
+        map.required("rim_to_center_ratio").number_within(0, 2, "(of the radiance at the center)");
     if (const auto chips = map.optional("chips")) glow.chips = read_chips(chips->map(), glow);
     if (const auto chips = map.optional("random_chips")) {
       if (glow.chips) throw chips->error("stands beside chips: a disc has one of them");
@@ -99,8 +99,8 @@ void read_profile(YamlMap& map, Glow& glow) {
   }
   if (const auto halo = map.optional("halo")) {
     YamlMap keys = halo->map();
-    glow.halo =
-        Halo{read_fraction(keys, "share"), keys.required("length_m").number_within(1e-3, 2, "m")};
+    glow.halo = Halo{read_fraction(keys, "fraction"),
+                     keys.required("length_m").number_within(1e-3, 2, "m")};
     keys.finish();
   }
 }

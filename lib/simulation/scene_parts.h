@@ -38,8 +38,8 @@ std::vector<SceneLamp> read_scene_lamps(const YamlValue& list, const Room& room)
 Clutter read_clutter(YamlMap map, const std::vector<SceneLamp>& lamps, const Room& room);
 /// Reads the keys of a glow except those of read_profile().
 Glow read_glow(YamlMap& map, const Room& room);
-/// Reads the brightness profile of a disc: recess or edge_share, and halo. Other shapes are evenly
-/// bright.
+/// Reads the brightness profile of a disc: recess or rim_to_center_ratio, and halo. Other shapes
+/// are evenly bright.
 void read_profile(YamlMap& map, Glow& glow);
 ImageProcessing read_image_processing(YamlMap map, const Sensor& sensor);
 SceneBoard read_scene_board(YamlMap map);

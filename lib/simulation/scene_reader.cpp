@@ -108,7 +108,7 @@ Optics read_optics(YamlMap map) {
 }
 
 Bloom read_bloom(YamlMap map) {
-  const Bloom bloom{map.required("share").number_within(0, 1, "(of the charge)"),
+  const Bloom bloom{map.required("fraction").number_within(0, 1, "(of the charge)"),
                     map.required("sigma_px").number_within(0.3, 50, "px")};
   map.finish();
   return bloom;
@@ -173,7 +173,7 @@ Scene read_scene(const std::filesystem::path& file) {
   scene.camera = read_scene_camera(document.required("camera").map());
   scene.optics = read_optics(document.required("optics").map());
   scene.sensor = read_sensor(document.required("sensor").map());
-  if (const auto picture = document.optional("picture")) {
+  if (const auto picture = document.optional("processing")) {
     scene.picture = read_image_processing(picture->map(), scene.sensor);
   }
   scene.mount = read_mount(document.required("mount").map());

@@ -12,11 +12,11 @@ namespace {
 
 /// Returns the gray level of a source that fills a pixel on the axis. Without a picture it may
 /// exceed white.
-double compute_level(const Scene& scene, const CaptureSet& set, double radiance_e_per_s) {
+double compute_level(const Scene& scene, const CaptureSet& set, double electron_rate_e_per_s) {
   const Sensor& sensor = scene.sensor;
   const double level =
       sensor.black_level_dn +
-      sensor.gain_dn_per_e * std::min(radiance_e_per_s * set.exposure_s, sensor.full_well_e);
+      sensor.gain_dn_per_e * std::min(electron_rate_e_per_s * set.exposure_s, sensor.full_well_e);
   return scene.picture ? apply_tone_curve(*scene.picture, sensor, level) : level;
 }
 
@@ -65,7 +65,7 @@ std::vector<std::string> find_warnings(const Scene& scene, const CaptureSet& set
   }
   double brightest = 0;
   for (const SceneLamp& lamp : scene.lamps) {
-    brightest = std::max(brightest, lamp.glow.radiance_e_per_s);
+    brightest = std::max(brightest, lamp.glow.electron_rate_e_per_s);
   }
   add_brightness(scene, set, "the brightest lamp", brightest + scene.ambient_e_per_s, "the ceiling",
                  scene.ambient_e_per_s, warnings);

@@ -55,10 +55,10 @@ void read_refusal(YamlMap map, StationConfig& config) {
   constexpr double max_px = 100;
   FrontendOptions& limits = config.frontend;
   read_into(map, "blur_px", limits.max_blur_px, max_px, "px");
-  read_into(map, "dark_share", limits.min_bright_fraction, 1, "(share)");
-  read_into(map, "white_share", limits.max_white_fraction, 1, "(share)");
-  read_into(map, "same_pose_share", limits.same_view_fraction, 1, "(share)");
-  read_into(map, "in_a_row", config.max_consecutive_rejections);
+  read_into(map, "dark_fraction", limits.min_bright_fraction, 1, "(share)");
+  read_into(map, "white_fraction", limits.max_white_fraction, 1, "(share)");
+  read_into(map, "same_pose_fraction", limits.same_view_fraction, 1, "(share)");
+  read_into(map, "max_consecutive_rejections", config.max_consecutive_rejections);
   map.finish();
 }
 
@@ -292,9 +292,9 @@ StationConfig read_station(const fs::path& file) {
   if (const auto place = document.optional("dispersion_station_m")) {
     config.dispersion_station_m = Eigen::Vector2d(place->numbers(2).data());
   }
-  if (const auto sufficient = document.optional("enough"))
+  if (const auto sufficient = document.optional("completion"))
     config.sufficient = read_enough(sufficient->map());
-  if (const auto refuse = document.optional("refuse")) read_refusal(refuse->map(), config);
+  if (const auto refuse = document.optional("rejection")) read_refusal(refuse->map(), config);
   config.gates = read_gates(document.required("gates"), unit_metrics());
   if (const auto guard = document.optional("guard_bands")) {
     read_guard_bands(guard->map(), config.gates);
@@ -320,7 +320,7 @@ StationConfig read_station(const fs::path& file) {
   config.records = read_records(document.required("records"), file);
   const auto spool = document.optional("spool");
   config.spool = spool ? resolve_path(*spool, file) : file.parent_path() / "spool";
-  if (const auto keep = document.optional("keep")) config.keep = read_retention(keep->map());
+  if (const auto keep = document.optional("retention")) config.keep = read_retention(keep->map());
   if (const auto hook = document.optional("hook")) config.hook = read_hook(hook->map(), file);
   document.finish();
   const auto& lamps = config.lamps.lamps;

@@ -69,7 +69,7 @@ def lines_of(before, now):
         a, b = old_figures.get(name), figures.get(name)
         by = f" ({b - a:+.3g})" if a is not None and b is not None else ""
         yield f"  {name}: {words(a)} -> {words(b)}{by}"
-    looks = [told_by(session)["look"] for session in (old, new)]
+    looks = [told_by(session)["remarks"] for session in (old, new)]
     for sign, some, others in (("-", *looks), ("+", *reversed(looks))):
         for line in some:
             if line not in others:

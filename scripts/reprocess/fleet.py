@@ -45,7 +45,7 @@ import statistics
 from collections import defaultdict
 
 from dates import days_of
-from outcome import TWO
+from outcome import TWO, sd_of
 
 FALSE_ALARM_RATE = 0.05
 FOUND_SHARE = 0.95
@@ -204,11 +204,11 @@ def camera_series(rows):
             for axis in "xy":
                 figure = f"{name}_{axis}_{unit}"
                 some = with_arm if with_arm and name in WITH_LEVER_ARM else of_it
-                some = [row for row in some if row[figure] and float(row[f"sd_{figure}"] or 0) > 0]
+                some = [row for row in some if row[figure] and float(row[sd_of(figure)] or 0) > 0]
                 if not all(row["date"] for row in of_it):
                     some = in_order(some)  # those without a date may be out
                 if len(some) > 1:
-                    found[camera][figure] = (some, [(float(row[figure]), float(row[f"sd_{figure}"])) for row in some])
+                    found[camera][figure] = (some, [(float(row[figure]), float(row[sd_of(figure)])) for row in some])
     return found
 
 
@@ -316,7 +316,7 @@ class Room:
         for i, session in enumerate(self.sessions):
             for lamp, row in session["lamps"].items():
                 off = complex(float(row["offset_x_mm"]), float(row["offset_y_mm"]))
-                self.series[lamp].append([i, off, float(row["sd_offset_x_mm"]), float(row["sd_offset_y_mm"])])
+                self.series[lamp].append([i, off, float(row["offset_x_sd_mm"]), float(row["offset_y_sd_mm"])])
         for series in self.series.values():  # of few captures a scatter is small by chance
             for axis in (2, 3):
                 usual = max(LEAST_SD_MM, statistics.median(one[axis] for one in series))

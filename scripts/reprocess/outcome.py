@@ -3,23 +3,31 @@
 """What came of a session: its verdict and figures, from session.json of vlp-calibrate and how that ended.
 
 A session that passes with something to look at, warnings, images skipped or lamps left out, has the verdict
-"look", and `look` says at what.
+"look", and `remarks` says at what.
 """
 import json
 import signal
 
-FIGURES = ["captures", "fixes", "missing_share", "mean_mm", "median_mm", "p90_mm", "max_mm", "rms_px"]
-TOLD = ["warnings", "images_skipped", "lamps_left_out", "look"]
+FIGURES = ["captures", "fixes", "missing_fraction", "mean_mm", "median_mm", "p90_mm", "max_mm", "rms_px"]
+TOLD = ["warnings", "images_skipped", "rejected_lamps", "remarks"]
 COLUMNS = ["camera", "session", "verdict", *FIGURES, *TOLD, "date", "reason", "version", "inputs", "key", "cpu_s"]
 # Of a calibration, over time: each along x and y with its standard deviation, and its name in session.json.
 TWO = {"focal": "px", "center": "px", "zenith": "deg", "rotation_center": "px"}
 TWO |= {"lever_arm": "mm", "dispersion_offset": "px"}
 TRACKED = [f"{name}_{axis}_{unit}" for name, unit in TWO.items() for axis in "xy"]
-RESIDUALS = ["rms_px", "rotation_px", "residual_ratio", "stated_ratio"]
+
+
+def sd_of(figure):
+    """Returns the column of a figure's standard deviation: focal_x_sd_px of focal_x_px."""
+    name, unit = figure.rsplit("_", 1)
+    return f"{name}_sd_{unit}"
+
+
+RESIDUALS = ["rms_px", "rotation_px", "residual_ratio", "normalized_error_rms"]
 FLEET = ["camera", "session", "date", "room", "map", "tilt_deg"]
-FLEET += [column for name in TRACKED for column in (name, f"sd_{name}")] + [*RESIDUALS, "mean_mm"]
+FLEET += [column for name in TRACKED for column in (name, sd_of(name))] + [*RESIDUALS, "mean_mm"]
 LAMPS = ["room", "map", "lamp", "camera", "session", "date", "captures", "map_x_m", "map_y_m"]
-LAMPS += ["offset_x_mm", "offset_y_mm", "sd_offset_x_mm", "sd_offset_y_mm"]
+LAMPS += ["offset_x_mm", "offset_y_mm", "offset_x_sd_mm", "offset_y_sd_mm"]
 ALL = list(dict.fromkeys([*COLUMNS, *FLEET, "lamps", "gate_metrics", "glance"]))  # of a shard's rows
 TOOK_TOO_LONG = -signal.SIGALRM
 # Files of vlp-calibrate that are kept, and their names there.
@@ -40,7 +48,7 @@ def figures_of(folder, session):
     figures = {}
     if (folder / "evaluation.json").exists():
         evaluation = json.loads((folder / "evaluation.json").read_text())
-        figures = {name: evaluation[name] for name in ("captures", "fixes", "missing_share")}
+        figures = {name: evaluation[name] for name in ("captures", "fixes", "missing_fraction")}
         for name in ("mean_mm", "median_mm", "p90_mm", "max_mm"):
             figures[name] = digits(evaluation["horizontal"][name])
     for metric in session["metrics"]:
@@ -50,7 +58,7 @@ def figures_of(folder, session):
 
 
 def told_by(session):
-    """What there is to look at: numbers, ids, and words, of which `look` is a list."""
+    """What there is to look at: numbers, ids, and words, of which `remarks` is a list."""
     words, skipped, left_out, warnings = [], 0, {}, 0
     for step in session["steps"]:
         of_step = step.get("warnings", [])
@@ -60,10 +68,10 @@ def told_by(session):
             skipped += len(images)
             first = f"{images[0]['image']}: {images[0]['reason']}"
             words.append(f"{step['name']}: {len(images)} image{'s' * (len(images) > 1)} skipped; the first, {first}")
-        for lamp in step.get("lamps_left_out", []):
+        for lamp in step.get("rejected_lamps", []):
             left_out[lamp["lamp"]] = left_out.get(lamp["lamp"], 0) + lamp["captures"]
     lamps = ", ".join(f"{lamp} ({captures})" for lamp, captures in sorted(left_out.items()))
-    return {"warnings": warnings, "images_skipped": skipped, "lamps_left_out": lamps, "look": words}
+    return {"warnings": warnings, "images_skipped": skipped, "rejected_lamps": lamps, "remarks": words}
 
 
 def calibration_of(session):
@@ -73,7 +81,7 @@ def calibration_of(session):
         values, sds = calibration.get(f"{name}_{unit}"), calibration.get(f"{name}_sd_{unit}")
         for i, axis in enumerate("xy"):
             figures[f"{name}_{axis}_{unit}"] = digits(values[i]) if values else ""
-            figures[f"sd_{name}_{axis}_{unit}"] = digits(sds[i]) if sds else ""
+            figures[f"{name}_{axis}_sd_{unit}"] = digits(sds[i]) if sds else ""
     figures["tilt_deg"] = digits(calibration.get("tilt_deg"))
     for part in session.get("history", []):
         for entry in part["inputs"]:
@@ -104,9 +112,9 @@ def outcome_of(folder, name, ended, said):
         return outcome | {"verdict": "crashed", "reason": ": ".join([f"vlp-calibrate {words}", *last])}
     told = told_by(session)
     verdict = session["verdict"]
-    if verdict == "pass" and (told["look"] or told["lamps_left_out"]):
+    if verdict == "pass" and (told["remarks"] or told["rejected_lamps"]):
         verdict = "look"
-    outcome |= {"verdict": verdict, "reason": session["reason"], **told, "look": "; ".join(told["look"])}
+    outcome |= {"verdict": verdict, "reason": session["reason"], **told, "remarks": "; ".join(told["remarks"])}
     if verdict == "no result":
         return outcome
     outcome["gate_metrics"] = gate_metrics(session)

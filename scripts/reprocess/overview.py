@@ -141,7 +141,7 @@ def look_here(rows):
         return ""
     words = '<h2 id="look">Passed, but look here</h2>\n'
     columns = ["session", "mean (mm)", "images skipped", "lamps left out (captures)", "what to look at"]
-    keys = ("mean_mm", "images_skipped", "lamps_left_out", "look")
+    keys = ("mean_mm", "images_skipped", "rejected_lamps", "remarks")
     return words + table(columns, [(name_of(row), *(row[key] for key in keys)) for row in look])
 
 

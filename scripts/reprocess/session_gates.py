@@ -41,5 +41,5 @@ def apply_session_gates(row, limits):
     gates = known["gates"] | limits
     checked = [(name, known["metrics"].get(name), limit) for name, limit in gates.items()]
     missed = [describe_missed(*gate) for gate in checked if not is_met(*gate)]
-    passed = "look" if row["look"] or row["lamps_left_out"] else "pass"
+    passed = "look" if row["remarks"] or row["rejected_lamps"] else "pass"
     row["verdict"], row["reason"] = ("gate", "; ".join(missed)) if missed else (passed, "")

@@ -56,7 +56,7 @@ def current(name, key):
 
 
 class EachProcess:
-    """vlp-calibrate --each: a process that splits one off for each session, so that its libraries are loaded once.
+    """vlp-calibrate --batch-stdin: a process that splits one off for each session, so that its libraries are loaded once.
     It holds the lock, too, and may outlive us by a session; what it splits off does not outlive it."""
 
     def __init__(self, program, lock):
@@ -65,7 +65,7 @@ class EachProcess:
     def ask(self, arguments):
         """One session at a time: answer() before another."""
         if self.process is None:
-            self.process = subprocess.Popen([self.program, "--each"], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+            self.process = subprocess.Popen([self.program, "--batch-stdin"], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
                                             pass_fds=[self.lock.fileno()], env=ENVIRONMENT)
         request = json.dumps({"arguments": [str(argument) for argument in arguments], "limit_s": LONGEST_S})
         try:

@@ -19,7 +19,7 @@ def lamps_of(row):
         for i, axis in enumerate("xy"):
             figures[f"map_{axis}_m"] = f"{lamp['map_m'][i]:.6g}"
             figures[f"offset_{axis}_mm"] = f"{lamp['offset_mm'][i]:.6g}"
-            figures[f"sd_offset_{axis}_mm"] = f"{lamp['offset_sd_mm'][i]:.6g}"
+            figures[f"offset_{axis}_sd_mm"] = f"{lamp['offset_sd_mm'][i]:.6g}"
         yield row | figures
 
 

@@ -14,7 +14,7 @@ def toolbox(folder):
     program = folder / PROGRAMS[0]
     # At the same time: a start takes a fifth of a second, of which the libraries are most.
     nothing = subprocess.DEVNULL
-    with subprocess.Popen([program, "--each"], stdin=nothing, stdout=nothing, stderr=nothing) as each:
+    with subprocess.Popen([program, "--batch-stdin"], stdin=nothing, stdout=nothing, stderr=nothing) as each:
         stated = subprocess.run([program, "--version"], capture_output=True, text=True, check=True).stdout
     if each.returncode != 0:
         raise ValueError(f"{program}: vlp-calibrate is too old for these scripts")

@@ -267,7 +267,7 @@ void try_scene(Scene scene, std::uint64_t seed, int images, bool new_seed_in_eac
 Scene chips_scene() {
   Scene scene = read_scene(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml");
   for (SceneLamp& lamp : scene.lamps) {
-    lamp.glow.edge_share = 1;
+    lamp.glow.rim_to_center_ratio = 1;
     lamp.glow.random_chips = RandomChips{7, 0.12, 0.75, 0.3, 0.8};
     lamp.glow.halo = Halo{0.12, 0.03};
   }

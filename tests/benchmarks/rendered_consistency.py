@@ -81,7 +81,7 @@ def write_places(folder, off_sd_m, rng, of, place_of):
     truth = rows_of(folder / "truth.csv")
     errors_m = {}
     with open(folder / "captures.csv", "w", newline="") as file:
-        names = ["image", "spot", "x_m", "y_m", "z_m", "place", "place_sd_m"]
+        names = ["image", "pivot", "x_m", "y_m", "z_m", "reference_point", "position_sd_m"]
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(names)
         for row in truth:

@@ -180,10 +180,10 @@ def deviations(year, results):
         truth = {"focal_x_px": intrinsics[0], "focal_y_px": intrinsics[1], "center_x_px": intrinsics[2]}
         truth |= {"center_y_px": intrinsics[3], "lever_arm_x_mm": 1e3 * arm[0], "lever_arm_y_mm": 1e3 * arm[1]}
         for figure, value in truth.items():
-            if row[figure] and row[f"sd_{figure}"]:
+            if row[figure] and row[fleet.sd_of(figure)]:
                 kind = fleet.kind_of(figure)
                 off.setdefault(kind, {}).setdefault((camera, figure), []).append(
-                    (float(row[figure]) - value, float(row[f"sd_{figure}"]))
+                    (float(row[figure]) - value, float(row[fleet.sd_of(figure)]))
                 )
     for kind, series in off.items():
         squares = freedoms = 0

@@ -60,7 +60,7 @@ def make_archive(archive, names):
 
 def made_up_metrics(chance, mean_mm):
     """As many metrics and gates as those of a session of datasets/archive."""
-    names = ["rms_px", "uncertainty_px", "coverage", "views", "board_tilt_deg", "halves_px"]
+    names = ["rms_px", "expected_max_error_px", "coverage", "views", "board_tilt_deg", "split_half_px"]
     gates = dict(zip(names, (1.0, 2.0, 0.4, 6.0, 20.0, 1.0)))
     names += [f"metric_{number:02d}_mm" for number in range(20)]
     metrics = {name: chance.random() for name in names} | {"coverage": 1.0, "views": 20.0, "board_tilt_deg": 90.0}
@@ -75,7 +75,7 @@ def made_up(sessions):
         chance = random.Random(number)
         for camera, session, result in list(fleet.all())[: sessions - number * IN_A_FLEET]:
             row = outcome.calibration_of(result) | {"camera": f"{number:04d}-{camera}", "session": session}
-            row |= {"verdict": "pass", "captures": 12, "fixes": 12, "missing_share": 0, "warnings": 0, "images_skipped": 0}
+            row |= {"verdict": "pass", "captures": 12, "fixes": 12, "missing_fraction": 0, "warnings": 0, "images_skipped": 0}
             row |= {name: f"{chance.lognormvariate(-1.4, 0.5):.6g}" for name in ("mean_mm", "median_mm", "p90_mm", "max_mm")}
             row["gate_metrics"] = made_up_metrics(chance, float(row["mean_mm"]))
             row |= {"rms_px": "0.02", "version": "1", "inputs": f"{chance.getrandbits(256):064x}", "cpu_s": "0.600"}
@@ -149,7 +149,7 @@ def run(options, folder):
     measured("plan, the first", *plan)
     apart(reprocessed, folder)
     files.write_whole(results / "summary.csv", "")  # as if the summary existed
-    measured("plan, unchanged, --look files", *plan, "--look", "files")
+    measured("plan, unchanged, --scan files", *plan, "--scan", "files")
     took["plan, unchanged"] = measured("plan, unchanged", *plan)
     names = [f"{camera.name}/{session.name}" for camera in sorted(archive.iterdir()) for session in camera.iterdir()]
     some = names[:: max(1, len(names) // options.changed)][: options.changed]

@@ -233,7 +233,7 @@ kinds() {
   tried lamp-of-other-frequency "$seed" 'lamp 3 is never seen'
   station_again
   scene_of $((seed + 4000)) 514.8 525.2 5 0.7
-  scene_change '/id: 4,/s/radiance_e_per_s: 2.0e+8/radiance_e_per_s: 1.0e+5/'
+  scene_change '/id: 4,/s/electron_rate_e_per_s: 2.0e+8/electron_rate_e_per_s: 1.0e+5/'
   render
   tried unlit-lamp "$seed" 'lamp 4 is never seen'
   scene_of "$seed" 514.8 525.2 5 0.7
@@ -243,7 +243,7 @@ kinds() {
   find "$work/unit/boards" -name '*.png' -exec sh -c 'for f; do echo x >>"$f"; done' sh {} +
   tried bright-lamps "$seed" 'overexposed'
   scene_of $((seed + 7000)) 514.8 525.2 5 0.7
-  scene_change 's/radiance_e_per_s: 2.0e+8/radiance_e_per_s: 2.0e+6/;s/ambient_e_per_s: .*/ambient_e_per_s: 1.0e+4/'
+  scene_change 's/electron_rate_e_per_s: 2.0e+8/electron_rate_e_per_s: 2.0e+6/;s/ambient_e_per_s: .*/ambient_e_per_s: 1.0e+4/'
   render --only rotation
   cp -r "$work/good/boards" "$work/unit/"
   find "$work/unit/boards" -name '*.png' -exec sh -c 'for f; do echo z >>"$f"; done' sh {} +

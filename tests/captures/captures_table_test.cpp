@@ -33,13 +33,27 @@ TEST(ReadCaptures, ReadsAnyColumns) {
 TEST(ReadCaptures, ReadsPlaceAndSpot) {
   const TemporaryFolder folder;
   const auto captures = read_captures(folder.file(
-      "captures.csv", "image,x_m,y_m,place,place_sd_m,spot\na,1,2,axis,0.001,s1\nb,1,2,,,\n"));
+      "captures.csv",
+      "image,x_m,y_m,reference_point,position_sd_m,pivot\na,1,2,axis,0.001,s1\nb,1,2,,,\n"));
   EXPECT_EQ(captures.at("a").place, PlaceOf::axis);
   EXPECT_EQ(captures.at("a").place_sd_m, 0.001);
   EXPECT_EQ(captures.at("a").spot, "s1");
   EXPECT_EQ(captures.at("b").place, PlaceOf::camera);
   EXPECT_FALSE(captures.at("b").place_sd_m);
   EXPECT_TRUE(captures.at("b").spot.empty());
+}
+
+TEST(ReadCaptures, NamesThePresentColumn) {
+  const TemporaryFolder folder;
+  const auto refusal = [&](const std::string& content) {
+    return rejection_message([&] { read_captures(folder.file("c.csv", content)); });
+  };
+  EXPECT_THAT(refusal("image,spot\na,s1\n"),
+              HasSubstr("c.csv:1: column 'spot' is now called 'pivot'"));
+  EXPECT_THAT(refusal("image,x_m,y_m,place\na,1,2,axis\n"),
+              HasSubstr("c.csv:1: column 'place' is now called 'reference_point'"));
+  EXPECT_THAT(refusal("image,x_m,y_m,place_sd_m\na,1,2,0.1\n"),
+              HasSubstr("c.csv:1: column 'place_sd_m' is now called 'position_sd_m'"));
 }
 
 TEST(ReadCaptures, ReadsOdometry) {
@@ -72,8 +86,8 @@ TEST(ReadCaptures, RejectsContradictions) {
   EXPECT_THAT(refusal("image,velocity_sd_m_per_s\na,1\n"), HasSubstr("is of no velocity"));
   EXPECT_THAT(refusal("image,z_m\na,high\n"), HasSubstr("c.csv:2: z_m: should be a finite number"));
   EXPECT_THAT(refusal("image,z_m\n,1\n"), HasSubstr("c.csv:2: image: is empty"));
-  EXPECT_THAT(refusal("image,place\na,robot\n"), HasSubstr("should be camera or axis"));
-  EXPECT_THAT(refusal("image,place_sd_m\na,-1\n"), HasSubstr("should not be negative"));
+  EXPECT_THAT(refusal("image,reference_point\na,robot\n"), HasSubstr("should be camera or axis"));
+  EXPECT_THAT(refusal("image,position_sd_m\na,-1\n"), HasSubstr("should not be negative"));
 }
 
 }  // namespace

@@ -37,8 +37,8 @@ TEST(CheckGates, PassesIfValueDoesNotExceedLimit) {
   const auto results = check_gates({{"mean_mm", 3.001},
                                     {"mean_mm", 2.999},
                                     {"p90_mm", 6.001},
-                                    {"missing", 0.25},
-                                    {"missing", 0.249},
+                                    {"missing_fraction", 0.25},
+                                    {"missing_fraction", 0.249},
                                     {"height_rms_mm", 2.9}},
                                    collect_metrics(evaluation()));
   std::vector<bool> passed;
@@ -130,7 +130,7 @@ TEST(CheckAll, IncludesMetricsWithoutGateAndGatesWithoutValue) {
 
 TEST(WithChanges, ReplacesLimitsAndAppendsNewGates) {
   const auto gates =
-      with_changes({{"rms_px", 1}, {"halves_px", 1}}, {{"coverage", 0.6}, {"rms_px", 2}});
+      with_changes({{"rms_px", 1}, {"split_half_px", 1}}, {{"coverage", 0.6}, {"rms_px", 2}});
   ASSERT_EQ(gates.size(), 3);
   EXPECT_EQ(gates[0].limit, 2);
   EXPECT_EQ(gates[1].limit, 1);
@@ -165,34 +165,38 @@ TEST(ParseGate, RejectsUnreachableLimits) {
       return problem.what();
     }
   };
-  EXPECT_EQ(words("missing=50"),
-            "gate 'missing' should be a share from 0 to 1, not 50: for 50 % say 0.5");
+  EXPECT_EQ(words("missing_fraction=50"),
+            "gate 'missing_fraction' should be a share from 0 to 1, not 50: for 50 % say 0.5");
   EXPECT_EQ(words("coverage=7"),
             "gate 'coverage' should be a share from 0 to 1, not 7: for 7 % say 0.07");
   EXPECT_EQ(words("yaw_rms_deg=200"), "gate 'yaw_rms_deg' should be at most 180 deg, not 200");
   EXPECT_THAT(words("mean_mm=-1"), HasSubstr("gate 'mean_mm' should not be negative"));
-  EXPECT_EQ(parse_gate("missing=1", known).limit, 1);
-  EXPECT_EQ(parse_gate("stated_ratio=50", known).limit, 50);
+  EXPECT_EQ(words("missing=0"), "gate 'missing' is now called 'missing_fraction'");
+  EXPECT_THAT(words("mising=0"), HasSubstr("gate 'mising' is not known"));
+  EXPECT_EQ(parse_gate("missing_fraction=1", known).limit, 1);
+  EXPECT_EQ(parse_gate("normalized_error_rms=50", known).limit, 50);
   const TemporaryFolder folder;
   const auto refusal = [&](const std::string& text) {
     return rejection_message(
         [&] { read_gates(folder.file("g.yaml", "format: vlp-gates/1\ngates:\n" + text), known); });
   };
-  EXPECT_THAT(refusal("  mean_mm: 1\n  missing: 1.5\n"),
-              HasSubstr("g.yaml:4: gates.missing: should be a share from 0 to 1"));
+  EXPECT_THAT(refusal("  mean_mm: 1\n  missing_fraction: 1.5\n"),
+              HasSubstr("g.yaml:4: gates.missing_fraction: should be a share from 0 to 1"));
+  EXPECT_THAT(refusal("  mean_mm: 1\n  missing: 0\n"),
+              HasSubstr("g.yaml:4: gates: key 'missing' is now called 'missing_fraction'"));
   EXPECT_THAT(refusal("  yaw_rms_deg: -0.5\n"),
               HasSubstr("g.yaml:3: gates.yaw_rms_deg: should not be negative"));
 }
 
 TEST(CheckGates, FailsGateWithoutValue) {
-  const CheckedMetric gate = check_gates({{"halves_px", 1}}, {{"rms_px", 0.1}})[0];
-  EXPECT_EQ(describe(gate), "halves_px is not known, at most 1 px is asked for");
+  const CheckedMetric gate = check_gates({{"split_half_px", 1}}, {{"rms_px", 0.1}})[0];
+  EXPECT_EQ(describe(gate), "split_half_px is not known, at most 1 px is asked for");
   const auto json = nlohmann::json::parse(to_json(evaluation(), {gate}));
   EXPECT_TRUE(json["gates"][0]["value"].is_null());
   EXPECT_EQ(json["passed"], false);
   const auto tests = make_junit_tests(std::vector{gate});
   ASSERT_EQ(tests.size(), 1);
-  EXPECT_THAT(tests[0].message, HasSubstr("halves_px is not known, at most 1 px"));
+  EXPECT_THAT(tests[0].message, HasSubstr("split_half_px is not known, at most 1 px"));
 }
 
 TEST(ParseGate, ParsesNameAndLimit) {
@@ -210,7 +214,8 @@ TEST(ReadGates, ReadsFileAndRejectsInvalidOnes) {
   const TemporaryFolder folder;
   const auto known = metric_kinds({MetricSource::evaluation});
   const auto gates = read_gates(
-      folder.file("g.yaml", "format: vlp-gates/1\ngates: {missing: 0, mean_mm: 1.5}\n"), known);
+      folder.file("g.yaml", "format: vlp-gates/1\ngates: {missing_fraction: 0, mean_mm: 1.5}\n"),
+      known);
   ASSERT_EQ(gates.size(), 2);
   EXPECT_EQ(gates[0].metric, "mean_mm");
   EXPECT_EQ(gates[0].limit, 1.5);
@@ -227,7 +232,8 @@ TEST(ReadGates, ReadsFileAndRejectsInvalidOnes) {
 
 TEST(EvaluationJson, HasUnitsInKeys) {
   const auto json = nlohmann::json::parse(to_json(
-      evaluation(), check_gates({{"max_mm", 5}, {"missing", 1}}, collect_metrics(evaluation()))));
+      evaluation(),
+      check_gates({{"max_mm", 5}, {"missing_fraction", 1}}, collect_metrics(evaluation()))));
   EXPECT_EQ(json["format"], "vlp-evaluation/1");
   EXPECT_EQ(json["captures"], 4);
   EXPECT_EQ(json["missing"]["degenerate"], 1);

@@ -11,8 +11,8 @@ namespace {
 
 TEST(MakeJUnitTests, FailsGatesThatAreNotPassed) {
   const std::vector<CheckedMetric> gates{{"mean_mm", "mm", 1.25, 1, Direction::at_most},
-                                         {"missing", "", 0, 0, Direction::at_most},
-                                         {"halves_px", "px", {}, 1, Direction::at_most}};
+                                         {"missing_fraction", "", 0, 0, Direction::at_most},
+                                         {"split_half_px", "px", {}, 1, Direction::at_most}};
   const auto tests = make_junit_tests(gates);
   ASSERT_EQ(tests.size(), 3);
   EXPECT_EQ(tests[0].name, "mean_mm");
@@ -23,7 +23,7 @@ TEST(MakeJUnitTests, FailsGatesThatAreNotPassed) {
   EXPECT_EQ(tests[1].result, JUnitTest::Result::passed);
   EXPECT_EQ(tests[1].message, "");
   EXPECT_EQ(tests[2].result, JUnitTest::Result::failed);
-  EXPECT_THAT(tests[2].message, testing::HasSubstr("halves_px is not known, at most 1 px is"));
+  EXPECT_THAT(tests[2].message, testing::HasSubstr("split_half_px is not known, at most 1 px is"));
 }
 
 TEST(FormatJUnit, WritesEachResultWithMessageAndWarnings) {

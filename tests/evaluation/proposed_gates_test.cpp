@@ -41,7 +41,7 @@ TEST(ProposeGates, RunsOfSameAccuracyPass) {
     const auto gates = propose_gates(first, evaluate(first));
     ASSERT_EQ(gates.size(), 5);
     for (const auto& gate : check_gates(gates, collect_metrics(evaluate(second)))) {
-      if (gate.name == "missing") continue;
+      if (gate.name == "missing_fraction") continue;
       ++checked;
       if (!gate.passed()) ++exceeded;
     }
@@ -70,7 +70,7 @@ TEST(ProposeGates, KeepsMarginWithoutScatter) {
   EXPECT_NEAR(gates[0].limit, 1.01, 1e-9);
   EXPECT_EQ(gates[1].metric, "height_rms_mm");
   EXPECT_NEAR(gates[1].limit, 0.001, 1e-9);
-  EXPECT_EQ(gates[3].metric, "missing");
+  EXPECT_EQ(gates[3].metric, "missing_fraction");
   EXPECT_EQ(gates[3].limit, 0);
 }
 

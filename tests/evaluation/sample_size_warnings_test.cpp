@@ -28,11 +28,11 @@ Evaluation evaluation(std::size_t clusters) {
 }
 
 TEST(MissingFixesWarning, WarnsIfNoGateLimitsMissingFixes) {
-  const auto gates =
-      check_gates({{"mean_mm", 2}, {"missing", 1}}, {{"mean_mm", 1}, {"missing", 0.9}});
+  const auto gates = check_gates({{"mean_mm", 2}, {"missing_fraction", 1}},
+                                 {{"mean_mm", 1}, {"missing_fraction", 0.9}});
   const CheckedMetric &mean = gates[0], &missing = gates[1];
   EXPECT_EQ(make_missing_fixes_warning(evaluation(50), {mean}),
-            "393 of 432 captures have no fix, and no gate 'missing' asks");
+            "393 of 432 captures have no fix, and no gate 'missing_fraction' asks");
   EXPECT_EQ(make_missing_fixes_warning(evaluation(50), {mean, missing}), "");
   EXPECT_EQ(make_missing_fixes_warning(evaluation(50), {}), "");
   Evaluation all = evaluation(50);

@@ -65,12 +65,14 @@ TEST(WriteLights, WritesOneRowPerLight) {
   EXPECT_EQ(text(0, "period_lines"), "11.2500");
   EXPECT_EQ(text(1, "reason"), "overexposed");
   EXPECT_EQ(text(1, "contrast"), "0.0000") << "measured, and none";
-  for (const char* column : {"lamp", "period_lines", "periods", "clarity", "coherence", "duty"}) {
+  for (const char* column :
+       {"lamp", "period_lines", "periods", "periodicity_r2", "coherence", "duty"}) {
     EXPECT_EQ(text(1, column), "") << column;
   }
   EXPECT_EQ(text(2, "image"), "c.png");
   EXPECT_EQ(text(2, "radius_px"), "38.0000");
-  for (const char* column : {"sigma_px", "outline", "rise_px", "roundness", "contrast"}) {
+  for (const char* column :
+       {"sigma_px", "outline", "edge_rise_px", "inlier_fraction", "contrast"}) {
     EXPECT_EQ(text(2, column), "") << column;
   }
   EXPECT_THROW(write_lights(folder / "no" / "lights.csv", {}), InputError);

@@ -260,7 +260,7 @@ const std::vector<std::string> kReaders{
     "vlp-evaluate BAD --truth truth.csv",
     kLocate + "-q && vlp-evaluate fixes.csv --truth BAD",
     "vlp-rotation BAD --lamps lamps.yaml --calibration calibration.yaml -o out.yaml",
-    "vlp-dispersion BAD --lamps lamps.yaml --calibration calibration.yaml --station 0 0 -o "
+    "vlp-dispersion BAD --lamps lamps.yaml --calibration calibration.yaml --reference-point 0 0 -o "
     "out.yaml",
     "vlp-adjust BAD --lamps lamps.yaml --calibration calibration.yaml -o out.yaml",
     "vlp-limits --lamps BAD --calibration calibration.yaml --height-m 0 --noise-px 0.05 "

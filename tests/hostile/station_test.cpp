@@ -309,7 +309,7 @@ const std::vector<StationTrial> kFolderTrials{
        fs::copy_file(fs::path(VLP_SOURCE_DIR) / "datasets/paper-rig/rendered/true_calibration.yaml",
                      s.home / name);
        s.change("station.yaml", "records: records.db",
-                "records: records.db\nkeep: {images_days: 1, results_days: 1}\n"
+                "records: records.db\nretention: {images_days: 1, results_days: 1}\n"
                 "golden: {camera_id: golden, calibration: " +
                     name + ", gates: {check_mean_mm: 20}}");
        return s.vlp_station("clean --delete");
@@ -324,7 +324,7 @@ const std::vector<StationTrial> kFolderTrials{
        s.empty_run();
        s.age_run(400);
        s.change("station.yaml", "records: records.db",
-                "records: records.db\nkeep: {images_days: 1, results_days: 1}");
+                "records: records.db\nretention: {images_days: 1, results_days: 1}");
        return s.vlp_station("clean --delete");
      },
      2, "more than a year before the clock",
@@ -336,7 +336,7 @@ const std::vector<StationTrial> kFolderTrials{
        s.empty_run();
        s.age_run(-400);
        s.change("station.yaml", "records: records.db",
-                "records: records.db\nkeep: {images_days: 1, results_days: 1}");
+                "records: records.db\nretention: {images_days: 1, results_days: 1}");
        return s.vlp_station("clean --delete");
      },
      2, "after the clock",

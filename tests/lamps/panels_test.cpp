@@ -188,8 +188,8 @@ TEST(LightDetector, RejectsReflectionsOfPanels) {
     scene.clutter.reflections.push_back({scene.lamps[lamp].glow, lamp});
     Glow& reflection = scene.clutter.reflections.back().glow;
     reflection.position_m.head<2>() += Eigen::Vector2d(0.1, lamp == 1 ? -0.75 : 0.75);
-    reflection.radiance_e_per_s /= 4;
-    reflection.edge_share = 0;
+    reflection.electron_rate_e_per_s /= 4;
+    reflection.rim_to_center_ratio = 0;
   }
   const Score score = Captures(std::move(scene), "check").score(2 * kStep, is_panel_or_tube);
   EXPECT_EQ(score.wrong, 0);

@@ -23,7 +23,7 @@ class VlpAdjust : public testing::Test {
   TemporaryFolder folder;
   SyntheticRig rig{synthetic_lamps(), {synthetic_camera(), {}, {}, {}, {}}, {{0, 0, 0}, 0}, {}};
   std::vector<Frame> frames;
-  std::string captures = "image,spot,x_m,y_m,z_m,place,place_sd_m\n";
+  std::string captures = "image,pivot,x_m,y_m,z_m,reference_point,position_sd_m\n";
 
   VlpAdjust() {
     rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.02, 1);
@@ -116,7 +116,7 @@ TEST_F(VlpAdjust, AcceptsContinuousRotation) {
   body.calibration.rotation_center = rig.calibration.rotation_center;
   rig.calibration.camera = body.calibration.camera;
   Random random(1);
-  captures = "image,spot,yaw_rate_rad_per_s\n";
+  captures = "image,pivot,yaw_rate_rad_per_s\n";
   std::string standing = captures;
   for (std::size_t i = 0; i < frames.size(); ++i) {
     const double yaw_rad = 2 * std::numbers::pi * static_cast<double>(i % 8) / 8;
@@ -187,7 +187,7 @@ TEST_F(VlpAdjust, RejectsAdjustedCalibration) {
 TEST_F(VlpAdjust, ReportsRemedyWhenUndetermined) {
   frames.resize(1);
   frames[0].detections.resize(2);
-  captures = "image,spot\n0,s\n";
+  captures = "image,pivot\n0,s\n";
   const ProgramResult result = adjust("--map-sd-m 0.01");
   EXPECT_EQ(result.exit_code, 3);
   EXPECT_THAT(result.errors, HasSubstr("a second height"));

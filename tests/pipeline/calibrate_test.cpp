@@ -231,7 +231,7 @@ TEST_F(VlpCalibrateSmallSession, GivesSameResultInForkedProcess) {
                               "3e-5", "--readout", "rows"}},
                             {"limit_s", 600}};
   folder.file("lines", line.dump() + "\n" + line.dump() + "\n");
-  const auto each = run_program("vlp-calibrate --each <'" + path("lines") + "'");
+  const auto each = run_program("vlp-calibrate --batch-stdin <'" + path("lines") + "'");
   EXPECT_EQ(each.exit_code, 0) << each.errors;
   std::istringstream answers(each.output);
   for (const bool as_before : {false, true}) {

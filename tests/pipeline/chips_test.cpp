@@ -23,7 +23,8 @@ namespace fs = std::filesystem;
 std::string scene_with_chips(const std::string& chips) {
   std::ifstream file(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml");
   std::string scene{std::istreambuf_iterator<char>(file), {}};
-  const std::string end = "edge_share: 0.8}", with = "edge_share: 0.8, chips: {" + chips + "}}";
+  const std::string end = "rim_to_center_ratio: 0.8}",
+                    with = "rim_to_center_ratio: 0.8, chips: {" + chips + "}}";
   for (std::size_t at = scene.find(end); at != std::string::npos;
        at = scene.find(end, at + with.size())) {
     scene.replace(at, end.size(), with);
@@ -34,7 +35,7 @@ std::string scene_with_chips(const std::string& chips) {
 TEST(DetectLamps, IsUnbiasedForVisibleLedChips) {
   const TemporaryFolder folder;
   const auto scene =
-      folder.file("scene.yaml", scene_with_chips("share: 0.3, pitch_m: 0.03, width_m: 0.02"));
+      folder.file("scene.yaml", scene_with_chips("fraction: 0.3, pitch_m: 0.03, width_m: 0.02"));
   const fs::path out = folder / "out", found_file = folder / "detections.csv";
   auto result =
       run_program("vlp-simulate -q " + scene.string() + " --only rotation -o " + out.string());

@@ -30,7 +30,7 @@ class CiAction : public testing::Test {
                                       "--only boards,rotation,dispersion,check -o '" +
                                       (folder / "session").string() + "'");
     ASSERT_EQ(rendered.exit_code, 0) << rendered.errors;
-    folder.file("gates.yaml", "format: vlp-gates/1\ngates: {mean_mm: 1, missing: 0}\n");
+    folder.file("gates.yaml", "format: vlp-gates/1\ngates: {mean_mm: 1, missing_fraction: 0}\n");
   }
   ProgramResult run_action(const std::string& inputs) const {
     return run_program("cd '" + (folder / "").string() +

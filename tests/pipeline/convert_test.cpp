@@ -76,7 +76,7 @@ TEST_F(VlpConvert, KeepsCalibratedRegion) {
   ASSERT_TRUE(back.intrinsics_report);
   EXPECT_EQ(back.intrinsics_report->region_px, report.region_px);
   EXPECT_EQ(back.intrinsics_report->views, 0);
-  EXPECT_FALSE(back.intrinsics_report->uncertainty_px);
+  EXPECT_FALSE(back.intrinsics_report->expected_max_error_px);
   EXPECT_THAT(convert("camera.yaml", "out", "--to mrcal"),
               HasSubstr("% of the image, which is kept"));
   EXPECT_THAT(convert("camera.yaml", "out", "--to ros"), HasSubstr("the format cannot say"));

@@ -48,7 +48,7 @@ class VlpDispersion : public testing::Test {
 };
 
 TEST_F(VlpDispersion, MakesFixesExactAtOtherPositions) {
-  const auto result = dispersion(turn(12, 6.28), "--station 0.102 -0.051");
+  const auto result = dispersion(turn(12, 6.28), "--reference-point 0.102 -0.051");
   ASSERT_EQ(result.exit_code, 0) << result.errors;
   EXPECT_THAT(result.output, HasSubstr("captures    12, 12 used, 0 left out"));
   EXPECT_THAT(result.output, HasSubstr("world       -2.000 1.000 mm"));
@@ -59,7 +59,7 @@ TEST_F(VlpDispersion, MakesFixesExactAtOtherPositions) {
   EXPECT_GT(written.dispersion->radius_m, 0.01) << "of the circle before";
   ASSERT_EQ(written.history.size(), 1);
   EXPECT_EQ(written.history[0].options,
-            "--lamps lamps.yaml --calibration rotated.yaml --station 0.102 -0.051");
+            "--lamps lamps.yaml --calibration rotated.yaml --reference-point 0.102 -0.051");
 
   rig.camera = {{-0.3, 0.2, 0.25}, -2};
   write_detections(folder / "elsewhere.csv", {{"a", seen_from(rig, 0.1)}});
@@ -93,47 +93,49 @@ TEST_F(VlpDispersion, ReadsPlacesFromCapturesCsv) {
 }
 
 TEST_F(VlpDispersion, RequiresSeveralYawsOrMethodPaper) {
-  const auto refused = dispersion(turn(6, 0), "--station 0.1 -0.05");
+  const auto refused = dispersion(turn(6, 0), "--reference-point 0.1 -0.05");
   EXPECT_EQ(refused.exit_code, 3);
   EXPECT_THAT(refused.errors, HasSubstr("turn the camera at the station"));
   EXPECT_FALSE(std::filesystem::exists(folder / "calibration.yaml"));
   for (const std::string circle : {"", " --circle enclosing"}) {
-    const auto paper = dispersion(turn(6, 0), "--station 0.1 -0.05 --method paper" + circle);
+    const auto paper =
+        dispersion(turn(6, 0), "--reference-point 0.1 -0.05 --method chen-guan" + circle);
     EXPECT_EQ(paper.exit_code, 0) << paper.errors;
     EXPECT_THAT(paper.output, HasSubstr("supposed right"));
   }
-  EXPECT_EQ(dispersion(turn(6, 6.28), "--station 0.1 -0.05 --method paper").exit_code, 3);
+  EXPECT_EQ(dispersion(turn(6, 6.28), "--reference-point 0.1 -0.05 --method chen-guan").exit_code,
+            3);
 }
 
 TEST_F(VlpDispersion, ReportsCauseOfFailure) {
-  const auto far = dispersion(turn(6, 6.28), "--station 100 -50");
+  const auto far = dispersion(turn(6, 6.28), "--reference-point 100 -50");
   EXPECT_EQ(far.exit_code, 2);
   EXPECT_THAT(far.errors, HasSubstr("in the frame of the lamp map?"));
-  const auto one = dispersion(turn(1, 0), "--station 0.1 -0.05");
+  const auto one = dispersion(turn(1, 0), "--reference-point 0.1 -0.05");
   EXPECT_EQ(one.exit_code, 3);
   EXPECT_THAT(one.errors, HasSubstr("add captures"));
   auto frames = turn(6, 6.28);
   for (Frame& frame : frames) {
     for (Detection& detection : frame.detections) detection.lamp += 100;
   }
-  const auto other_map = dispersion(frames, "--station 0.1 -0.05");
+  const auto other_map = dispersion(frames, "--reference-point 0.1 -0.05");
   EXPECT_EQ(other_map.exit_code, 2);
   EXPECT_THAT(other_map.errors, HasSubstr("lamps.yaml: has none of the lamps"));
   frames = turn(6, 6.28);
   LampMap mirrored = rig.map;
   for (Lamp& lamp : mirrored.lamps) lamp.position_m.y() *= -1;
   write_lamp_map(folder / "lamps.yaml", mirrored);
-  const auto from_below = dispersion(frames, "--station 0.1 -0.05");
+  const auto from_below = dispersion(frames, "--reference-point 0.1 -0.05");
   EXPECT_EQ(from_below.exit_code, 2);
   EXPECT_THAT(from_below.errors, HasSubstr("lamps.yaml: the lamp map looks mirrored"));
   write_lamp_map(folder / "lamps.yaml", rig.map);
   for (Frame& frame : frames) frame.detections.resize(1), frame.detections[0].lamp = 1;
-  EXPECT_EQ(dispersion(frames, "--station 0.1 -0.05").exit_code, 3);
+  EXPECT_EQ(dispersion(frames, "--reference-point 0.1 -0.05").exit_code, 3);
 }
 
 TEST_F(VlpDispersion, PlotsFixes) {
   const auto result =
-      dispersion(turn(12, 6.28), "--station 0.1 -0.05 --plot " + path("picture.svg"));
+      dispersion(turn(12, 6.28), "--reference-point 0.1 -0.05 --plot " + path("picture.svg"));
   ASSERT_EQ(result.exit_code, 0) << result.errors;
   EXPECT_THAT(TemporaryFolder::read_content(folder / "picture.svg"), HasSubstr("<svg"));
 }
@@ -143,7 +145,7 @@ TEST_F(VlpDispersion, KeepsOtherPartsOfCalibration) {
   believed.rotation_center.reset();
   believed.dispersion.reset();
   write_calibration(folder / "rotated.yaml", believed);
-  const auto result = dispersion(turn(6, 6.28), "--station 0.1 -0.05");
+  const auto result = dispersion(turn(6, 6.28), "--reference-point 0.1 -0.05");
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_THAT(result.errors, HasSubstr("run vlp-rotation first"));
   EXPECT_THAT(result.output, Not(HasSubstr("nan")));

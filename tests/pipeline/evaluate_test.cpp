@@ -73,10 +73,11 @@ TEST_F(VlpEvaluate, MatchesHandComputedMetrics) {
 
 TEST_F(VlpEvaluate, ReturnsOneAndWritesAllWhenGateFails) {
   const auto result = with_truth(
-      "--gate mean_mm=2.5,p90_mm=3 --gate missing=0 --json evaluation.json --junit junit.xml");
+      "--gate mean_mm=2.5,p90_mm=3 --gate missing_fraction=0 --json evaluation.json --junit "
+      "junit.xml");
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_THAT(result.errors, AllOf(HasSubstr("p90_mm is 4 mm, at most 3 mm"),
-                                   HasSubstr("missing is 0.1667, at most 0 is"),
+                                   HasSubstr("missing_fraction is 0.1667, at most 0 is"),
                                    testing::Not(HasSubstr("mean_mm"))));
   EXPECT_THAT(result.output,
               AllOf(HasSubstr("NOT MET gate p90_mm"), HasSubstr("met    gate mean_mm")));
@@ -107,19 +108,19 @@ TEST_F(VlpEvaluate, ProposesGatesThatPass) {
   ASSERT_EQ(proposed.exit_code, 0) << proposed.errors;
   EXPECT_THAT(content("gates.yaml"),
               AllOf(HasSubstr("format: vlp-gates/1\n"), HasSubstr("  mean_mm: "),
-                    HasSubstr("  height_rms_mm: "), HasSubstr("  missing: 0 ")));
+                    HasSubstr("  height_rms_mm: "), HasSubstr("  missing_fraction: 0 ")));
   const auto passed = evaluate_example("--noise-px 0.05 --gates '" + path("gates.yaml") + "'");
   EXPECT_EQ(passed.exit_code, 0) << passed.errors;
 }
 
 TEST_F(VlpEvaluate, WarnsOfMissingFixesWithoutGate) {
-  const std::string words = "1 of 6 captures has no fix, and no gate 'missing' asks";
+  const std::string words = "1 of 6 captures has no fix, and no gate 'missing_fraction' asks";
   const auto result = with_truth("--gate mean_mm=2.5 --report r.html");
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_THAT(result.errors, HasSubstr(words));
   const std::string html = content("r.html");
   EXPECT_LT(html.find("<strong>PASS</strong>"), html.find("<p>1 of 6 captures has no fix"));
-  EXPECT_THAT(with_truth("--gate missing=1").errors, testing::Not(HasSubstr(words)));
+  EXPECT_THAT(with_truth("--gate missing_fraction=1").errors, testing::Not(HasSubstr(words)));
 }
 
 TEST_F(VlpEvaluate, CombinesGatesOfFileAndCommandLine) {
@@ -131,9 +132,10 @@ TEST_F(VlpEvaluate, CombinesGatesOfFileAndCommandLine) {
   const auto unknown = with_truth("--gates gates.yaml");
   EXPECT_EQ(unknown.exit_code, 2);
   EXPECT_THAT(unknown.errors, HasSubstr("gates.yaml:4: gates: key 'mean' is unknown"));
-  folder.file("gates.yaml", "format: vlp-gates/1\ngates:\n  missing: 50\n");
-  EXPECT_THAT(with_truth("--gates gates.yaml").errors,
-              HasSubstr("gates.yaml:3: gates.missing: should be a share from 0 to 1, not 50"));
+  folder.file("gates.yaml", "format: vlp-gates/1\ngates:\n  missing_fraction: 50\n");
+  EXPECT_THAT(
+      with_truth("--gates gates.yaml").errors,
+      HasSubstr("gates.yaml:3: gates.missing_fraction: should be a share from 0 to 1, not 50"));
 }
 
 TEST_F(VlpEvaluate, ComparesFixesWithPathAndLine) {
@@ -204,7 +206,8 @@ TEST_F(VlpEvaluate, SchemaRejectsChangedDocuments) {
 
 TEST_F(VlpEvaluate, ComparesExampleWithCrlb) {
   // Errors of 36 fixes are within 30 % of the limit of their noise: three standard errors.
-  const auto result = evaluate_example("--noise-px 0.05 --gate limit_ratio=1.3,stated_ratio=1.3");
+  const auto result =
+      evaluate_example("--noise-px 0.05 --gate crlb_ratio=1.3,normalized_error_rms=1.3");
   EXPECT_EQ(result.exit_code, 0) << result.errors;
   EXPECT_THAT(result.output,
               AllOf(HasSubstr("limit       0.1"), HasSubstr("error / sd  horizontal")));
@@ -256,7 +259,7 @@ TEST_F(VlpEvaluate, ReturnsTwoForBadUsage) {
   for (const char* options :
        {"", "--truth truth.csv --line 0 0 1 0", "--line 0 0 0 0", "--line 0 0 1",
         "--truth truth.csv --gate mean=1", "--truth truth.csv --gate mean_mm=x",
-        "--truth truth.csv --gate missing=50", "--truth truth.csv --gate mean_mm=-1",
+        "--truth truth.csv --gate missing_fraction=50", "--truth truth.csv --gate mean_mm=-1",
         "--truth truth.csv --gate mean_mm=1,mean_mm=2", "--truth truth.csv --gate fitted_mean_mm=1",
         "--truth truth.csv --junit a.xml", "--truth truth.csv --json truth.csv",
         "--truth truth.csv --noise-px 1", "--truth truth.csv --station-mm 0", "--line 0 0 1e7 0",

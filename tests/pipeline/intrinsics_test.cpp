@@ -69,7 +69,7 @@ TEST_P(VlpIntrinsicsRenderedImages, GiveTrueLensForAllThreadCounts) {
   EXPECT_THAT(content("plot.svg"), HasSubstr("standard deviation (px)"));
   // A gate that is not met: everything is written all the same.
   const auto gated = calibrate(rig + "/boards", board,
-                               "--gate uncertainty_px=0.001 --held-out 6 --cache " + cache);
+                               "--gate expected_max_error_px=0.001 --held-out 6 --cache " + cache);
   EXPECT_EQ(gated.exit_code, 1);
   EXPECT_THAT(gated.errors,
               HasSubstr("at most 0.001 px is asked for; add views, next the board in the "));
@@ -122,9 +122,9 @@ TEST_P(VlpIntrinsicsProcessedImages, GiveTrueLens) {
   RecordProperty("worst_px", std::to_string(difference->worst_px));
 }
 
-constexpr const char* kPhone = "\npicture: {gamma: 2.2, jpeg_quality: 90}\n";
+constexpr const char* kPhone = "\nprocessing: {gamma: 2.2, jpeg_quality: 90}\n";
 constexpr const char* kSharp =
-    "\npicture: {gamma: 2.2, sharpening: {amount: 1, radius_px: 1}, jpeg_quality: 90}\n";
+    "\nprocessing: {gamma: 2.2, sharpening: {amount: 1, radius_px: 1}, jpeg_quality: 90}\n";
 INSTANTIATE_TEST_SUITE_P(
     Scenes, VlpIntrinsicsProcessedImages,
     testing::Values(Coded{"paper-rig", kPhone, "0.004", "Plain", 0.02, 0.15},
@@ -140,7 +140,7 @@ TEST_F(VlpIntrinsics, FailsUncertaintyGateForFrontalViews) {
   if (real.empty()) GTEST_SKIP() << "no real captures here";
   const auto result = calibrate((real / "cam0").string(), (real / "board.yaml").string());
   EXPECT_EQ(result.exit_code, 1);
-  EXPECT_THAT(result.errors, HasSubstr("uncertainty_px is "));
+  EXPECT_THAT(result.errors, HasSubstr("expected_max_error_px is "));
   const auto report = read_calibration(folder / "camera.yaml").intrinsics_report;
   ASSERT_TRUE(report);
   EXPECT_EQ(report->views, 15) << "one is blurred by more than 2 px";

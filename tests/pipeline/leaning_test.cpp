@@ -33,12 +33,12 @@ sensor: {bits: 8, gain_dn_per_e: 0.02, black_level_dn: 2, full_well_e: 13000, re
 mount: {tilt_deg: 0.4, tilt_azimuth_deg: 60, lever_arm_m: [0, 0]}
 ambient_e_per_s: 1.0e+6
 lamps:
-  - {id: 1, position_m: [-0.6, -0.3, 1.6], diameter_m: 0.18, frequency_hz: 1600, duty: 0.5, radiance_e_per_s: 2.0e+8, edge_share: 0.8}
-  - {id: 2, position_m: [0, -0.32, 1.6], diameter_m: 0.18, frequency_hz: 2000, duty: 0.5, radiance_e_per_s: 2.0e+8, edge_share: 0.8}
-  - {id: 3, position_m: [0.6, -0.3, 1.6], diameter_m: 0.18, frequency_hz: 2500, duty: 0.5, radiance_e_per_s: 2.0e+8, edge_share: 0.8}
-  - {id: 4, position_m: [-0.6, 0.3, 1.6], diameter_m: 0.18, frequency_hz: 3100, duty: 0.5, radiance_e_per_s: 2.0e+8, edge_share: 0.8}
-  - {id: 5, position_m: [0, 0.28, 1.6], diameter_m: 0.18, frequency_hz: 3800, duty: 0.5, radiance_e_per_s: 2.0e+8, edge_share: 0.8}
-  - {id: 6, position_m: [0.6, 0.3, 1.6], diameter_m: 0.18, frequency_hz: 4700, duty: 0.5, radiance_e_per_s: 2.0e+8, edge_share: 0.8}
+  - {id: 1, position_m: [-0.6, -0.3, 1.6], diameter_m: 0.18, frequency_hz: 1600, duty: 0.5, electron_rate_e_per_s: 2.0e+8, rim_to_center_ratio: 0.8}
+  - {id: 2, position_m: [0, -0.32, 1.6], diameter_m: 0.18, frequency_hz: 2000, duty: 0.5, electron_rate_e_per_s: 2.0e+8, rim_to_center_ratio: 0.8}
+  - {id: 3, position_m: [0.6, -0.3, 1.6], diameter_m: 0.18, frequency_hz: 2500, duty: 0.5, electron_rate_e_per_s: 2.0e+8, rim_to_center_ratio: 0.8}
+  - {id: 4, position_m: [-0.6, 0.3, 1.6], diameter_m: 0.18, frequency_hz: 3100, duty: 0.5, electron_rate_e_per_s: 2.0e+8, rim_to_center_ratio: 0.8}
+  - {id: 5, position_m: [0, 0.28, 1.6], diameter_m: 0.18, frequency_hz: 3800, duty: 0.5, electron_rate_e_per_s: 2.0e+8, rim_to_center_ratio: 0.8}
+  - {id: 6, position_m: [0.6, 0.3, 1.6], diameter_m: 0.18, frequency_hz: 4700, duty: 0.5, electron_rate_e_per_s: 2.0e+8, rim_to_center_ratio: 0.8}
 captures:
 )";
 // clang-format on
@@ -74,7 +74,8 @@ class TiltedCamera : public testing::Test {
       const double x_m = axis == 1 ? -aside_m : 0, y_m = axis == 0 ? aside_m : 0;
       captures += fmt::format(
           "  - {{folder: {}{}, exposure_s: 5.0e-5, spots_m: [[{:.3f}, {:.3f}], [{:.3f}, {:.3f}]], "
-          "heights_m: [0.2, 0.4], yaws_deg: [{}], interval_s: 0.5, lean: {{{}_deg: [{}, {}]}}}}\n",
+          "heights_m: [0.2, 0.4], yaws_deg: [{}], interval_s: 0.5, roll_pitch: {{{}_deg: [{}, "
+          "{}]}}}}\n",
           axes[axis], lean_deg, x_m + 0.1, y_m - 0.05, x_m - 0.1, y_m + 0.1, 0, axes[axis],
           lean_deg, lean_deg);
     }
@@ -132,7 +133,7 @@ TEST_F(TiltedCamera, HasErrorsAsPredictedFromPixelNoise) {
   for (const int lean_deg : {5, 15, 30, 50}) add_set(lean_deg);
   render();
   for (const int lean_deg : {5, 15, 30, 50})
-    check(lean_deg, "--lean-sd-deg 90", fmt::format("deg_{}", lean_deg));
+    check(lean_deg, "--roll-pitch-sd-deg 90", fmt::format("deg_{}", lean_deg));
 }
 
 /// The inclination in captures.csv determines the plane in which lamps are discs.
@@ -179,7 +180,7 @@ TEST_F(TiltedCamera, IsLocatedFromEllipsesUpTo80Degrees) {
     const bool rolls = std::string(axis) == "roll";
     captures += fmt::format(
         "  - {{folder: {}{}, exposure_s: 1.7e-5, spots_m: [[{:.3f}, {:.3f}]], heights_m: [0.8, "
-        "1.0], yaws_deg: [0], interval_s: 0.5, lean: {{{}_deg: [{}, {}]}}}}\n",
+        "1.0], yaws_deg: [0], interval_s: 0.5, roll_pitch: {{{}_deg: [{}, {}]}}}}\n",
         axis, degrees, rolls ? 0.1 : 0.1 - aside_m, rolls ? aside_m - 0.05 : -0.05, axis, degrees,
         degrees);
   }
@@ -187,7 +188,7 @@ TEST_F(TiltedCamera, IsLocatedFromEllipsesUpTo80Degrees) {
   for (const auto& [axis, degrees] : leans) {
     const std::string set = fmt::format("{}{}", axis, degrees);
     SCOPED_TRACE(set);
-    const auto result = locate(set, "--lean-sd-deg 90");
+    const auto result = locate(set, "--roll-pitch-sd-deg 90");
     EXPECT_EQ(result.exit_code, 0) << result.errors;
     Errors errors;
     add_errors(set, errors);
@@ -202,11 +203,12 @@ TEST_F(TiltedCamera, AnnotatesFinalDetection) {
   render();
   const std::string level = (folder / "level").string(), leaning = (folder / "leaning").string();
   ASSERT_EQ(locate("roll15", "--annotate " + level).exit_code, 0);
-  ASSERT_EQ(locate("roll15", "--lean-sd-deg 90 --threads 1 --annotate " + leaning).exit_code, 0);
+  ASSERT_EQ(locate("roll15", "--roll-pitch-sd-deg 90 --threads 1 --annotate " + leaning).exit_code,
+            0);
   const std::string fixes = TemporaryFolder::read_content(fixes_file("roll15"));
   EXPECT_NE(TemporaryFolder::read_content(folder / "level/0000.png.png"),
             TemporaryFolder::read_content(folder / "leaning/0000.png.png"));
-  ASSERT_EQ(locate("roll15", "--lean-sd-deg 90 --threads 3").exit_code, 0);
+  ASSERT_EQ(locate("roll15", "--roll-pitch-sd-deg 90 --threads 3").exit_code, 0);
   EXPECT_EQ(TemporaryFolder::read_content(fixes_file("roll15")), fixes);
 }
 
@@ -215,11 +217,11 @@ TEST_F(TiltedCamera, IsLocatedWhileMoving) {
   captures +=
       "  - {folder: drive, exposure_s: 5.0e-5, drive: {from_m: [-0.2, 0.35], to_m: [0.2, 0.4], "
       "speed_m_per_s: 1}, heights_m: [0.3], yaws_deg: [0], turn_rate_deg_per_s: 30, "
-      "interval_s: 0.1, lean: {roll_deg: [15, 15]}}\n";
+      "interval_s: 0.1, roll_pitch: {roll_deg: [15, 15]}}\n";
   render();
-  for (const char* frames : {"", " --frames 2"}) {
+  for (const char* frames : {"", " --window 2"}) {
     const auto result =
-        locate("drive", std::string("--lean-sd-deg 90 --max-speed-m-per-s 2") + frames);
+        locate("drive", std::string("--roll-pitch-sd-deg 90 --max-speed-m-per-s 2") + frames);
     ASSERT_EQ(result.exit_code, 0) << result.errors;
     Errors errors;
     add_errors("drive", errors);

@@ -24,7 +24,8 @@ const std::string kLimits = "vlp-limits --lamps " VLP_SOURCE_DIR
                             "/datasets/example/calibration.yaml --height-m 0 --noise-px 0.1 ";
 
 TEST(VlpLimits, PrintsErrorBudget) {
-  const auto result = run_program(kLimits + "--center-px 1 --tilt-deg 0.5 --lamp-map-mm 1");
+  const auto result =
+      run_program(kLimits + "--principal-point-px 1 --tilt-deg 0.5 --lamp-map-mm 1");
   ASSERT_EQ(result.exit_code, 0) << result.errors;
   for (const char* row : {"noise", "center", "tilt", "lamp map", "together"}) {
     EXPECT_THAT(result.output, HasSubstr(std::string("\n") + row));
@@ -60,8 +61,8 @@ TEST(VlpLimits, ReportsEffectOfMotionAndTilt) {
     EXPECT_EQ(result.exit_code, 0) << result.errors;
     return std::pair(result.output, CsvTable(folder / "map.csv"));
   };
-  const auto [output, map] = compute_map(" --max-speed-m-per-s 2 --lean-sd-deg 90 --picture " +
-                                         (folder / "map.svg").string());
+  const auto [output, map] = compute_map(
+      " --max-speed-m-per-s 2 --roll-pitch-sd-deg 90 --picture " + (folder / "map.svg").string());
   for (const char* row : {"\nmotion ", "\nlean ", ", a fix at "}) {
     EXPECT_THAT(output, HasSubstr(row));
   }
@@ -98,7 +99,7 @@ TEST(VlpLimits, RequiresRowTimeOfMovingCamera) {
   const auto result = run_program(two_lamps + "--max-speed-m-per-s 2");
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.errors, HasSubstr("a camera that moves needs row_time_s and readout"));
-  const auto leaning = run_program(two_lamps + "--lean-sd-deg 90");
+  const auto leaning = run_program(two_lamps + "--roll-pitch-sd-deg 90");
   EXPECT_EQ(leaning.exit_code, 3);
   EXPECT_THAT(leaning.errors, HasSubstr("the lamps in view tell motion and lean nowhere"));
 }
@@ -126,7 +127,7 @@ class VlpLimitsFromCalibration : public testing::Test {
 };
 
 TEST_F(VlpLimitsFromCalibration, NamesLargestErrorSource) {
-  const auto result = run("--stated --map " + (folder / "map.csv").string());
+  const auto result = run("--from-calibration --map " + (folder / "map.csv").string());
   ASSERT_EQ(result.exit_code, 0) << result.errors;
   EXPECT_THAT(result.output, HasSubstr("improve     lamp map first, 99 % of the horizontal"));
   EXPECT_THAT(result.output, HasSubstr("vlp-adjust --refine-map"));
@@ -149,7 +150,7 @@ TEST_F(VlpLimitsFromCalibration, IncludeOnlyLensWithoutRotationCenter) {
   calibration.intrinsics_report = IntrinsicsReport{10, 1000, 0, 0.1, {}, {}};
   calibration.intrinsics_report->covariance = MatrixX(1e-6 * MatrixX::Identity(12, 12));
   for (Lamp& lamp : lamps.lamps) lamp.sd_m.reset();
-  const auto result = run("--stated");
+  const auto result = run("--from-calibration");
   ASSERT_EQ(result.exit_code, 0) << result.errors;
   EXPECT_THAT(result.output, HasSubstr("\nlens  "));
   EXPECT_THAT(result.output, HasSubstr("improve     lens first"));
@@ -162,20 +163,20 @@ TEST_F(VlpLimitsFromCalibration, WarnOfLampsAdjustedElsewhere) {
   lamps = rig.map;
   calibration.adjustment = rig.calibration.adjustment;
   calibration.adjustment->sets = {"turn"};
-  EXPECT_THAT(run("--stated").errors, Not(HasSubstr("elsewhere")));
+  EXPECT_THAT(run("--from-calibration").errors, Not(HasSubstr("elsewhere")));
   lamps.lamps[2].position_m.x() += 0.01;
   lamps.lamps[2].sd_m = 0.002;
-  const auto result = run("--stated");
+  const auto result = run("--from-calibration");
   EXPECT_EQ(result.exit_code, 0) << result.errors;
   EXPECT_THAT(result.errors,
               HasSubstr("1 lamps are elsewhere than in the adjustment of the calibration"));
 }
 
 TEST_F(VlpLimitsFromCalibration, RejectErrorsGivenTwice) {
-  EXPECT_EQ(run("--stated --tilt-deg 1").exit_code, 2);
+  EXPECT_EQ(run("--from-calibration --tilt-deg 1").exit_code, 2);
   calibration.rotation_center->covariance.reset();
   for (Lamp& lamp : lamps.lamps) lamp.sd_m.reset();
-  const auto result = run("--stated");
+  const auto result = run("--from-calibration");
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.errors, HasSubstr("calibration.yaml: states no errors of its own, and"));
 }
@@ -244,7 +245,7 @@ TEST(VlpLimits, ReturnsTwoForBadUsage) {
   EXPECT_EQ(run_program(kLimits + "--tilt-deg nan").exit_code, 2);
   EXPECT_EQ(run_program(kLimits + "--height-m inf").exit_code, 2);
   EXPECT_EQ(run_program(kLimits + "--picture a.bmp").exit_code, 2);
-  EXPECT_EQ(run_program(kLimits + "--lean-sd-deg -1").exit_code, 2);
+  EXPECT_EQ(run_program(kLimits + "--roll-pitch-sd-deg -1").exit_code, 2);
   EXPECT_EQ(run_program(kLimits + "--max-yaw-rate-deg-per-s 10").exit_code, 2);
   EXPECT_EQ(run_program("vlp-limits --lamps a --calibration b --height-m 0").exit_code, 2);
 }

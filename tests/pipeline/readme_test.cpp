@@ -277,7 +277,7 @@ TEST(Pages, NameOptionsOfTheirPrograms) {
 TEST(Pages, NamedOptionsAreFoundInCode) {
   EXPECT_THAT(named_options("vlp-locate FOLDER --camera-on-robot"),
               testing::ElementsAre("--camera-on-robot"));
-  EXPECT_THAT(named_options("--gate missing=0 --json=out/no--option.json"),
+  EXPECT_THAT(named_options("--gate missing_fraction=0 --json=out/no--option.json"),
               testing::ElementsAre("--gate", "--json"));
   EXPECT_THAT(listed_options("\n  -o,--output TEXT\n  --row-time-s FLOAT\n      as --other\n"),
               testing::ElementsAre("--output", "--row-time-s"));

@@ -87,7 +87,8 @@ TEST_F(VlpLocateRealLamps, LocatesRigCenterWithFiveLamps) {
   const auto evaluate = [&](const std::string& gates) {
     return run_program("vlp-evaluate " + path("fixes.csv") + " --truth " + truth.string() + gates);
   };
-  const auto evaluated = evaluate(" --gate max_mm=20 --gate height_rms_mm=20 --gate missing=0");
+  const auto evaluated =
+      evaluate(" --gate max_mm=20 --gate height_rms_mm=20 --gate missing_fraction=0");
   EXPECT_EQ(evaluated.exit_code, 0) << evaluated.output << evaluated.errors;
   EXPECT_EQ(evaluate(" --gate max_mm=18").exit_code, 1);
 }

@@ -121,7 +121,7 @@ TEST_F(RealLog, MatchesErrorsAgainstPath) {
   EXPECT_THAT(evaluate("").output, testing::HasSubstr("mean           65.831 mm"));
   ASSERT_EQ(level().exit_code, 0);
   figures(in_log("lamps.yaml"), path("leveled.yaml"));
-  EXPECT_EQ(evaluate("--gate mean_mm=32.9 --gate missing=0").exit_code, 0);
+  EXPECT_EQ(evaluate("--gate mean_mm=32.9 --gate missing_fraction=0").exit_code, 0);
   EXPECT_EQ(evaluate("--gate mean_mm=32.5").exit_code, 1);
 }
 
@@ -135,7 +135,7 @@ TEST_F(RealLog, HasLargerErrorsWithTiltPerImage) {
     EXPECT_EQ(result.exit_code, 0) << result.errors;
     return result.output;
   };
-  const std::string free = " --lean-sd-deg 90 --sigma-px 0.3";
+  const std::string free = " --roll-pitch-sd-deg 90 --sigma-px 0.3";
   EXPECT_NEAR(figures(in_log("lamps.yaml"), calibration, free).mean_distance_m, 0.03639, 1e-4);
   EXPECT_THAT(evaluate(), testing::HasSubstr("p90            67.28"));
   ASSERT_EQ(level().exit_code, 0);

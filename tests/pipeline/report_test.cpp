@@ -36,8 +36,8 @@ class VlpEvaluateReport : public testing::Test {
     const std::string leveled = (folder / "rotated.yaml").string();
     must("vlp-rotation " + kExample + "turning.csv" + rig(kExample + "calibration.yaml") + " -o " +
          leveled + " --plot" + in("rotation.svg"));
-    must("vlp-dispersion " + kExample + "station.csv" + rig(leveled) + " --station 0.1 0 -o" +
-         in("calibration.yaml") + " --plot" + in("dispersion.svg"));
+    must("vlp-dispersion " + kExample + "station.csv" + rig(leveled) +
+         " --reference-point 0.1 0 -o" + in("calibration.yaml") + " --plot" + in("dispersion.svg"));
     must("vlp-locate " + kExample + "detections.csv" + rig(kExample + "calibration.yaml") + " -o" +
          in("fixes.csv"));
     draw(folder / "camera.svg", make_drawing(IntrinsicsPlot{"unit 7",

@@ -21,7 +21,8 @@ class RunEach : public testing::Test {
  protected:
   ProgramResult run(const std::string& lines) const {
     std::ofstream(folder / "lines") << lines;
-    return run_program(fmt::format("vlp-calibrate --each <'{}'", (folder / "lines").string()));
+    return run_program(
+        fmt::format("vlp-calibrate --batch-stdin <'{}'", (folder / "lines").string()));
   }
   /// Returns the request for a session, with results next to it.
   std::string line(const std::string& session, int limit_s = 100) const {
@@ -95,10 +96,10 @@ TEST_F(RunEach, RejectsInvalidLine) {
             bad + "\n");
   }
   EXPECT_EQ(run("").exit_code, 0);
-  const auto with_more = run_program("vlp-calibrate a -o b --each");
+  const auto with_more = run_program("vlp-calibrate a -o b --batch-stdin");
   EXPECT_EQ(with_more.exit_code, 2);
   EXPECT_EQ(with_more.errors,
-            "vlp-calibrate: error: --each: stands alone; see vlp-calibrate --help\n");
+            "vlp-calibrate: error: --batch-stdin: stands alone; see vlp-calibrate --help\n");
 }
 
 }  // namespace

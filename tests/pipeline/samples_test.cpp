@@ -85,7 +85,7 @@ TEST_P(RenderedSamplesOfDiscs, HaveMeanErrorBelowLimit) {
   ASSERT_EQ(located.exit_code, 0) << located.errors;
   const auto result =
       run_program("vlp-evaluate " + fixes + " --truth " + rendered + "/sample/truth.csv --gate " +
-                  "missing=0,mean_mm=" + std::to_string(GetParam().mean_mm));
+                  "missing_fraction=0,mean_mm=" + std::to_string(GetParam().mean_mm));
   EXPECT_EQ(result.exit_code, 0) << result.output << result.errors;
 }
 

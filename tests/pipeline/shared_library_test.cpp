@@ -77,7 +77,7 @@ TEST(SharedLibrary, ExportsOnlyDeclaredSymbols) {
   }
   for (const char* function :
        {"vlp::Positioner::locate", "vlp::read_calibration", "vlp::read_lamp_map",
-        "vlp::explanation_of", "vlp::InputError::InputError", "vlp::LampDetector::LampDetector",
+        "vlp::describe", "vlp::InputError::InputError", "vlp::LampDetector::LampDetector",
         "vlp::LampDetector::detect", "vlp_open", "vlp_detect", "vlp_locate"}) {
     EXPECT_THAT(functions, testing::Contains(function));
   }

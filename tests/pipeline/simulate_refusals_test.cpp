@@ -88,7 +88,8 @@ TEST_F(VlpSimulateErrors, RejectInvalidNumbers) {
 }
 
 TEST_F(VlpSimulateErrors, NameTagMissingInFamily) {
-  const std::string message = "scene.yaml:21: board.print: tag36h11 has no tag 587, only 0 to 586";
+  const std::string message =
+      "scene.yaml:21: board.pattern: tag36h11 has no tag 587, only 0 to 586";
   change_scene("first_id: 0", "first_id: 581");
   EXPECT_EQ(run_program(command("--only boards")).exit_code, 0) << "the last six";
   std::filesystem::remove_all(output);
@@ -106,7 +107,7 @@ TEST_F(VlpSimulateErrors, NameFamilyWithoutTwoBitBorder) {
   std::filesystem::remove_all(output);
   change_scene("family: tag36h11", "family: tagStandard41h12");
   expect_refused_and_nothing_made(
-      "", "board.print: tags of tagStandard41h12 have no border of two black bits");
+      "", "board.pattern: tags of tagStandard41h12 have no border of two black bits");
 }
 
 TEST_F(VlpSimulateErrors, NameFamilyWithOverlappingTags) {
@@ -115,7 +116,7 @@ TEST_F(VlpSimulateErrors, NameFamilyWithOverlappingTags) {
   std::filesystem::remove_all(output);
   change_scene("tag_spacing: 1,", "tag_spacing: 0.3,");
   expect_refused_and_nothing_made(
-      "", "board.print: the gap between the tags is too small for tagStandard41h12");
+      "", "board.pattern: the gap between the tags is too small for tagStandard41h12");
 }
 
 }  // namespace

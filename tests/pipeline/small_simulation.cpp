@@ -22,12 +22,12 @@ sensor: {bits: 8, gain_dn_per_e: 0.02, black_level_dn: 2, full_well_e: 13000, re
 mount: {tilt_deg: 3, tilt_azimuth_deg: 50, lever_arm_m: [0.05, -0.03]}
 ambient_e_per_s: 1.0e+6
 lamps:
-  - {id: 1, position_m: [-0.6, -0.3, 1.6], diameter_m: 0.18, frequency_hz: 1600, duty: 0.5, radiance_e_per_s: 2.0e+8, edge_share: 0.8, map_error_m: [0.01, 0, 0]}
-  - {id: 2, position_m: [0.5, -0.35, 1.4], diameter_m: 0.18, frequency_hz: 2500, duty: 0.5, radiance_e_per_s: 2.0e+8, edge_share: 0.8}
-  - {id: 3, position_m: [-0.4, 0.3, 1.3], diameter_m: 0.18, frequency_hz: 3100, duty: 0.5, radiance_e_per_s: 2.0e+8, edge_share: 0.8}
-  - {id: 4, position_m: [0.6, 0.4, 1.5], diameter_m: 0.18, frequency_hz: 4700, duty: 0.5, radiance_e_per_s: 2.0e+8, edge_share: 0.8}
+  - {id: 1, position_m: [-0.6, -0.3, 1.6], diameter_m: 0.18, frequency_hz: 1600, duty: 0.5, electron_rate_e_per_s: 2.0e+8, rim_to_center_ratio: 0.8, map_error_m: [0.01, 0, 0]}
+  - {id: 2, position_m: [0.5, -0.35, 1.4], diameter_m: 0.18, frequency_hz: 2500, duty: 0.5, electron_rate_e_per_s: 2.0e+8, rim_to_center_ratio: 0.8}
+  - {id: 3, position_m: [-0.4, 0.3, 1.3], diameter_m: 0.18, frequency_hz: 3100, duty: 0.5, electron_rate_e_per_s: 2.0e+8, rim_to_center_ratio: 0.8}
+  - {id: 4, position_m: [0.6, 0.4, 1.5], diameter_m: 0.18, frequency_hz: 4700, duty: 0.5, electron_rate_e_per_s: 2.0e+8, rim_to_center_ratio: 0.8}
 board:
-  print: {family: tag36h11, cols: 3, rows: 2, tag_size_m: 0.03, tag_spacing: 1, border_bits: 1, corner_squares: false, first_id: 0, id_order: row-major-from-top-left}
+  pattern: {family: tag36h11, cols: 3, rows: 2, tag_size_m: 0.03, tag_spacing: 1, border_bits: 1, corner_squares: false, first_id: 0, id_order: row-major-from-top-left}
   margin_m: 0.02
   warp_m: [0.0003, -0.0002]
   white_e_per_s: 2.4e+6
@@ -35,7 +35,7 @@ board:
   surround_e_per_s: 6.0e+5
 captures:
   - {folder: lamps, exposure_s: 5.0e-5, grid: {x_m: [-0.4, 0.4], y_m: [-0.2, 0.2], columns: 2, rows: 2}, heights_m: [0, 0.3], turn: {count: 2, jitter_deg: 90}, interval_s: 0.5}
-  - {folder: boards, exposure_s: 0.004, views: {count: 8, distance_m: [0.2, 0.3], tilt_deg: 40, roll_deg: 180, spread: 0.5}}
+  - {folder: boards, exposure_s: 0.004, views: {count: 8, distance_m: [0.2, 0.3], tilt_deg: 40, roll_deg: 180, field_coverage: 0.5}}
 )";
 // clang-format on
 

@@ -27,8 +27,8 @@ SmallStation::SmallStation() {
   change("station.yaml", "dispersion_captures: 40, check_captures: 36",
          "dispersion_captures: 12, check_captures: 8");
   // Fewer images determine lens and turn less accurately.
-  change("station.yaml", "uncertainty_px: 0.26", "uncertainty_px: 2");
-  change("station.yaml", "halves_px: 0.036", "halves_px: 1");
+  change("station.yaml", "expected_max_error_px: 0.26", "expected_max_error_px: 2");
+  change("station.yaml", "split_half_px: 0.036", "split_half_px: 1");
   change("station.yaml", "rotation_px: 0.029", "rotation_px: 0.2");
   change("station.yaml", "rotation_sd_px: 0.023", "rotation_sd_px: 0.2");
   change("scene.yaml", "count: 36", "count: 16");

@@ -54,7 +54,7 @@ class VlpIntrinsicsSquareBoards : public VlpIntrinsics {
 
 TEST_F(VlpIntrinsicsSquareBoards, GiveLensFromChessboard) {
   render("{kind: chessboard, cols: 10, rows: 7, square_size_m: 0.015}",
-         "{count: 24, distance_m: [0.15, 0.25], tilt_deg: 45, roll_deg: 180, spread: 0.7}");
+         "{count: 24, distance_m: [0.15, 0.25], tilt_deg: 45, roll_deg: 180, field_coverage: 0.7}");
   const std::string cache = " --cache " + (folder / "cache").string();
   const auto found = calibrate(boards, board, "-v" + cache);
   ASSERT_EQ(found.exit_code, 0) << found.errors;
@@ -84,7 +84,7 @@ TEST_F(VlpIntrinsicsSquareBoards, GiveLensFromCharucoBoard) {
   render(
       "{kind: charuco, cols: 10, rows: 8, square_size_m: 0.02, marker_size_m: 0.015, "
       "dictionary: DICT_5X5_100, top_left: white}",
-      "{count: 20, distance_m: [0.13, 0.28], tilt_deg: 45, roll_deg: 180, spread: 1}");
+      "{count: 20, distance_m: [0.13, 0.28], tilt_deg: 45, roll_deg: 180, field_coverage: 1}");
   const std::string table = (folder / "corners.csv").string();
   const auto found = calibrate(boards, board, "--corners " + table);
   ASSERT_EQ(found.exit_code, 0) << found.errors;

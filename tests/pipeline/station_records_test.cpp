@@ -24,7 +24,7 @@ TEST_F(VlpStationRecords, CleanDeletesExpiredFolders) {
   prepare("0001");
   ASSERT_EQ(run_program(run("0001", "--idle-s 0.1")).exit_code, 3);
   EXPECT_EQ(records("clean").exit_code, 2);
-  change("station.yaml", "records: records.db", "records: records.db\nkeep: {images_days: 1}");
+  change("station.yaml", "records: records.db", "records: records.db\nretention: {images_days: 1}");
   EXPECT_THAT(records("clean").output, HasSubstr("0 folders, 0.0 MB"));
   // A hundred days ago, as the records and the folder have it.
   const std::string client =
@@ -81,7 +81,7 @@ TEST_F(VlpStationRecords, VerifyDetectsChangedRecords) {
   EXPECT_THAT(kept.output,
               testing::MatchesRegex("1 runs, 1 entries in the trail\nlast digest [0-9a-f]{64}\n"));
   const std::string noted = kept.output.substr(kept.output.find("digest ") + 7, 64);
-  EXPECT_EQ(records("verify-records --noted " + noted).exit_code, 0);
+  EXPECT_EQ(records("verify-records --expected-digest " + noted).exit_code, 0);
   const std::string client =
       "import sqlite3, sys\n"
       "db = sqlite3.connect(sys.argv[1], isolation_level=None)\n"
@@ -91,7 +91,7 @@ TEST_F(VlpStationRecords, VerifyDetectsChangedRecords) {
       run_program("python3 " + folder.file("pass.py", client).string() + " " + database).exit_code,
       0);
   const auto changed = run_program("vlp-station verify-records --records " + database +
-                                   " --noted " + std::string(64, '0'));
+                                   " --expected-digest " + std::string(64, '0'));
   EXPECT_EQ(changed.exit_code, 1);
   EXPECT_THAT(
       changed.output,

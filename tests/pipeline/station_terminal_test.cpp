@@ -86,7 +86,7 @@ class VlpStationTerminal : public SmallStation {
 
 TEST_F(VlpStationTerminal, GuidesOperatorThroughUnit) {
   if (run_program("tmux -V").exit_code != 0) GTEST_SKIP() << "tmux is not installed";
-  change("station.yaml", "same_pose_share: 0.01", "same_pose_share: 0.02");
+  change("station.yaml", "same_pose_fraction: 0.01", "same_pose_fraction: 0.02");
   render();
   for (const char* step : {"dispersion", "check"}) {
     fs::create_directories(captures("0001") / step);

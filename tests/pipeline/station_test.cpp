@@ -71,10 +71,10 @@ TEST_F(VlpStation, PassesGoodUnitAndKeepsRecord) {
                     ContainsRegex("focal length x</th><td>[0-9.]+ \u00b1 0[.][0-9]+\u00a0px"),
                     HasSubstr("lamp map")));
   EXPECT_THAT(records("list --camera-id 0002").output, HasSubstr("1 runs, 1 passed"));
-  EXPECT_THAT(
-      records("show --camera-id 0001").output,
-      AllOf(ContainsRegex("check_mean_mm +[0-9.e-]+ +<= 1 mm +met"),
-            ContainsRegex("nominal_px +[0-9.e-]+ px"), HasSubstr("images     48, 48 used")));
+  EXPECT_THAT(records("show --camera-id 0001").output,
+              AllOf(ContainsRegex("check_mean_mm +[0-9.e-]+ +<= 1 mm +met"),
+                    ContainsRegex("nominal_difference_px +[0-9.e-]+ px"),
+                    HasSubstr("images     48, 48 used")));
   const auto exported = folder / "runs.json", picture = folder / "trend.svg";
   EXPECT_EQ(records("export -o " + exported.string()).exit_code, 0);
   EXPECT_THAT(TemporaryFolder::read_content(exported), HasSubstr("vlp-calibration/1"));
@@ -86,7 +86,8 @@ TEST_F(VlpStation, PassesGoodUnitAndKeepsRecord) {
   folder.file("station/golden.yaml", calibration);
   change("station.yaml", "# The images of a unit",
          "golden: {camera_id: \"0001\", calibration: golden.yaml, gates: {check_mean_mm: 0.5, "
-         "check_lamps: 0.95, world_mm: 1, center_px: 1}}\n# The images of a unit");
+         "check_lamp_inlier_fraction: 0.95, world_offset_mm: 1, principal_point_px: 1}}\n# The "
+         "images of a unit");
   // A lamp that is out of the golden unit's view is for a gate to ask for (check_lamps_seen).
   change("lamps.yaml", "  - {id: 1,",
          "  - {id: 7, position_m: [3, 3, 1.6], diameter_m: 0.18, frequency_hz: 6000, duty: 0.5}\n"

@@ -38,10 +38,10 @@ TEST(ReportHtml, HasFactsAndFloorPlanBeforeGates) {
 }
 
 TEST(ReportHtml, FailsGateWithoutValue) {
-  const std::string html =
-      report_html({"unit 7", {{"halves_px", "px", {}, 1, Direction::at_most}}, {}, {}, {}, {}, {}});
+  const std::string html = report_html(
+      {"unit 7", {{"split_half_px", "px", {}, 1, Direction::at_most}}, {}, {}, {}, {}, {}});
   EXPECT_THAT(html, HasSubstr("<strong>FAIL</strong>1 of 1 gate is not met."));
-  EXPECT_THAT(html, HasSubstr("<th scope=\"row\">halves_px</th><td>none</td>"
+  EXPECT_THAT(html, HasSubstr("<th scope=\"row\">split_half_px</th><td>none</td>"
                               "<td>at most\u00a01\u00a0px</td><td>NOT\u00a0MET</td>"));
 }
 
@@ -110,7 +110,7 @@ TEST(ReportHtml, ReportsOnlyValidRegionOfImportedLens) {
   calibration.intrinsics_report->region_px = {{0, 0}, {500, 0}, {500, 599}};
   const Report report{"cam-9", {}, {}, {}, calibration, {}, {}};
   const std::string html = report_html(report);
-  EXPECT_THAT(html, HasSubstr("where the board was seen, region_px"));
+  EXPECT_THAT(html, HasSubstr("where the board was seen, valid_region_px"));
   EXPECT_THAT(html, Not(HasSubstr("views of the board")));
 }
 

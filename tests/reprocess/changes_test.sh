@@ -43,7 +43,7 @@ reprocess "$results" --shard-size 3 --previous "$previous" --gates "$scratch/gat
   grep -q '^this run    ran 0, of them 0 without a result; reused 2; ' "$said" || fail "$(cat "$said")"
   grep -q '^gates       2 with a result that misses a gate' "$said" || fail "$(cat "$said")"
   grep -q '^camera.*mean_mm is .* at most 0.0001 mm' "$scratch/gates-results/summary.csv" || fail "no reason"
-  grep -q '^unit 2,few boards,gate,12,.*halves_px is ' "$scratch/gates-results/summary.csv" || fail "no reason"
+  grep -q '^unit 2,few boards,gate,12,.*split_half_px is ' "$scratch/gates-results/summary.csv" || fail "no reason"
   grep -q '"verdict": "gate"' "$scratch/gates-results/sessions/unit 2/few boards/session.json" || fail "passes without a lens"
   grep -q 'id: "unit 2"' "$scratch/gates-results/sessions/unit 2/few boards/calibration.yaml" || fail "whose calibration?"
 )
@@ -132,9 +132,9 @@ reprocess "$results" --shard-size 3 --previous "$previous" --gates "$scratch/gat
 
 "$source_dir/scripts/reprocess.sh" --help >"$said"
 [ "$(wc -L <"$said")" -le 80 ] && grep -q '^Exit code: ' "$said" || fail "help is wider than a terminal, or cut short"
-options_of() { sed -n '/^while/,/^done/p' "$1" | grep -o -- '--[a-z][a-z-]*' | grep -v -x -- '--camera-option\|--help' | sort -u; }
+options_of() { sed -n '/^while/,/^done/p' "$1" | grep -o -- '--[a-z][a-z-]*' | grep -v -x -- '--camera-option\|--help\|--look' | sort -u; }
 for option in $(options_of "$source_dir/scripts/reprocess.sh"); do
-  grep -q -- "^$option " "$said" || fail "--help does not tell of $option"
+  grep -q -- "^$option " "$said" || fail "--help does not describe $option"
 done
 
 refused() {  # MESSAGE ARGUMENT...: exit code 2 and one line
@@ -150,7 +150,8 @@ refused 'unknown option' "$archive" "$scratch/refused" --odd
 refused '--shard-size: should be a number' "$archive" "$scratch/refused" --shard-size 0
 refused '--readout: should be rows or columns' "$archive" "$scratch/refused" --readout diagonals
 refused 'neither of ours nor a folder' "$archive" "$scratch/refused" --profile odd
-refused '--look: should be files or folders' "$archive" "$scratch/refused" --look everywhere
+refused '--scan: should be files or folders' "$archive" "$scratch/refused" --scan everywhere
+refused "option '--look' is now called '--scan'" "$archive" "$scratch/refused" --look files
 refused '--keep: should be a number' "$archive" "$scratch/refused" --keep all
 refused 'keeps no former result' --diff "$results" camera-00001/session-01
 refused 'holds no result of' --diff "$results" camera-00001/session-77

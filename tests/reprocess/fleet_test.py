@@ -178,7 +178,7 @@ class OverTime(unittest.TestCase):
         rows, lamps = fleet_rows(Fleet(1))
         for without in ({}, {"lever_arm_x_mm": "", "lever_arm_y_mm": ""}):
             one = rows[14]
-            rows[14] = one | without | {"zenith_x_deg": "9", "sd_zenith_x_deg": "0.0001", "rotation_center_y_px": "9"}
+            rows[14] = one | without | {"zenith_x_deg": "9", "zenith_x_sd_deg": "0.0001", "rotation_center_y_px": "9"}
             cameras = [alarm["camera"] for alarm in fleet.fleet_of(rows, lamps)["cameras"]]
             self.assertEqual(cameras, [] if without else ["camera-01"])
             rows[14] = one

@@ -88,12 +88,12 @@ ln -s "$bin"/vlp-* "$results-bin"
 rm "$results-bin/vlp-calibrate"
 cat >"$results-bin/vlp-calibrate" <<PROGRAM
 #!/bin/bash
-[ "\$1" = --each ] || exec "$bin/vlp-calibrate" "\$@"
+[ "\$1" = --batch-stdin ] || exec "$bin/vlp-calibrate" "\$@"
 while read -r line; do
   if [ -e "$results-crash" ] && [[ \$line == *$good* ]]; then
     kill -9 \$\$
   fi
-  "$bin/vlp-calibrate" --each <<<"\$line"
+  "$bin/vlp-calibrate" --batch-stdin <<<"\$line"
 done
 PROGRAM
 chmod +x "$results-bin/vlp-calibrate"

@@ -28,7 +28,7 @@ class Outcome(unittest.TestCase):
 
     def test_is_what_session_json_says(self):
         self.session("gate", "rms_px is 2 px", [{"name": "rms_px", "step": "lens", "value": 2.00000049}])
-        evaluation = {"captures": 3, "fixes": 2, "missing_share": 1 / 3}
+        evaluation = {"captures": 3, "fixes": 2, "missing_fraction": 1 / 3}
         evaluation["horizontal"] = {name: 0.25 for name in ("mean_mm", "median_mm", "p90_mm", "max_mm")}
         (self.work / "evaluation.json").write_text(json.dumps(evaluation))
         found = self.outcome(1)
@@ -43,17 +43,17 @@ class Outcome(unittest.TestCase):
         self.session("pass", steps=steps)
         found = self.outcome()
         self.assertEqual((found["verdict"], found["reason"]), ("look", ""))
-        self.assertEqual((found["warnings"], found["images_skipped"], found["lamps_left_out"]), (1, 6, ""))
+        self.assertEqual((found["warnings"], found["images_skipped"], found["rejected_lamps"]), (1, 6, ""))
         skipped = "rotation: 6 images skipped; the first, 0000.png: is cut short"
-        self.assertEqual(found["look"], f"rotation: {warning}; {skipped}")
+        self.assertEqual(found["remarks"], f"rotation: {warning}; {skipped}")
         left_out = [{"lamp": 4, "captures": 1}, {"lamp": 2, "captures": 12}]
-        self.session("pass", steps=[{"name": "check", "lamps_left_out": left_out, "warnings": ["lamp 2 is left out"]}])
+        self.session("pass", steps=[{"name": "check", "rejected_lamps": left_out, "warnings": ["lamp 2 is left out"]}])
         found = self.outcome()
-        self.assertEqual((found["verdict"], found["lamps_left_out"]), ("look", "2 (12), 4 (1)"))
+        self.assertEqual((found["verdict"], found["rejected_lamps"]), ("look", "2 (12), 4 (1)"))
         self.session("gate", "rms_px is 2 px", steps=steps)
         self.assertEqual((self.outcome()["verdict"], self.outcome()["images_skipped"]), ("gate", 6))
         self.session("pass", steps=[{"name": "check", "notes": ["of so few as 12 captures"]}])
-        self.assertEqual((self.outcome()["verdict"], self.outcome()["look"]), ("pass", ""))
+        self.assertEqual((self.outcome()["verdict"], self.outcome()["remarks"]), ("pass", ""))
 
     def test_keeps_what_is_tracked_over_time(self):
         calibration = {"tilt_deg": 0.5, "focal_px": [260.5, 261], "focal_sd_px": [0.02, 0.03], "lever_arm_mm": [1, 2]}
@@ -64,10 +64,10 @@ class Outcome(unittest.TestCase):
         self.session("pass", steps=[{"name": "check", "lamp_offsets": lamps}], calibration=calibration, history=history)
         found = self.outcome()
         self.assertEqual(found["verdict"], "pass")
-        self.assertEqual((found["focal_y_px"], found["sd_focal_y_px"], found["map"]), ("261", "0.03", "0123456789ab"))
-        self.assertEqual((found["lever_arm_x_mm"], found["sd_lever_arm_x_mm"], found["center_x_px"]), ("1", "", ""))
+        self.assertEqual((found["focal_y_px"], found["focal_y_sd_px"], found["map"]), ("261", "0.03", "0123456789ab"))
+        self.assertEqual((found["lever_arm_x_mm"], found["lever_arm_x_sd_mm"], found["center_x_px"]), ("1", "", ""))
         lamp = next(summary.lamps_of(found))
-        self.assertEqual((lamp["lamp"], lamp["offset_y_mm"], lamp["sd_offset_y_mm"], lamp["map_y_m"]), (2, "-1", "0.2", "1"))
+        self.assertEqual((lamp["lamp"], lamp["offset_y_mm"], lamp["offset_y_sd_mm"], lamp["map_y_m"]), (2, "-1", "0.2", "1"))
 
     def test_no_result_has_no_figures(self):
         self.session("no result", "lens: boards: holds no image")

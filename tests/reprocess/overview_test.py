@@ -60,7 +60,7 @@ class Overview(unittest.TestCase):
 
     def test_each_action_leads_to_a_section(self):
         rows = [row("1", "look", "1"), row("2", "no result"), row("3", "gate", "9")]
-        rows = [one | {"images_skipped": "", "lamps_left_out": "", "look": ""} for one in rows]
+        rows = [one | {"images_skipped": "", "rejected_lamps": "", "remarks": ""} for one in rows]
         items = items_of(vanished=["c/9"], lost_results=["c/2"])
         document = document_of(rows, items, {"vanished": 0, "mean_mm": 1})
         html = overview.page({"version": "1", "toolbox": "t"}, rows, document, items, "", "")

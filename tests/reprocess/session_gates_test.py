@@ -16,7 +16,7 @@ GATES = [{"name": "rms_px", "limit": 1.0}, {"name": "coverage", "limit": 0.4}]
 
 def judged(limits, verdict="gate", look="", own=False):
     document = {"metrics": METRICS, "gates": GATES}
-    row = {"verdict": verdict, "reason": "of before", "look": look, "lamps_left_out": ""}
+    row = {"verdict": verdict, "reason": "of before", "remarks": look, "rejected_lamps": ""}
     row["gate_metrics"] = "" if own else outcome.gate_metrics(document)
     session_gates.apply_session_gates(row, limits)
     return row["verdict"], row["reason"]

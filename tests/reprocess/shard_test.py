@@ -95,7 +95,7 @@ class Shard(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             program = Path(folder) / "vlp-calibrate"
             program.write_text("""#!/bin/bash
-[ "$*" = --each ] || exit 7
+[ "$*" = --batch-stdin ] || exit 7
 read -r line
 [[ $line != *dies* ]] || kill -9 $$
 while echo '{"exit_code": 3, "cpu_s": 0.25, "said": "'$BASHPID'"}' && read -r line; do true; done

@@ -72,8 +72,10 @@ TEST(ReadCalibration, ReportsLineAndKeyOfInvalidReport) {
        {"rms_px: 0.21", "rms_px: -0.21", "intrinsics_report.rms_px: -0.21 px is not within 0 and"},
        {"rms_px: 0.21", "rms_px: nan", "intrinsics_report.rms_px: should be a finite number"},
        {"[0.0001, -2.5e-05]", "[0.0001]", "intrinsics_report.board_warp_m: should be 2 numbers"},
-       {"uncertainty_px: 0.08", "uncertainty_px: -1", "intrinsics_report.uncertainty_px: -1 px is"},
-       {"uncertainty_px", "uncertainty_mm", "intrinsics_report: key 'uncertainty_mm' is unknown"}});
+       {"expected_max_error_px: 0.08", "expected_max_error_px: -1",
+        "intrinsics_report.expected_max_error_px: -1 px is"},
+       {"expected_max_error_px", "uncertainty_mm",
+        "intrinsics_report: key 'uncertainty_mm' is unknown"}});
 }
 
 TEST(ReadCalibration, ReportsLineAndKeyOfInvalidRotationCenter) {
@@ -99,8 +101,8 @@ TEST(ReadCalibration, ReportsLineAndKeyOfInvalidRotationCenter) {
         "rotation_center.lever_arm_covariance: is not a covariance"},
        {"  lever_arm_m: [0.012, -0.009]\n", "",
         "rotation_center.lever_arm_covariance: is of no lever_arm_m"},
-       {"center_px:", "center_px:",
-        "rotation_center: key 'center_px' is missing; there are: model, center_px, "
+       {"center_px:", "middle_px:",
+        "rotation_center: key 'center_px' is missing; there are: model, middle_px, "
         "zenith_in_camera",
         "model: tilt"}});
 }

@@ -87,10 +87,10 @@ TEST(ReadCalibration, RejectsMismatchedAdjustment) {
 
 TEST(WriteCalibration, OmitsInfiniteUncertainty) {
   Calibration calibration = sample_calibration();
-  calibration.intrinsics_report->uncertainty_px = std::numeric_limits<double>::infinity();
+  calibration.intrinsics_report->expected_max_error_px = std::numeric_limits<double>::infinity();
   const TemporaryFolder folder;
   write_calibration(folder / "calibration.yaml", calibration);
-  calibration.intrinsics_report->uncertainty_px.reset();
+  calibration.intrinsics_report->expected_max_error_px.reset();
   expect_same(read_calibration(folder / "calibration.yaml"), calibration);
 }
 
@@ -100,7 +100,7 @@ TEST(WriteCalibration, KeepsEachPartWithoutOptionalKeys) {
       [](Calibration& c) { c.camera.row_time_s.reset(); },
       [](Calibration& c) { c.camera.readout.reset(); },
       [](Calibration& c) { c.intrinsics_report->board_warp_m.reset(); },
-      [](Calibration& c) { c.intrinsics_report->uncertainty_px.reset(); },
+      [](Calibration& c) { c.intrinsics_report->expected_max_error_px.reset(); },
       [](Calibration& c) { c.rotation_center->covariance.reset(); },
       [](Calibration& c) { c.rotation_center->lever_arm_covariance.reset(); },
       [](Calibration& c) {

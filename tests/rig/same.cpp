@@ -56,7 +56,7 @@ void expect_same(const IntrinsicsReport& found, const IntrinsicsReport& expected
   EXPECT_EQ(found.outliers, expected.outliers);
   EXPECT_EQ(found.rms_px, expected.rms_px);
   EXPECT_EQ(found.board_warp_m, expected.board_warp_m);
-  EXPECT_EQ(found.uncertainty_px, expected.uncertainty_px);
+  EXPECT_EQ(found.expected_max_error_px, expected.expected_max_error_px);
   EXPECT_EQ(found.covariance, expected.covariance);
   EXPECT_EQ(found.region_px, expected.region_px);
 }

@@ -43,8 +43,8 @@ intrinsics_report:
   outliers: 12
   rms_px: 0.21
   board_warp_m: [0.0001, -2.5e-05]
-  uncertainty_px: 0.08
-  region_px: [[10, 20], [1500, 20.5], [700, 1100]]
+  expected_max_error_px: 0.08
+  valid_region_px: [[10, 20], [1500, 20.5], [700, 1100]]
 rotation_center:
   model: tilt
   center_px: [801.25, 597.5]

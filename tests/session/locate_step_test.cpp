@@ -27,7 +27,7 @@ TEST(LocateFrames, LocatesAllFramesOfExample) {
   EXPECT_TRUE(found.ok());
   EXPECT_EQ(found.summary.fixes, found.rows.size());
   EXPECT_THAT(found.warnings, IsEmpty());
-  EXPECT_THAT(found.lamps_left_out, IsEmpty());
+  EXPECT_THAT(found.rejected_lamps, IsEmpty());
 }
 
 TEST(LocateFrames, CountsCapturesOfRejectedLamp) {
@@ -41,7 +41,7 @@ TEST(LocateFrames, CountsCapturesOfRejectedLamp) {
   ASSERT_EQ(moved, 3);
   const LocateResult found = locate_frames(input);
   int captures = 0;
-  for (const auto& [lamp, count] : found.lamps_left_out) captures += count;
+  for (const auto& [lamp, count] : found.rejected_lamps) captures += count;
   EXPECT_EQ(captures, 3);
   EXPECT_THAT(found.warnings,
               testing::Contains(HasSubstr("3 detections that contradict the others")));
@@ -139,13 +139,13 @@ TEST(LocateFrames, WarnsOfMovedLampWithDisplacement) {
   EXPECT_THAT(found.warnings,
               testing::Contains("lamp 2 hangs 30 mm from where the map has it (x +30 mm, y +0 mm): "
                                 "moved, or entered wrongly"));
-  ASSERT_EQ(found.lamps_left_out.size(), 1U);
-  EXPECT_EQ(found.lamps_left_out[0].lamp, 2);
+  ASSERT_EQ(found.rejected_lamps.size(), 1U);
+  EXPECT_EQ(found.rejected_lamps[0].lamp, 2);
   for (std::size_t i = 0; i < 36; ++i) {
     EXPECT_THAT(found.rows[i].rejected,
                 testing::ElementsAreArray(std::vector<int>(i < 12 ? 1U : 0U, 2)));
   }
-  EXPECT_THAT(locate_frames(room_with_a_moved_lamp(0)).lamps_left_out, IsEmpty());
+  EXPECT_THAT(locate_frames(room_with_a_moved_lamp(0)).rejected_lamps, IsEmpty());
 }
 
 TEST(LocateFrames, UsesInclinationsOfTable) {

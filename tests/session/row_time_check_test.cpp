@@ -41,7 +41,7 @@ Observation observe(const LampMap& map, const std::vector<double>& deviations, b
     if (is_identified) light.lamp = lamp.id;
     const double frequency_hz = *lamp.frequency_hz * (1 + deviations[i]);
     light.stripes.period_lines = 1 / (frequency_hz * kTrueRowTime_s);
-    light.stripes.clarity = 0.95;
+    light.stripes.periodicity_r2 = 0.95;
     light.stripes.periods = 5;
     light.stripes.is_regular = true;
     light.pixel = {100 + 120.0 * static_cast<double>(i), 300};

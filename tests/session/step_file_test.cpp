@@ -17,11 +17,11 @@ namespace {
 StepResult sample() {
   StepResult result;
   result.metrics = {{"rms_px", 0.1 + 0.2},
-                    {"uncertainty_px", std::numeric_limits<double>::infinity()}};
+                    {"expected_max_error_px", std::numeric_limits<double>::infinity()}};
   result.warnings = {"one \"lamp\""};
   result.notes = {"note"};
   result.skipped = {{"a.png", "is empty"}};
-  result.lamps_left_out = {{2, 12}};
+  result.rejected_lamps = {{2, 12}};
   result.lamp_offsets = {{3, 12, {-0.6, 0.3}, {1e-3, -2e-3}, {1e-4, 2e-4}}};
   result.fail(StepFailure::wrong_map, "look swapped", "lamps.yaml");
   return result;
@@ -39,7 +39,7 @@ TEST(StepFile, RoundTripIsExact) {
   EXPECT_FALSE(std::isfinite(result.metrics[1].value));
   EXPECT_EQ(result.warnings, sample().warnings);
   EXPECT_EQ(result.skipped[0].reason, "is empty");
-  EXPECT_EQ(result.lamps_left_out[0].captures, 12);
+  EXPECT_EQ(result.rejected_lamps[0].captures, 12);
   ASSERT_EQ(result.lamp_offsets.size(), 1);
   const LampOffset& offset = result.lamp_offsets[0];
   EXPECT_EQ(offset.lamp, 3);

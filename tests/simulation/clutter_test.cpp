@@ -78,7 +78,7 @@ TEST_F(FrameRendererClutter, ReflectionHasStripesOfItsLampAndSteadyLampNone) {
 TEST_F(FrameRendererClutter, RectangularReflectionFadesTowardsItsSides) {
   const LampShape shape{ShapeKind::rectangle, Eigen::Vector2d(0.12, 0.06), std::numbers::pi / 2};
   const Glow glow{{0.3, 0, 1.6}, shape, 2e7, 0};
-  scene_.lamps[0].glow.radiance_e_per_s = 0;
+  scene_.lamps[0].glow.electron_rate_e_per_s = 0;
   scene_.clutter.reflections = {{glow, 0}};
   const cv::Mat1f image = rendered();
   // 20 px wide and 40 px high; a parabola keeps two thirds along each axis.

@@ -222,7 +222,7 @@ TEST(DrawRandomParts, DrawsSeededHotSpotsWithinBounds) {
 }
 
 TEST_F(FrameRendererDownlight, OccluderHidesSteadyDownlight) {
-  scene_.lamps[0].glow.radiance_e_per_s = 0;
+  scene_.lamps[0].glow.electron_rate_e_per_s = 0;
   scene_.clutter.steady_lamps = {
       {{0, 0, 1.6}, make_disc(0.18), 1e9, 0, Recess{0.05, 0.04, 0.2, {}}, Halo{0.1, 0.02}}};
   const cv::Mat1f open = rendered();

@@ -18,7 +18,7 @@ class FrameRendererForeignLight : public testing::Test {
  protected:
   FrameRendererForeignLight() {
     scene_.camera = pinhole_camera();
-    scene_.lamps[0].glow.radiance_e_per_s = 0;
+    scene_.lamps[0].glow.electron_rate_e_per_s = 0;
   }
 
   LampShot shot() const { return shot_at(scene_, {0, 0, 0.1}, 0); }

@@ -97,7 +97,7 @@ TEST_P(FrameRendererDisc, CentroidMatchesProjectedOutline) {
     }
     const Brightness rendered = measure_brightness(render_image(renderer, shot));
     EXPECT_LT((rendered.centroid_px - moment / twice_area).norm(), 0.001);
-    const double level = glow.radiance_e_per_s * shot.exposure_s;
+    const double level = glow.electron_rate_e_per_s * shot.exposure_s;
     EXPECT_NEAR(rendered.sum / level / std::abs(twice_area / 2), 1, 1e-4);
   }
 }

@@ -71,7 +71,7 @@ TEST_P(FrameRendererRectangle, CoversProjectedOutline) {
     const cv::Mat1f image(expose(scene_.sensor, renderer.lamp_electrons(shot), 1));
     const Brightness rendered = measure_brightness(image);
     EXPECT_LT((rendered.centroid_px - moment / twice_area).norm(), 0.001);
-    const double level = glow.radiance_e_per_s * shot.exposure_s;
+    const double level = glow.electron_rate_e_per_s * shot.exposure_s;
     EXPECT_NEAR(rendered.sum / level / std::abs(twice_area / 2), 1, 1e-4);
 
     const auto corners_px = projected(shot, corners_m);

@@ -14,18 +14,18 @@ TEST(ReadScene, RejectsRadianceOutOfRange) {
       "unit?";
   EXPECT_EQ(refusal_with("ambient_e_per_s: 1.0e+6", "ambient_e_per_s: -1"),
             "scene.yaml:8: ambient_e_per_s: -1" + range);
-  EXPECT_EQ(refusal_with("radiance_e_per_s: 2.0e+8", "radiance_e_per_s: -5"),
-            "scene.yaml:10: lamps[0].radiance_e_per_s: -5" + range);
-  EXPECT_EQ(refusal_with("radiance_e_per_s: 3.0e+8", "radiance_e_per_s: 2.5e+13"),
-            "scene.yaml:11: lamps[1].radiance_e_per_s: 2.5e+13" + range);
-  EXPECT_EQ(refusal_with("radiance_e_per_s: 1.5e+8", "radiance_e_per_s: -2"),
-            "scene.yaml:13: clutter.steady_lamps[0].radiance_e_per_s: -2" + range);
-  EXPECT_EQ(refusal_with("radiance_e_per_s: 8.0e+7", "radiance_e_per_s: -2"),
-            "scene.yaml:14: clutter.windows[0].radiance_e_per_s: -2" + range);
-  EXPECT_EQ(refusal_with("radiance_e_per_s: 1.2e+7", "radiance_e_per_s: -2"),
-            "scene.yaml:15: clutter.reflections[0].radiance_e_per_s: -2" + range);
-  EXPECT_EQ(refusal_with("radiance_e_per_s: 2.0e+6", "radiance_e_per_s: -2"),
-            "scene.yaml:16: clutter.occluders[0].radiance_e_per_s: -2" + range);
+  EXPECT_EQ(refusal_with("electron_rate_e_per_s: 2.0e+8", "electron_rate_e_per_s: -5"),
+            "scene.yaml:10: lamps[0].electron_rate_e_per_s: -5" + range);
+  EXPECT_EQ(refusal_with("electron_rate_e_per_s: 3.0e+8", "electron_rate_e_per_s: 2.5e+13"),
+            "scene.yaml:11: lamps[1].electron_rate_e_per_s: 2.5e+13" + range);
+  EXPECT_EQ(refusal_with("electron_rate_e_per_s: 1.5e+8", "electron_rate_e_per_s: -2"),
+            "scene.yaml:13: clutter.steady_lamps[0].electron_rate_e_per_s: -2" + range);
+  EXPECT_EQ(refusal_with("electron_rate_e_per_s: 8.0e+7", "electron_rate_e_per_s: -2"),
+            "scene.yaml:14: clutter.windows[0].electron_rate_e_per_s: -2" + range);
+  EXPECT_EQ(refusal_with("electron_rate_e_per_s: 1.2e+7", "electron_rate_e_per_s: -2"),
+            "scene.yaml:15: clutter.reflections[0].electron_rate_e_per_s: -2" + range);
+  EXPECT_EQ(refusal_with("electron_rate_e_per_s: 2.0e+6", "electron_rate_e_per_s: -2"),
+            "scene.yaml:16: clutter.occluders[0].electron_rate_e_per_s: -2" + range);
   EXPECT_EQ(refusal_with("black_e_per_s: 1.5e+5", "black_e_per_s: -2"),
             "scene.yaml:22: board.black_e_per_s: -2" + range);
 }
@@ -47,8 +47,8 @@ TEST(ReadScene, RejectsInvalidSensor) {
   EXPECT_EQ(refusal_with("full_well_e: 13000", "full_well_e: 0"),
             "scene.yaml:6: sensor.full_well_e: 0 electrons is not within 1 and 1.0e+09 electrons: "
             "is it in the right unit?");
-  EXPECT_EQ(refusal_with("share: 0.3", "share: 30"),
-            "scene.yaml:6: sensor.bloom.share: 30 (of the charge) is not within 0 and 1 (of the "
+  EXPECT_EQ(refusal_with("fraction: 0.3", "fraction: 30"),
+            "scene.yaml:6: sensor.bloom.fraction: 30 (of the charge) is not within 0 and 1 (of the "
             "charge): is it in the right unit?");
 }
 
@@ -110,15 +110,16 @@ TEST(ReadScene, RejectsInvalidRecessOrHalo) {
   EXPECT_EQ(refusal_with("source_diameter_m: 0.04", "source_diameter_m: 0.14"), "");
   EXPECT_EQ(refusal_with("source_diameter_m: 0.04", "source_diameter_m: 0"),
             recess + "source_diameter_m: 0 m is not within 0.001 and 10 m" + unit);
-  EXPECT_EQ(refusal_with("reflector_share: 0.1", "reflector_share: 10"),
+  EXPECT_EQ(refusal_with("reflector_ratio: 0.1", "reflector_ratio: 10"),
             recess +
-                "reflector_share: 10 (of the source's radiance) is not within 0 and 1 (of the "
+                "reflector_ratio: 10 (of the source's radiance) is not within 0 and 1 (of the "
                 "source's radiance)" +
                 unit);
-  EXPECT_EQ(refusal_with("share: 0.02", "share: -0.02"),
-            "scene.yaml:11: lamps[1].halo.share: -0.02 (of the source's radiance) is not within 0 "
-            "and 1 (of the source's radiance)" +
-                unit);
+  EXPECT_EQ(
+      refusal_with("fraction: 0.02", "fraction: -0.02"),
+      "scene.yaml:11: lamps[1].halo.fraction: -0.02 (of the source's radiance) is not within 0 "
+      "and 1 (of the source's radiance)" +
+          unit);
   EXPECT_EQ(refusal_with("length_m: 0.015", "length_m: 0"),
             "scene.yaml:11: lamps[1].halo.length_m: 0 m is not within 0.001 and 2 m" + unit);
 }
@@ -128,31 +129,33 @@ TEST(ReadScene, RejectsInvalidColorFilters) {
     return refusal_with("jpeg_quality: 90}", "jpeg_quality: 90, bayer: {" + filters + "}}");
   };
   EXPECT_EQ(with("red_share: 0.6, blue_share: 0.5"), "");
-  EXPECT_THAT(with("red_share: 0, blue_share: 0.5"),
-              testing::HasSubstr("picture.bayer.red_share: 0 (of what green filters pass) is not "
-                                 "within 0.05 and 2"));
+  EXPECT_THAT(
+      with("red_share: 0, blue_share: 0.5"),
+      testing::HasSubstr("processing.bayer.red_share: 0 (of what green filters pass) is not "
+                         "within 0.05 and 2"));
   EXPECT_THAT(with("red_share: 0.6"), testing::HasSubstr("blue_share"));
 }
 
 TEST(ReadScene, RejectsInvalidChips) {
   const auto with = [](const std::string& chips) {
-    return refusal_with("edge_share: 0.8}", "edge_share: 0.8, chips: {" + chips + "}}");
+    return refusal_with("rim_to_center_ratio: 0.8}",
+                        "rim_to_center_ratio: 0.8, chips: {" + chips + "}}");
   };
   const std::string chips = "scene.yaml:10: lamps[0].chips.";
-  EXPECT_EQ(with("share: 0.3, pitch_m: 0.03, width_m: 0.02"), "");
-  EXPECT_EQ(with("share: 3, pitch_m: 0.03, width_m: 0.02"),
+  EXPECT_EQ(with("fraction: 0.3, pitch_m: 0.03, width_m: 0.02"), "");
+  EXPECT_EQ(with("fraction: 3, pitch_m: 0.03, width_m: 0.02"),
             chips +
-                "share: 3 (of the source's radiance) is not within 0 and 1 (of the source's "
+                "fraction: 3 (of the source's radiance) is not within 0 and 1 (of the source's "
                 "radiance): is it in the right unit?");
-  EXPECT_EQ(with("share: 0.3, pitch_m: 0.2, width_m: 0.02"),
+  EXPECT_EQ(with("fraction: 0.3, pitch_m: 0.2, width_m: 0.02"),
             chips + "pitch_m: is larger than the disc, diameter_m");
-  EXPECT_EQ(with("share: 0.3, pitch_m: 0.03, width_m: 0.07"),
+  EXPECT_EQ(with("fraction: 0.3, pitch_m: 0.03, width_m: 0.07"),
             chips + "width_m: is more than twice pitch_m: such chips are an even disc");
 }
 
 TEST(ReadScene, RejectsInvalidRandomChips) {
   const auto with = [](const std::string& keys) {
-    return refusal_with("edge_share: 0.8}", "edge_share: 0.8, " + keys + "}");
+    return refusal_with("rim_to_center_ratio: 0.8}", "rim_to_center_ratio: 0.8, " + keys + "}");
   };
   const std::string random = "random_chips: {count: 7, sigma_fraction: 0.12, ";
   const std::string chips = "scene.yaml:10: lamps[0].random_chips";
@@ -164,7 +167,7 @@ TEST(ReadScene, RejectsInvalidRandomChips) {
           "radius): is it in the right unit?");
   EXPECT_EQ(with(random + "within_fraction: 0.75, excess: [0.8, 0.3]}"),
             chips + ".excess: should be [least, most]");
-  EXPECT_EQ(with("chips: {share: 0.3, pitch_m: 0.03, width_m: 0.02}, " + random +
+  EXPECT_EQ(with("chips: {fraction: 0.3, pitch_m: 0.03, width_m: 0.02}, " + random +
                  "within_fraction: 0.75, excess: [0.3, 0.8]}"),
             chips + ": stands beside chips: a disc has one of them");
 }
@@ -183,11 +186,12 @@ TEST(ReadScene, RejectsInvalidForeignLight) {
     return refusal_with(
         "clutter:\n", "clutter:\n  foreign_lights: [{position_m: [0, 0.2, 1.6], " + keys + "}]\n");
   };
-  const std::string disc = "diameter_m: 0.2, radiance_e_per_s: 1.0e+8, edge_share: 1, ";
+  const std::string disc =
+      "diameter_m: 0.2, electron_rate_e_per_s: 1.0e+8, rim_to_center_ratio: 1, ";
   const std::string place = "scene.yaml:13: clutter.foreign_lights[0]";
   EXPECT_EQ(with(disc + "pwm: {frequency_hz: 500, duty: 0.3}"), "");
   EXPECT_EQ(with(disc + "mains: {frequency_hz: 100, depth: 0.3}, phase: 0.5"), "");
-  EXPECT_EQ(with("shape: rectangle, size_m: [0.6, 0.1], radiance_e_per_s: 1.0e+8, "
+  EXPECT_EQ(with("shape: rectangle, size_m: [0.6, 0.1], electron_rate_e_per_s: 1.0e+8, "
                  "mains: {frequency_hz: 100, depth: 0.3}"),
             "");
   EXPECT_EQ(with(disc + "phase: 0.5"), place + ": needs one of the keys pwm and mains");
@@ -207,9 +211,9 @@ TEST(ReadScene, RejectsInvalidMirrorBlindOrSign) {
   EXPECT_EQ(with("mirrors: [{" + panel + "reflectance: 0.1}]"), "");
   EXPECT_THAT(with("mirrors: [{" + panel + "reflectance: 10}]"),
               testing::StartsWith("scene.yaml:13: clutter.mirrors[0].reflectance: 10"));
-  EXPECT_THAT(with("mirrors: [{" + panel + "reflectance: 0.1, radiance_e_per_s: 1}]"),
-              testing::HasSubstr("key 'radiance_e_per_s' is unknown here"));
-  const std::string lit = panel + "radiance_e_per_s: 1.0e+8, ";
+  EXPECT_THAT(with("mirrors: [{" + panel + "reflectance: 0.1, electron_rate_e_per_s: 1}]"),
+              testing::HasSubstr("key 'electron_rate_e_per_s' is unknown here"));
+  const std::string lit = panel + "electron_rate_e_per_s: 1.0e+8, ";
   EXPECT_EQ(with("blinds: [{" + lit + "slats: 9, open_fraction: 0.5}]"), "");
   EXPECT_THAT(with("blinds: [{" + lit + "slats: 0, open_fraction: 0.5}]"),
               testing::StartsWith("scene.yaml:13: clutter.blinds[0].slats: should be a whole"));
@@ -222,15 +226,17 @@ TEST(ReadScene, RejectsInvalidMirrorBlindOrSign) {
 TEST(ReadScene, RectangleLampTakesKeysOfLampMapOnly) {
   const std::string disc =
       "diameter_m: 0.18, frequency_hz: 1600, duty: 0.4, "
-      "radiance_e_per_s: 2.0e+8, edge_share: 0.8}";
+      "electron_rate_e_per_s: 2.0e+8, rim_to_center_ratio: 0.8}";
   const auto with = [&](const std::string& keys) {
-    return refusal_with(disc, keys + ", frequency_hz: 1600, duty: 0.4, radiance_e_per_s: 2.0e+8}");
+    return refusal_with(disc,
+                        keys + ", frequency_hz: 1600, duty: 0.4, electron_rate_e_per_s: 2.0e+8}");
   };
   const std::string shape = "shape: rectangle, size_m: [0.6, 0.3], yaw_rad: 0.1";
   EXPECT_EQ(with(shape), "");
-  EXPECT_THAT(with(shape + ", edge_share: 1"),
-              testing::StartsWith("scene.yaml:10: lamps[0]: key 'edge_share' is unknown here"));
-  EXPECT_THAT(with(shape + ", chips: {share: 0.3, pitch_m: 0.03, width_m: 0.02}"),
+  EXPECT_THAT(
+      with(shape + ", rim_to_center_ratio: 1"),
+      testing::StartsWith("scene.yaml:10: lamps[0]: key 'rim_to_center_ratio' is unknown here"));
+  EXPECT_THAT(with(shape + ", chips: {fraction: 0.3, pitch_m: 0.03, width_m: 0.02}"),
               testing::StartsWith("scene.yaml:10: lamps[0]: key 'chips' is unknown here"));
   EXPECT_EQ(with(shape + ", diameter_m: 0.2"),
             "scene.yaml:10: lamps[0].diameter_m: is of a disc, and this is a rectangle: it has "
@@ -239,13 +245,14 @@ TEST(ReadScene, RectangleLampTakesKeysOfLampMapOnly) {
 }
 
 TEST(ReadScene, RejectsEdgeShareWithRecess) {
-  EXPECT_EQ(refusal_with("recess: {", "edge_share: 1, recess: {"),
-            "scene.yaml:13: clutter.steady_lamps[1]: key 'edge_share' is unknown here; the keys "
-            "are: position_m, shape, diameter_m, size_m, yaw_rad, radiance_e_per_s, recess, halo");
+  EXPECT_EQ(
+      refusal_with("recess: {", "rim_to_center_ratio: 1, recess: {"),
+      "scene.yaml:13: clutter.steady_lamps[1]: key 'rim_to_center_ratio' is unknown here; the keys "
+      "are: position_m, shape, diameter_m, size_m, yaw_rad, electron_rate_e_per_s, recess, halo");
 }
 
 TEST(ReadScene, RejectsInvalidPicture) {
-  const std::string gamma = "scene.yaml:29: picture.gamma: ";
+  const std::string gamma = "scene.yaml:29: processing.gamma: ";
   EXPECT_EQ(refusal_with("gamma: 2.2", "gamma: 0"),
             gamma +
                 "0 (of the tone curve) is not within 0.1 and 10 (of the tone curve): is it in "
@@ -254,19 +261,22 @@ TEST(ReadScene, RejectsInvalidPicture) {
             gamma +
                 "-2.2 (of the tone curve) is not within 0.1 and 10 (of the tone curve): is it "
                 "in the right unit?");
-  EXPECT_EQ(refusal_with("jpeg_quality: 90", "jpeg_quality: 0"),
-            "scene.yaml:29: picture.jpeg_quality: should be a whole number within 1 and 100, not "
-            "'0'");
-  EXPECT_EQ(refusal_with("jpeg_quality: 90", "jpeg_quality: 101"),
-            "scene.yaml:29: picture.jpeg_quality: should be a whole number within 1 and 100, not "
-            "'101'");
+  EXPECT_EQ(
+      refusal_with("jpeg_quality: 90", "jpeg_quality: 0"),
+      "scene.yaml:29: processing.jpeg_quality: should be a whole number within 1 and 100, not "
+      "'0'");
+  EXPECT_EQ(
+      refusal_with("jpeg_quality: 90", "jpeg_quality: 101"),
+      "scene.yaml:29: processing.jpeg_quality: should be a whole number within 1 and 100, not "
+      "'101'");
   EXPECT_EQ(refusal_with("bits: 8", "bits: 16"),
-            "scene.yaml:29: picture.jpeg_quality: JPEG has 8 bits: set sensor.bits to 8");
-  EXPECT_EQ(refusal_with("radius_px: 1.5", "radius_px: 0"),
-            "scene.yaml:29: picture.sharpening.radius_px: 0 px is not within 0.3 and 50 px: is it "
-            "in the right unit?");
+            "scene.yaml:29: processing.jpeg_quality: JPEG has 8 bits: set sensor.bits to 8");
+  EXPECT_EQ(
+      refusal_with("radius_px: 1.5", "radius_px: 0"),
+      "scene.yaml:29: processing.sharpening.radius_px: 0 px is not within 0.3 and 50 px: is it "
+      "in the right unit?");
   EXPECT_EQ(refusal_with("black_level_dn: 2", "black_level_dn: 255"),
-            "scene.yaml:29: picture: needs levels between sensor.black_level_dn and white");
+            "scene.yaml:29: processing: needs levels between sensor.black_level_dn and white");
 }
 
 TEST(ReadScene, RejectsPanelThatIsNoRectangle) {
@@ -315,10 +325,11 @@ TEST(ReadScene, RejectsInvalidSteadyLampOrBoard) {
   EXPECT_EQ(refusal_with("diameter_m: 0.12", "diameter_m: 120"),
             "scene.yaml:13: clutter.steady_lamps[0].diameter_m: 120 m is not within 0.001 and 10 "
             "m: is it in the right unit?");
-  EXPECT_EQ(refusal_with("edge_share: 0.7", "edge_share: -0.7"),
-            "scene.yaml:13: clutter.steady_lamps[0].edge_share: -0.7 (of the radiance at the "
-            "center) is not within 0 and 2 (of the radiance at the center): is it in the right "
-            "unit?");
+  EXPECT_EQ(
+      refusal_with("rim_to_center_ratio: 0.7", "rim_to_center_ratio: -0.7"),
+      "scene.yaml:13: clutter.steady_lamps[0].rim_to_center_ratio: -0.7 (of the radiance at the "
+      "center) is not within 0 and 2 (of the radiance at the center): is it in the right "
+      "unit?");
   EXPECT_EQ(refusal_with("[0.0003, -0.0002]", "[0.3, -0.2]"),
             "scene.yaml:20: board.warp_m[0]: 0.3 m is not within -0.009 and 0.009 m: is it in the "
             "right unit?");

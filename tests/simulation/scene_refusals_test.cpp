@@ -12,10 +12,10 @@ using testing::HasSubstr;
 TEST(ReadScene, AcceptsSampleScene) { EXPECT_EQ(scene_refusal(kSceneYaml), ""); }
 
 TEST(ReadScene, RejectsUnknownKeyInEachSection) {
-  EXPECT_EQ(
-      refusal_with("seed: 7", "seed: 7\nlight: 1"),
-      "scene.yaml:3: key 'light' is unknown here; the keys are: format, seed, room, camera, "
-      "optics, sensor, picture, mount, ambient_e_per_s, lamps, clutter, board, archive, captures");
+  EXPECT_EQ(refusal_with("seed: 7", "seed: 7\nlight: 1"),
+            "scene.yaml:3: key 'light' is unknown here; the keys are: format, seed, room, camera, "
+            "optics, sensor, processing, mount, ambient_e_per_s, lamps, clutter, board, archive, "
+            "captures");
   EXPECT_EQ(refusal_with("z_m: [0, 1.7]", "z_m: [0, 1.7], w_m: 0"),
             "scene.yaml:3: room: key 'w_m' is unknown here; the keys are: x_m, y_m, z_m");
   const auto unknown = [](const std::string& before, const std::string& place) {
@@ -26,19 +26,19 @@ TEST(ReadScene, RejectsUnknownKeyInEachSection) {
   unknown("id: small", "4: camera");
   unknown("blur_px", "5: optics");
   unknown("bits", "6: sensor");
-  unknown("share: 0.3", "6: sensor.bloom");
+  unknown("fraction: 0.3", "6: sensor.bloom");
   unknown("tilt_deg", "7: mount");
   unknown("id: 5", "11: lamps[1]");
-  unknown("share: 0.02", "11: lamps[1].halo");
+  unknown("fraction: 0.02", "11: lamps[1].halo");
   unknown("depth_m", "13: clutter.steady_lamps[1].recess");
-  unknown("reflector_share: 0.05", "13: clutter.steady_lamps[1].recess.dark_side");
-  unknown("gamma", "29: picture");
-  unknown("amount", "29: picture.sharpening");
+  unknown("reflector_ratio: 0.05", "13: clutter.steady_lamps[1].recess.dark_side");
+  unknown("gamma", "29: processing");
+  unknown("amount", "29: processing.sharpening");
   unknown("position_m: [0.3", "13: clutter.steady_lamps[0]");
   unknown("corner_m: [-0.9", "14: clutter.windows[0]");
   unknown("of_lamp", "15: clutter.reflections[0]");
   unknown("corner_m: [-0.7", "16: clutter.occluders[0]");
-  unknown("family", "18: board.print");
+  unknown("family", "18: board.pattern");
   unknown("folder: spots", "25: captures[0]");
   unknown("x_m: [-0.6, 0.6]", "26: captures[1].grid");
   unknown("count: 4", "26: captures[1].turn");
@@ -53,7 +53,7 @@ TEST(ReadScene, RejectsUnknownKeyInEachSection) {
 TEST(ReadScene, RejectsMissingKey) {
   EXPECT_EQ(refusal_with("seed: 7\n", ""),
             "scene.yaml:1: key 'seed' is missing; there are: format, room, camera, optics, sensor, "
-            "mount, ambient_e_per_s, lamps, clutter, board, captures, picture");
+            "mount, ambient_e_per_s, lamps, clutter, board, captures, processing");
   const auto missing = [](const std::string& text, const std::string& place,
                           const std::string& key) {
     EXPECT_THAT(refusal_with(text, ""),
@@ -63,20 +63,20 @@ TEST(ReadScene, RejectsMissingKey) {
   missing("x_m: [-1, 1], ", "3: room: ", "x_m");
   missing("vignetting_power: 4", "5: optics: ", "vignetting_power");
   missing("full_well_e: 13000, ", "6: sensor: ", "full_well_e");
-  missing("share: 0.3, ", "6: sensor.bloom: ", "share");
+  missing("fraction: 0.3, ", "6: sensor.bloom: ", "fraction");
   missing(", lever_arm_m: [0.03, -0.04]", "7: mount: ", "lever_arm_m");
   // Optional in a lamp map, not here.
   missing("diameter_m: 0.18, ", "10: lamps[0]: ", "diameter_m");
   missing("frequency_hz: 1600, ", "10: lamps[0]: ", "frequency_hz");
   missing("duty: 0.4, ", "10: lamps[0]: ", "duty");
-  missing(", edge_share: 0.8", "10: lamps[0]: ", "edge_share");
+  missing(", rim_to_center_ratio: 0.8", "10: lamps[0]: ", "rim_to_center_ratio");
   missing(", length_m: 0.015", "11: lamps[1].halo: ", "length_m");
   missing("depth_m: 0.07, ", "13: clutter.steady_lamps[1].recess: ", "depth_m");
   missing("source_diameter_m: 0.04, ", "13: clutter.steady_lamps[1].recess: ", "source_diameter_m");
-  missing(" reflector_share: 0.1,", "13: clutter.steady_lamps[1].recess: ", "reflector_share");
+  missing(" reflector_ratio: 0.1,", "13: clutter.steady_lamps[1].recess: ", "reflector_ratio");
   missing(", azimuth_deg: 90", "13: clutter.steady_lamps[1].recess.dark_side: ", "azimuth_deg");
-  missing("gamma: 2.2, ", "29: picture: ", "gamma");
-  missing(", radius_px: 1.5", "29: picture.sharpening: ", "radius_px");
+  missing("gamma: 2.2, ", "29: processing: ", "gamma");
+  missing(", radius_px: 1.5", "29: processing.sharpening: ", "radius_px");
   missing("of_lamp: 5, ", "15: clutter.reflections[0]: ", "of_lamp");
   missing("  margin_m: 0.02\n", "18: board: ", "margin_m");
   missing("exposure_s: 5.0e-5, ", "25: captures[0]: ", "exposure_s");
@@ -85,7 +85,7 @@ TEST(ReadScene, RejectsMissingKey) {
   missing(", columns: 3", "26: captures[1].grid: ", "columns");
   missing("count: 4, ", "26: captures[1].turn: ", "count");
   missing(", speed_m_per_s: 0.5", "27: captures[2].drive: ", "speed_m_per_s");
-  missing("spread: 0.75, ", "28: captures[3].views: ", "spread");
+  missing("field_coverage: 0.75, ", "28: captures[3].views: ", "field_coverage");
 }
 
 TEST(ReadScene, RejectsCameraWithoutRowTimeOrReadout) {

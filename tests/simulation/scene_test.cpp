@@ -59,8 +59,8 @@ TEST(ReadScene, ReadsLampsInOrderOfFile) {
   EXPECT_EQ(lamp.id, 5);
   EXPECT_EQ(lamp.glow.position_m, Vector3d(0.6, 0.2, 1.5));
   EXPECT_EQ(lamp.glow.radius_m(), 0.05);
-  EXPECT_EQ(lamp.glow.radiance_e_per_s, 3e8);
-  EXPECT_EQ(lamp.glow.edge_share, 0.9);
+  EXPECT_EQ(lamp.glow.electron_rate_e_per_s, 3e8);
+  EXPECT_EQ(lamp.glow.rim_to_center_ratio, 0.9);
   EXPECT_EQ(lamp.frequency_hz, 2500);
   EXPECT_EQ(lamp.duty, 0.5);
   EXPECT_EQ(lamp.phase, 0.25);
@@ -70,11 +70,11 @@ TEST(ReadScene, ReadsLampsInOrderOfFile) {
 TEST(ReadScene, ReadsClutterAndBoard) {
   const Scene scene = read_scene_text(kSceneYaml);
   const Clutter& clutter = scene.clutter;
-  EXPECT_EQ(clutter.steady_lamps.at(0).edge_share, 0.7);
+  EXPECT_EQ(clutter.steady_lamps.at(0).rim_to_center_ratio, 0.7);
   EXPECT_EQ(clutter.windows.at(0).edge_b_m, Vector3d(0, 0.3, 0));
-  EXPECT_EQ(clutter.windows.at(0).radiance_e_per_s, 8e7);
+  EXPECT_EQ(clutter.windows.at(0).electron_rate_e_per_s, 8e7);
   EXPECT_EQ(clutter.reflections.at(0).lamp, 1U) << "the index of lamp 5";
-  EXPECT_EQ(clutter.reflections.at(0).glow.edge_share, 0) << "it fades towards its rim";
+  EXPECT_EQ(clutter.reflections.at(0).glow.rim_to_center_ratio, 0) << "it fades towards its rim";
   EXPECT_EQ(clutter.occluders.at(0).corner_m, Vector3d(-0.7, -0.2, 1.4));
   ASSERT_TRUE(scene.board);
   EXPECT_EQ(scene.board->print.first_id, 9);
@@ -92,7 +92,7 @@ TEST(ReadScene, ReadsReflectionOfRectangle) {
   EXPECT_EQ(glow.shape.kind, ShapeKind::rectangle);
   EXPECT_EQ(glow.shape.size_m, Eigen::Vector2d(0.6, 0.1));
   EXPECT_EQ(glow.shape.yaw_rad, 0.2);
-  EXPECT_EQ(glow.edge_share, 0) << "it fades towards its sides";
+  EXPECT_EQ(glow.rim_to_center_ratio, 0) << "it fades towards its sides";
 }
 
 TEST(ReadScene, ReadsRecessesAndHalos) {
@@ -106,9 +106,9 @@ TEST(ReadScene, ReadsRecessesAndHalos) {
   const Recess recess = scene.clutter.steady_lamps.at(1).recess.value();
   EXPECT_EQ(recess.depth_m, 0.07);
   EXPECT_EQ(recess.source_diameter_m, 0.04);
-  EXPECT_EQ(recess.reflector_share, 0.1);
+  EXPECT_EQ(recess.reflector_ratio, 0.1);
   ASSERT_TRUE(recess.dark_side);
-  EXPECT_EQ(recess.dark_side->reflector_share, 0.05);
+  EXPECT_EQ(recess.dark_side->reflector_ratio, 0.05);
   EXPECT_NEAR(recess.dark_side->azimuth_rad, std::numbers::pi / 2, kRounding);
 }
 
@@ -119,7 +119,7 @@ TEST(ReadScene, ReadsPicture) {
   EXPECT_EQ(picture.sharpening->amount, 0.6);
   EXPECT_EQ(picture.sharpening->radius_px, 1.5);
   EXPECT_EQ(picture.jpeg_quality, 90);
-  EXPECT_FALSE(read_scene_text(scene_with("picture: ", "# ")).picture);
+  EXPECT_FALSE(read_scene_text(scene_with("processing: ", "# ")).picture);
 }
 
 TEST(ReadScene, ReadsSpotsInOrderOfFile) {
@@ -192,31 +192,31 @@ TEST(ReadScene, ReadsForeignLightsMirrorsBlindsAndSigns) {
               "clutter:\n",
               "clutter:\n"
               "  foreign_lights:\n"
-              "    - {position_m: [0, 0.2, 1.6], diameter_m: 0.2, radiance_e_per_s: 1.0e+8, "
-              "edge_share: 0.9, pwm: {frequency_hz: 500, duty: 0.3}, phase: 0.25}\n"
+              "    - {position_m: [0, 0.2, 1.6], diameter_m: 0.2, electron_rate_e_per_s: 1.0e+8, "
+              "rim_to_center_ratio: 0.9, pwm: {frequency_hz: 500, duty: 0.3}, phase: 0.25}\n"
               "    - {position_m: [0, 0, 1.6], shape: rectangle, size_m: [0.6, 0.1], yaw_rad: 0.5, "
-              "radiance_e_per_s: 2.0e+8, mains: {frequency_hz: 120, depth: 0.4}}\n"
+              "electron_rate_e_per_s: 2.0e+8, mains: {frequency_hz: 120, depth: 0.4}}\n"
               "  mirrors: [{" +
                   panel +
                   "reflectance: 0.15}]\n"
                   "  blinds: [{" +
                   panel +
-                  "radiance_e_per_s: 3.0e+7, slats: 9, open_fraction: 0.4}]\n"
+                  "electron_rate_e_per_s: 3.0e+7, slats: 9, open_fraction: 0.4}]\n"
                   "  signs: [{" +
                   panel +
-                  "radiance_e_per_s: 4.0e+7, lines: 2, letters: 8}]\n"
+                  "electron_rate_e_per_s: 4.0e+7, lines: 2, letters: 8}]\n"
                   "  ambient_flicker: {frequency_hz: 100, depth: 0.6}\n"))
           .clutter;
   ASSERT_EQ(clutter.foreign_lights.size(), 2U);
   const ForeignLight &dimmed = clutter.foreign_lights[0], &tube = clutter.foreign_lights[1];
   EXPECT_EQ(dimmed.glow.radius_m(), 0.1);
-  EXPECT_EQ(dimmed.glow.edge_share, 0.9);
+  EXPECT_EQ(dimmed.glow.rim_to_center_ratio, 0.9);
   EXPECT_EQ(dimmed.phase, 0.25);
   EXPECT_EQ(std::get<SquareWave>(dimmed.wave).frequency_hz, 500);
   EXPECT_EQ(std::get<SquareWave>(dimmed.wave).duty, 0.3);
   EXPECT_EQ(tube.glow.shape.kind, ShapeKind::rectangle);
   EXPECT_EQ(tube.glow.shape.yaw_rad, 0.5);
-  EXPECT_EQ(tube.glow.radiance_e_per_s, 2e8);
+  EXPECT_EQ(tube.glow.electron_rate_e_per_s, 2e8);
   EXPECT_EQ(std::get<RectifiedSine>(tube.wave).frequency_hz, 120);
   EXPECT_EQ(std::get<RectifiedSine>(tube.wave).depth, 0.4);
   EXPECT_FALSE(tube.phase);
@@ -226,7 +226,7 @@ TEST(ReadScene, ReadsForeignLightsMirrorsBlindsAndSigns) {
   ASSERT_EQ(clutter.blinds.size(), 1U);
   EXPECT_EQ(clutter.blinds[0].slats, 9);
   EXPECT_EQ(clutter.blinds[0].open_fraction, 0.4);
-  EXPECT_EQ(clutter.blinds[0].window.radiance_e_per_s, 3e7);
+  EXPECT_EQ(clutter.blinds[0].window.electron_rate_e_per_s, 3e7);
   ASSERT_EQ(clutter.signs.size(), 1U);
   EXPECT_EQ(clutter.signs[0].lines, 2);
   EXPECT_EQ(clutter.signs[0].letters, 8);
@@ -236,10 +236,10 @@ TEST(ReadScene, ReadsForeignLightsMirrorsBlindsAndSigns) {
 }
 
 TEST(ReadScene, ReadsRandomChipsAndRecessExponents) {
-  const Scene chips = read_scene_text(scene_with(
-      "edge_share: 0.8}",
-      "edge_share: 0.8, random_chips: {count: 7, sigma_fraction: 0.12, within_fraction: 0.75, "
-      "excess: [0.3, 0.8]}}"));
+  const Scene chips = read_scene_text(scene_with("rim_to_center_ratio: 0.8}",
+                                                 "rim_to_center_ratio: 0.8, random_chips: {count: "
+                                                 "7, sigma_fraction: 0.12, within_fraction: 0.75, "
+                                                 "excess: [0.3, 0.8]}}"));
   ASSERT_TRUE(chips.lamps.at(0).glow.random_chips);
   EXPECT_EQ(chips.lamps[0].glow.random_chips->within_fraction, 0.75);
   EXPECT_EQ(chips.lamps[0].glow.random_chips->max_excess, 0.8);

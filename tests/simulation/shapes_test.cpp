@@ -62,14 +62,14 @@ constexpr int kTriangles = 20;
 
 TEST(Disc, IntegralOverRandomTriangleMatchesSampling) {
   Random random(1);
-  const double edge_share = 0.3;
-  const Disc disc({1, 1}, edge_share);
+  const double rim_to_center_ratio = 0.3;
+  const Disc disc({1, 1}, rim_to_center_ratio);
   for (int i = 0; i < kTriangles; ++i) {
     const auto triangle = random_triangle(random, 1.5);
     const double expected = sampled_integral(
         [&](const Eigen::Vector2d& at) {
           const double r2 = at.squaredNorm();
-          return r2 < 1 ? 1 - (1 - edge_share) * r2 : 0;
+          return r2 < 1 ? 1 - (1 - rim_to_center_ratio) * r2 : 0;
         },
         triangle);
     EXPECT_NEAR(integral_over(disc, triangle), expected, 1e-3);

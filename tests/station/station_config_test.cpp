@@ -55,7 +55,8 @@ TEST_F(ReadStation, AcceptsOptionalKeysOfExample) {
       "station.yaml",
       std::regex_replace(
           TemporaryFolder::read_content(folder / "station.yaml"),
-          std::regex("\n# (golden:|verify_due:|serial_pattern:|void_operators:|hook:|keep:| {9})"),
+          std::regex(
+              "\n# (golden:|verify_due:|serial_pattern:|void_operators:|hook:|retention:| {9})"),
           "\n$1"));
   const StationConfig config = read_station(folder / "station.yaml");
   ASSERT_TRUE(config.golden);
@@ -79,7 +80,7 @@ TEST_F(ReadStation, RejectsImplausibleValues) {
   change("station.yaml", "\n  coverage: 0.7", "\n  coverage: 7");
   EXPECT_THAT(refusal(), HasSubstr("gates.coverage: should be a share from 0 to 1, not 7"));
   change("station.yaml", "board_coverage: 0.7", "board_coverage: 70");
-  EXPECT_THAT(refusal(), HasSubstr("enough.board_coverage"));
+  EXPECT_THAT(refusal(), HasSubstr("completion.board_coverage"));
 }
 
 TEST_F(ReadStation, RejectsCameraTypeWithoutRowTime) {
@@ -112,7 +113,7 @@ TEST_F(ReadStation, ReadsGuardBands) {
   EXPECT_THAT(refused("check_mean_mm: 0.02", "check_mean_mm: 0.62"),
               AllOf(HasSubstr("standard_uncertainties.check_mean_mm"),
                     HasSubstr("leaves nothing within the gate")));
-  EXPECT_THAT(refused("check_mean_mm: 0.02", "check_lamps: 0.04"),
+  EXPECT_THAT(refused("check_mean_mm: 0.02", "check_lamp_inlier_fraction: 0.04"),
               HasSubstr("leaves nothing within the gate"));
 }
 
@@ -160,7 +161,7 @@ TEST(SerialProblem, LimitsTimeOfPatternMatch) {
 
 TEST_F(ReadStation, ReadsVerifyDueAndRetention) {
   change("station.yaml", "records: records.db",
-         "records: records.db\nkeep: {images_days: 90}\nverify_due: {hours: 24, units: 200}");
+         "records: records.db\nretention: {images_days: 90}\nverify_due: {hours: 24, units: 200}");
   EXPECT_THAT(refusal(), HasSubstr("verify_due: needs a golden unit"));
   folder.file("golden.yaml", TemporaryFolder::read_content(kExample + "calibration.yaml"));
   change("station.yaml", "records: records.db",
@@ -179,7 +180,7 @@ TEST_F(ReadStation, ReadsVerifyDueAndRetention) {
   change("station.yaml", "images_days: 90", "images_days: 0");
   EXPECT_THAT(refusal(), HasSubstr("verify_due"));
   change("station.yaml", "verify_due: {}", "verify_due: {units: 1}");
-  EXPECT_THAT(refusal(), HasSubstr("keep.images_days"));
+  EXPECT_THAT(refusal(), HasSubstr("retention.images_days"));
 }
 
 TEST_F(ReadStation, RejectsGoldenUnitWithoutRowTime) {

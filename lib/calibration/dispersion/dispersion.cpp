@@ -141,14 +141,14 @@ std::string_view describe(DispersionStatus status) {
       return "no capture has a fix";
     case DispersionStatus::too_few_captures:
       return "too few captures have a fix that agrees with the others: three or more are needed "
-             "(two for --method paper); add captures";
+             "(two for --method chen-guan); add captures";
     case DispersionStatus::station_far:
       return "every fix is farther from the station than a fifth of the lamps' height: is it in "
              "meters, and in the frame of the lamp map? Are these the captures taken there?";
     case DispersionStatus::one_yaw:
       return "all captures, or all but one, are at one yaw, where an error of the camera and one "
              "of the station or the lamp map look alike: turn the camera at the station and add "
-             "those captures, or take --method paper, which supposes that station and map are "
+             "those captures, or take --method chen-guan, which supposes that station and map are "
              "right";
     case DispersionStatus::many_yaws:
       return "the captures are at different yaws, over which the paper's circle averages the "

@@ -20,7 +20,8 @@ namespace vlp {
 ///
 /// mrcal's tools use the problem, such as mrcal-show-projection-uncertainty and
 /// mrcal-show-residuals. The former assumes independent errors of the corners. For a board of tags
-/// it shows less than IntrinsicsReport::uncertainty_px, which is by tags (ProjectionUncertainty).
+/// it shows less than IntrinsicsReport::expected_max_error_px, which is by tags
+/// (ProjectionUncertainty).
 /// @throws InputError
 /// @pre has_mrcal() of the lens model, also for write_corners()
 void write_cameramodel(const std::filesystem::path& file, const IntrinsicsSolution& solution);

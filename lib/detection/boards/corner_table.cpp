@@ -62,7 +62,7 @@ BoardDetection make_board_detection(ImageCorners corners, const std::set<int>& i
   return seen;
 }
 
-constexpr std::array kBowColumns{"bow_square_px", "bow_cube_px", "bow_reach"};
+constexpr std::array kBowColumns{"edge_quadratic_px", "edge_cubic_px", "edge_half_extent"};
 
 /// Reads the curvature of an edge; unknown if the table does not have the columns.
 EdgeCurvature read_curvature(const CsvTable& csv, std::size_t row) {

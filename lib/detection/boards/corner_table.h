@@ -16,7 +16,8 @@ namespace vlp {
 ///
 /// Columns for boards of tags:
 ///   image, tag, corner, u_px, v_px         corner 0 to 3 as in BoardTag::corners_m
-///   bow_square_px, bow_cube_px, bow_reach  optional: EdgeCurvature from this corner to the next
+///   edge_quadratic_px, edge_cubic_px,
+///   edge_half_extent                       optional: EdgeCurvature from this corner to the next
 ///   sd_px                                  optional: TagDetection::Deviations
 /// Columns for boards of squares:
 ///   image, corner, u_px, v_px              corner as in PointDetection::index; rows may also be

@@ -256,7 +256,7 @@ Stripes measure_candidate_stripes(const RegionCandidate& candidate) {
   if (!(std::abs(stripes.period_lines / fit.period_lines - 1) < 2 * kLampDrift)) {
     stripes.period_lines = fit.period_lines;
   }
-  stripes.clarity = 1 - fit.unexplained;
+  stripes.periodicity_r2 = 1 - fit.unexplained;
   stripes.periods = count_periods(candidate);
   stripes.is_regular = true;
   return stripes;

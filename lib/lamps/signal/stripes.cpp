@@ -15,7 +15,7 @@ namespace vlp {
 
 namespace {
 
-constexpr double kMinClarity = 0.7;
+constexpr double kMinPeriodicity = 0.7;
 
 /// Values of four frequencies, for vector instructions.
 using Lanes = Eigen::Array4d;
@@ -122,11 +122,11 @@ double lit_area(const std::vector<double>& signal, double middle) {
 }  // namespace
 
 bool is_reliable(const Stripes& stripes) {
-  return stripes.clarity > kMinClarity && stripes.periods > kMinReliablePeriods;
+  return stripes.periodicity_r2 > kMinPeriodicity && stripes.periods > kMinReliablePeriods;
 }
 
 bool is_readable(const Stripes& stripes) {
-  return stripes.is_regular || stripes.clarity > kMinClarity;
+  return stripes.is_regular || stripes.periodicity_r2 > kMinPeriodicity;
 }
 
 Stripes measure_stripes(const std::vector<double>& signal) {
@@ -153,12 +153,13 @@ Stripes measure_stripes(const std::vector<double>& signal) {
   for (double first = lowest; first <= highest; first += 4 * step) {
     const Lanes fractions = compute_explained_fraction(signal, mean, variance, first + steps);
     for (Eigen::Index i = 0; i < 4 && first + steps[i] <= highest; ++i) {
-      if (fractions[i] > stripes.clarity) stripes.clarity = fractions[i], best = first + steps[i];
+      if (fractions[i] > stripes.periodicity_r2)
+        stripes.periodicity_r2 = fractions[i], best = first + steps[i];
     }
   }
   const Lanes neighbors = compute_explained_fraction(signal, mean, variance, best - step + steps);
   const double before = neighbors[0], after = neighbors[2];
-  const double curvature = before - 2 * stripes.clarity + after;
+  const double curvature = before - 2 * stripes.periodicity_r2 + after;
   if (curvature < 0) best += std::clamp((before - after) / curvature / 2, -1.0, 1.0) * step;
   const double middle = (low + high) / 2;
   const auto in_time = fit_period_to_crossings(signal, middle, 1 / best);

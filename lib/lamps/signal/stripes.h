@@ -41,7 +41,7 @@ struct Stripes {
   double period_lines;
   double duty;
   /// Fraction of the signal's variance that a sine of this period explains.
-  double clarity;
+  double periodicity_r2;
   /// Number of periods in the signal.
   double periods;
   /// True if the begins and ends of all stripes agree with the period.
@@ -53,19 +53,19 @@ struct Stripes {
   double lit_area;
 };
 
-/// Returns true if the stripes are clear and numerous: clarity above 0.7 and more than
+/// Returns true if the stripes are clear and numerous: periodicity above 0.7 and more than
 /// kMinReliablePeriods periods. Stripes of a partly hidden lamp are not.
 bool is_reliable(const Stripes& stripes);
 
-/// Returns true if the period is meaningful: the stripes are regular, or their clarity exceeds 0.7.
-/// An object that hides a part of a lamp creates stripes that match another lamp by chance.
+/// Returns true if the period is meaningful: the stripes are regular, or their periodicity exceeds
+/// 0.7. An object that hides a part of a lamp creates stripes that match another lamp by chance.
 bool is_readable(const Stripes& stripes);
 
 /// Measures the stripes of a signal, the result of compute_line_signal(). For a disc it covers
 /// `kUsedHeight` of the radius above and below the middle. The period is first that of the
 /// best-fitting sine with a constant (least squares, Lomb 1976), between kMinPeriod_lines and
 /// the length of the signal. If the begins and ends of the stripes agree with it, they determine
-/// the period. Contrast and clarity are 0 for signals of less than 8 scanlines.
+/// the period. Contrast and periodicity are 0 for signals of less than 8 scanlines.
 Stripes measure_stripes(const std::vector<double>& signal);
 
 }  // namespace vlp

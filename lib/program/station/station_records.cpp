@@ -259,7 +259,7 @@ void print_run(const StationRecordsOptions& options) {
   fmt::print("\nfigures without a gate\n");
   for (const CheckedMetric& metric : record.metrics) {
     if (metric.limit || !metric.value) continue;
-    print_line(fmt::format("{:<24}{:>12.4g} {}", metric.name, *metric.value, metric.unit));
+    print_line(fmt::format("{:<28}{:>12.4g} {}", metric.name, *metric.value, metric.unit));
   }
   const auto used = std::count_if(record.images.begin(), record.images.end(),
                                   [](const auto& image) { return image.refused.empty(); });
@@ -295,7 +295,7 @@ void clean_expired_folders(const StationRecordsOptions& options) {
   const auto known = open_runs(options);
   const StationConfig& config = *known->station();
   if (!config.keep.images_days && !config.keep.results_days) {
-    throw InputError(options.station, "keeps all for ever: add the key 'keep'");
+    throw InputError(options.station, "keeps all for ever: add the key 'retention'");
   }
   check_clock(config, known->records());
   const RetentionResult found = find_expired(config, known->records());
@@ -448,7 +448,7 @@ void print_capability(const StationRecordsOptions& options) {
   const auto known = open_runs(options);
   Records& records = known->records();
   const RunFilter filter = comparable_runs(options, *known);
-  constexpr const char* head = "{:<22}{:>5}{:>10}{:>10}{:>10}{:>10}   {:<25}{}";
+  constexpr const char* head = "{:<27}{:>5}{:>10}{:>10}{:>10}{:>10}   {:<25}{}";
   std::vector<std::string> rows;
   rows.reserve(kinds.size());
   for (const MetricKind& kind : kinds) {

@@ -139,7 +139,7 @@ void print_evaluation(const Evaluation& evaluation, const std::vector<CheckedMet
   if (evaluation.comparison) print_comparison(*evaluation.comparison);
   if (!gates.empty()) fmt::print("\n");
   for (const CheckedMetric& gate : gates) {
-    fmt::print("{:6} gate {:16} {:>10.4g} {:3} {} {:.4g}\n", gate.passed() ? "met" : "NOT MET",
+    fmt::print("{:6} gate {:20} {:>10.4g} {:3} {} {:.4g}\n", gate.passed() ? "met" : "NOT MET",
                gate.name, gate.value.value(), gate.unit, describe(gate.direction),
                gate.limit.value());
   }

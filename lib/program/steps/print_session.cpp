@@ -56,7 +56,7 @@ void print_session(const SessionResult& result, const std::string& results) {
       MetricRow{"p90", "p90_mm", "mm"},
       MetricRow{"max", "max_mm", "mm"},
       MetricRow{"height", "height_rms_mm", "mm rms"},
-      MetricRow{"missing", "missing", "of the captures, as a share"}};
+      MetricRow{"missing", "missing_fraction", "of the captures, as a share"}};
   fmt::print("\n");
   for (const auto& [label, name, unit] : metric_rows) {
     if (const auto value = find(result, name)) fmt::print("{:11} {:.4g} {}\n", label, *value, unit);

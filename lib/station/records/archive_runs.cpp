@@ -52,7 +52,7 @@ void add_metrics(const nlohmann::json& entries, std::vector<CheckedMetric>& metr
   metrics.reserve(metrics.size() + entries.size());
   for (const nlohmann::json& entry : entries) {
     CheckedMetric metric;
-    metric.name = entry.at("name");
+    metric.name = present_metric_name(entry.at("name"));
     if (!names.insert(metric.name).second) continue;
     metric.unit = entry.value("unit", "");
     metric.value = find_number(entry, "value");

@@ -73,7 +73,7 @@ nlohmann::ordered_json to_json(const RunRecord& run) {
                             {"unit", metric.unit},
                             {"gate", number_or_null(metric.limit)},
                             {"at_least", metric.direction == Direction::at_least},
-                            {"met", metric.passed()}};
+                            {"passed", metric.passed()}};
     if (!metric.guard) continue;
     metrics[metric.name]["uncertainty"] = metric.guard->standard_uncertainty;
     metrics[metric.name]["guard_k"] = metric.guard->k;

@@ -102,12 +102,12 @@ std::string measuring_digest(const StationConfig& config) {
              {"check_captures", sufficient.check_captures}});
   const FrontendOptions& limits = config.frontend;
   lines.add({{"blur_px", limits.max_blur_px},
-             {"dark_share", limits.min_bright_fraction},
-             {"same_pose_share", limits.same_view_fraction},
-             {"in_a_row", config.max_consecutive_rejections}});
+             {"dark_fraction", limits.min_bright_fraction},
+             {"same_pose_fraction", limits.same_view_fraction},
+             {"max_consecutive_rejections", config.max_consecutive_rejections}});
   // Stations without the key keep their digest.
   if (limits.max_white_fraction != FrontendOptions().max_white_fraction) {
-    lines.add("white_share", limits.max_white_fraction);
+    lines.add("white_fraction", limits.max_white_fraction);
   }
   add_gates(config.gates, lines);
   if (const auto& golden = config.golden) {

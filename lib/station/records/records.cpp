@@ -20,6 +20,7 @@
 #include <utility>
 
 #include "rig/input_error.h"
+#include "rig/renamed.h"
 #include "station/database_name.h"
 #include "station/records/record_tables.h"
 #include "station/records/run_storage.h"
@@ -315,8 +316,8 @@ void bind_filter(soci::statement& statement, const RunFilter& filter) {
   }
 }
 
-/// Returns the rows of a query, with its columns in the members of `Row`; a non-empty `figure` is
-/// bound after the filter.
+/// Returns the rows of a query, with its columns in the members of `Row`; a non-empty `figure` and
+/// its former name are bound after the filter.
 template <typename Row>
 std::vector<Row> query_rows(soci::session& sql, const std::string& query, const RunFilter& filter,
                             const std::string& metric,
@@ -328,7 +329,11 @@ std::vector<Row> query_rows(soci::session& sql, const std::string& query, const 
   for (std::string Row::*text : texts) statement.exchange(soci::into(row.*text));
   if (value != nullptr) statement.exchange(soci::into(row.*value));
   bind_filter(statement, filter);
-  if (!metric.empty()) statement.exchange(soci::use(metric));
+  const std::string former(find_former_name(NameKind::metric, metric));
+  if (!metric.empty()) {
+    statement.exchange(soci::use(metric));
+    statement.exchange(soci::use(former));
+  }
   statement.alloc();
   statement.prepare(query);
   statement.define_and_bind();
@@ -515,7 +520,8 @@ std::vector<TrendPoint> Records::trend(const std::string& metric, const RunFilte
       "SELECT runs.run, runs.station, runs.camera, runs.verdict, runs.ended_utc, figures.value "
       "FROM runs JOIN figures ON figures.run = runs.run " +
       make_condition(filter) + " AND " + kNotVoided +
-      " AND figures.name = :figure AND figures.value IS NOT NULL ORDER BY runs.ended_utc, runs.run";
+      " AND figures.name IN (:figure, :former) AND figures.value IS NOT NULL "
+      "ORDER BY runs.ended_utc, runs.run";
   return database_->run(
       [&](ConnectionWatchdog&) {
         return query_rows<Point>(
@@ -527,7 +533,10 @@ std::vector<TrendPoint> Records::trend(const std::string& metric, const RunFilte
 }
 
 std::optional<RunRecord> Records::find(const std::string& run) {
-  return database_->run([&](ConnectionWatchdog&) { return load_run(database_->sql, run); });
+  auto found = database_->run([&](ConnectionWatchdog&) { return load_run(database_->sql, run); });
+  if (!found) return found;
+  for (CheckedMetric& metric : found->metrics) metric.name = present_metric_name(metric.name);
+  return found;
 }
 
 TrailCheck Records::check(const std::string& expected_digest) {

@@ -59,8 +59,9 @@ SpooledRun parse_run(const Json& json) {
   }
   for (const Json& metric : json.at("figures")) {
     run.metrics.push_back(
-        {metric.at("name").get<std::string>(), metric.at("unit").get<std::string>(),
-         read_optional_number(metric.at("value")), read_optional_number(metric.at("gate")),
+        {present_metric_name(metric.at("name").get<std::string>()),
+         metric.at("unit").get<std::string>(), read_optional_number(metric.at("value")),
+         read_optional_number(metric.at("gate")),
          metric.at("at_least").get<bool>() ? Direction::at_least : Direction::at_most,
          read_guard_band(metric)});
   }

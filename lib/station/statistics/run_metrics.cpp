@@ -8,6 +8,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "rig/renamed.h"
+
 namespace vlp {
 
 std::vector<MetricKind> list_run_metrics() {
@@ -22,6 +24,8 @@ MetricKind find_run_metric(const std::string& name) {
   const auto kind = std::find_if(kinds.begin(), kinds.end(),
                                  [&](const MetricKind& any) { return any.name == name; });
   if (kind != kinds.end()) return *kind;
+  const std::string_view present = find_present_name(NameKind::metric, name);
+  if (!present.empty()) throw std::invalid_argument("figure " + describe_renaming(name, present));
   std::string names;
   for (const MetricKind& any : kinds) names.append(names.empty() ? "" : ", ").append(any.name);
   throw std::invalid_argument("there is no figure " + name + "; there are: " + names);

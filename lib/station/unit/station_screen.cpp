@@ -79,7 +79,7 @@ ScreenLine gate_line(const CheckedMetric& metric) {
     outcome += fmt::format(", p {:.3f}", *sure);
   }
   return {
-      fmt::format("{:<24}{:>12}{:>14} {:<4} {}", metric.name, value, limit, metric.unit, outcome),
+      fmt::format("{:<28}{:>12}{:>14} {:<4} {}", metric.name, value, limit, metric.unit, outcome),
       metric.passed() ? Tone::plain : Tone::bad};
 }
 
@@ -166,7 +166,7 @@ std::vector<ScreenLine> make_verdict_screen(const RunRecord& record) {
   const bool passed = record.passed() && no_verdict.empty();
   const Tone tone = passed ? Tone::good : Tone::bad;
   std::vector<ScreenLine> lines{
-      {fmt::format("{:<24}{:>12}{:>14}", "gate", "figure", "limit"), Tone::heading}};
+      {fmt::format("{:<28}{:>12}{:>14}", "gate", "figure", "limit"), Tone::heading}};
   for (const CheckedMetric& metric : record.metrics) {
     if (metric.limit && metric.value) lines.push_back(gate_line(metric));
   }

@@ -38,16 +38,17 @@ void add_nominal_differences(const Camera& type, LensResult& result) {
   const double focal =
       std::max(std::abs(found[0] / nominal[0] - 1), std::abs(found[1] / nominal[1] - 1));
   result.metrics.push_back({"focal_percent", percent * focal});
-  result.metrics.push_back({"center_px", std::hypot(found[2] - nominal[2], found[3] - nominal[3])});
+  result.metrics.push_back(
+      {"principal_point_px", std::hypot(found[2] - nominal[2], found[3] - nominal[3])});
   const auto difference =
       compute_projection_difference(result.lens.solution.lens(), Lens(type.lens_model, nominal),
                                     type.imager_px, [](const Eigen::Vector2d&) { return 1.0; });
-  if (difference) result.metrics.push_back({"nominal_px", difference->worst_px});
+  if (difference) result.metrics.push_back({"nominal_difference_px", difference->worst_px});
   const auto& report = result.calibration.intrinsics_report;
   const auto [x_m, y_m] =
       report ? report->board_warp_m.value_or(std::array{0.0, 0.0}) : std::array{0.0, 0.0};
   const double warp_m = std::max({std::abs(x_m), std::abs(y_m), std::abs(x_m + y_m)});
-  result.metrics.push_back({"board_bend_mm", kMillimetersPerMeter * warp_m});
+  result.metrics.push_back({"board_warp_mm", kMillimetersPerMeter * warp_m});
 }
 
 LampCaptures make_lamp_captures(const StationConfig& config, const Calibration& calibration,
@@ -108,8 +109,8 @@ void add_check_fractions(const LocateResult& located, const std::vector<Frame>& 
   const auto ratio = [](std::size_t part, std::size_t whole) {
     return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : 0;
   };
-  result.metrics = {{"check_fixes", ratio(located.summary.fixes, frames.size())},
-                    {"check_lamps", ratio(num_inliers, lamps)},
+  result.metrics = {{"check_fix_fraction", ratio(located.summary.fixes, frames.size())},
+                    {"check_lamp_inlier_fraction", ratio(num_inliers, lamps)},
                     {"check_lamps_seen", ratio(seen.size(), map.lamps.size())}};
 }
 
@@ -184,7 +185,7 @@ StepResult check_fixes(const StationConfig& config, const Calibration& calibrati
   result.calibration = calibration;
   const LocateResult located = locate_frames({known.frames, config.lamps, calibration, places});
   add_check_fractions(located, known.frames, config.lamps, result);
-  result.lamps_left_out = located.lamps_left_out;
+  result.rejected_lamps = located.rejected_lamps;
   result.warnings = located.warnings;
   result.notes = located.notes;
   if (!located.ok()) return result;

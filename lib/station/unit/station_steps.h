@@ -16,8 +16,8 @@
 /// of the station. Each step uses the calibration of the step before; the caller adds the history.
 namespace vlp {
 
-/// Calibrates the lens. Further metrics: focal_percent, center_px and nominal_px against the
-/// nominal lens, and board_bend_mm.
+/// Calibrates the lens. Further metrics: focal_percent, principal_point_px and
+/// nominal_difference_px against the nominal lens, and board_warp_mm.
 StepResult solve_boards(const StationConfig& config, const std::string& camera_id,
                         Observations seen);
 

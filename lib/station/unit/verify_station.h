@@ -22,10 +22,10 @@ struct VerificationResult {
 /// Verifies the station with its golden unit, a camera of known calibration, from the images in
 /// FOLDER/check/ and, if they exist, FOLDER/dispersion/ and FOLDER/boards/.
 ///
-/// The lens that the boards give is compared with the known one (center_px, focal_percent,
-/// nominal_px). A difference shows that the board has changed. Fixes use the known calibration;
-/// their errors show that lamps or known points have moved. FAIL here refers to the station, and
-/// INVALID means that the golden unit was not measured.
+/// The lens that the boards give is compared with the known one (principal_point_px,
+/// focal_percent, nominal_difference_px). A difference shows that the board has changed. Fixes use
+/// the known calibration; their errors show that lamps or known points have moved. FAIL here refers
+/// to the station, and INVALID means that the golden unit was not measured.
 ///
 /// `run` is a make_run_id() from before the measurement. Throws InputError without images.
 /// Precondition: the configuration has a golden unit.

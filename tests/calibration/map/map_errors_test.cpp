@@ -54,7 +54,7 @@ class FindMapErrors : public testing::Test {
 };
 
 TEST_F(FindMapErrors, ReturnsNoneForCorrectMap) {
-  ASSERT_THAT(find_map_errors(frames, map, camera_alone()).offsets, SizeIs(map.lamps.size()));
+  ASSERT_THAT(find_map_errors(frames, map, extract_camera()).offsets, SizeIs(map.lamps.size()));
   EXPECT_EQ(found(), "");
   for (Lamp& lamp : map.lamps) lamp.position_m.x() += random.uniform(-0.005, 0.005);
   EXPECT_EQ(found(), "") << "5 mm are for --refine-map";
@@ -164,7 +164,7 @@ TEST_F(FindMapErrors, KeepsFalseAlarmRateBelowLimit) {
         for (Lamp& lamp : map.lamps) {
           if (is_stated) lamp.sd_m = 2e-3;
         }
-        const MapErrors judged = find_map_errors(frames, map, camera_alone());
+        const MapErrors judged = find_map_errors(frames, map, extract_camera());
         // Without offsets and errors, the captures would be too few for an alarm.
         ASSERT_FALSE(judged.offsets.empty() && judged.errors.empty());
         alarms += judged.errors.empty() ? 0 : 1;

@@ -15,7 +15,7 @@ Lamp rule_lamp(int id, double frequency_hz, std::optional<double> duty = {}) {
 
 Stripes stripes(double frequency_hz, double duty = 0.5) {
   Stripes stripes{};
-  stripes.contrast = stripes.clarity = 0.9;
+  stripes.contrast = stripes.periodicity_r2 = 0.9;
   stripes.period_lines = 1 / (frequency_hz * kRowTime_s);
   stripes.periods = 5;
   stripes.is_regular = true;
@@ -40,7 +40,7 @@ TEST(IdentifyLampByFrequency, AllowsLessDeviationForFewOrUnclearStripes) {
   const std::vector<Lamp> lamps{rule_lamp(1, 2000)};
   Stripes few = stripes(2080), unclear = few;
   few.periods = 2;
-  unclear.clarity = 0.6;
+  unclear.periodicity_r2 = 0.6;
   EXPECT_EQ(identified(lamps, few), std::nullopt);
   EXPECT_EQ(identified(lamps, unclear), std::nullopt);
   few.period_lines = stripes(2030).period_lines;
@@ -50,10 +50,10 @@ TEST(IdentifyLampByFrequency, AllowsLessDeviationForFewOrUnclearStripes) {
 TEST(IdentifyLampByFrequency, RejectsUnclearIrregularStripes) {
   const std::vector<Lamp> lamps{rule_lamp(1, 2000)};
   Stripes unclear = stripes(2000);
-  unclear.clarity = 0.6;
+  unclear.periodicity_r2 = 0.6;
   unclear.is_regular = false;
   EXPECT_EQ(identified(lamps, unclear), std::nullopt);
-  unclear.clarity = 0.75;
+  unclear.periodicity_r2 = 0.75;
   EXPECT_EQ(identified(lamps, unclear), 1);
 }
 

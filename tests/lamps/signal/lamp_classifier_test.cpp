@@ -96,7 +96,7 @@ TEST(LampClassifier, AcceptsUnclearStripesOnlyCloseToLamp) {
   ASSERT_EQ(identify_lamp(classifier, stripes), 7);
   stripes.period_lines *= 1.025;
   EXPECT_EQ(identify_lamp(classifier, stripes), 7);
-  stripes.clarity = 0.6;
+  stripes.periodicity_r2 = 0.6;
   EXPECT_EQ(identify_lamp(classifier, stripes), std::nullopt);
 }
 

@@ -52,8 +52,8 @@ TEST_P(MeasureStripesOfSquareWave, ReturnsPeriodAndDuty) {
         EXPECT_NEAR(stripes.duty, duty, 0.05);
         EXPECT_NEAR(stripes.contrast, 1 - kDarkCounts / kBrightCounts, 1e-9);
         EXPECT_NEAR(stripes.periods, lines / stripes.period_lines, 1e-9);
-        EXPECT_GT(stripes.clarity, 0.5);
-        EXPECT_LE(stripes.clarity, 1);
+        EXPECT_GT(stripes.periodicity_r2, 0.5);
+        EXPECT_LE(stripes.periodicity_r2, 1);
       }
     }
   }
@@ -71,7 +71,7 @@ TEST_P(MeasureStripesOfSquareWave, ReturnsPeriodUnderExposure) {
           const Stripes stripes =
               measure_stripes(square_wave(lines, period, duty, phase, exposure * period));
           EXPECT_NEAR(stripes.period_lines, period, 0.01 * period);
-          EXPECT_GT(stripes.clarity, 0.5);
+          EXPECT_GT(stripes.periodicity_r2, 0.5);
         }
       }
     }
@@ -89,7 +89,7 @@ TEST(MeasureStripes, ReturnsPeriodAndClarityOfSine) {
     }
     const Stripes stripes = measure_stripes(signal);
     EXPECT_NEAR(stripes.period_lines, period, 0.01 * period);
-    EXPECT_GT(stripes.clarity, 0.96);
+    EXPECT_GT(stripes.periodicity_r2, 0.96);
   }
 }
 
@@ -111,14 +111,14 @@ TEST(MeasureStripes, ReturnsLowContrastAndClarityForSteadyLight) {
     for (double& value : signal) value = 150 + 2 * random.normal();
     const Stripes stripes = measure_stripes(signal);
     EXPECT_LT(stripes.contrast, 0.1);
-    EXPECT_LT(stripes.clarity, 0.5);
+    EXPECT_LT(stripes.periodicity_r2, 0.5);
   }
 }
 
 void expect_no_stripes(const std::vector<double>& signal) {
   const Stripes stripes = measure_stripes(signal);
   EXPECT_EQ(stripes.contrast, 0);
-  EXPECT_EQ(stripes.clarity, 0);
+  EXPECT_EQ(stripes.periodicity_r2, 0);
   EXPECT_TRUE(std::isfinite(stripes.period_lines) && std::isfinite(stripes.periods));
   EXPECT_TRUE(stripes.duty >= 0 && stripes.duty <= 1) << stripes.duty;
 }
@@ -134,7 +134,7 @@ TEST(MeasureStripes, ReturnsNoStripesForConstantSignals) {
       SCOPED_TRACE(testing::Message() << level << ", " << lines);
       const Stripes stripes = measure_stripes(std::vector<double>(lines, level));
       EXPECT_EQ(stripes.contrast, 0);
-      EXPECT_LT(stripes.clarity, 0.5);
+      EXPECT_LT(stripes.periodicity_r2, 0.5);
       EXPECT_TRUE(stripes.duty >= 0 && stripes.duty <= 1) << stripes.duty;
     }
   }

@@ -48,14 +48,15 @@ class ArchiveRuns : public testing::Test {
   void session(const std::string& name, std::optional<double> rms_px) {
     std::string metrics;
     if (rms_px) {
-      metrics = R"({"name": "rms_px", "unit": "px", "limit": 1.0, "asked": "at most", "value": )" +
-                std::to_string(*rms_px) + R"(}, {"name": "mean_mm", "unit": "mm", "value": 0.5},)" +
-                R"({"name": "residual_ratio", "value": 1.25})";
+      metrics =
+          R"({"name": "rms_px", "unit": "px", "limit": 1.0, "direction": "at most", "value": )" +
+          std::to_string(*rms_px) + R"(}, {"name": "mean_mm", "unit": "mm", "value": 0.5},)" +
+          R"({"name": "residual_ratio", "value": 1.25}, {"name": "scatter_mm", "value": 0.1})";
     }
     write("archive/" + name + "/session.json",
           R"({"metrics": [)" + metrics +
-              R"(], "gates": [{"name": "coverage", "limit": 0.4, "asked": "at least",)"
-              R"( "value": null, "met": false}]})" +
+              R"(], "gates": [{"name": "coverage", "limit": 0.4, "direction": "at least",)"
+              R"( "value": null, "passed": false}]})" +
               "\n");
   }
 
@@ -88,14 +89,15 @@ TEST_F(ArchiveRuns, ReturnsDatedSessionsInChronologicalOrder) {
   EXPECT_EQ(runs[1].calibration, "format: vlp-calibration/1\n");
   EXPECT_EQ(runs[2].first_cause(), "rms_px is 2 px, at most 1 px is asked for");
   EXPECT_EQ(runs[3].program, "vlp-calibrate 1.2.3");
-  ASSERT_THAT(runs[2].metrics, SizeIs(4));
+  ASSERT_THAT(runs[2].metrics, SizeIs(5));
   EXPECT_EQ(runs[2].metrics[0].value, 2);
   EXPECT_FALSE(runs[2].metrics[0].passed());
   EXPECT_EQ(runs[2].metrics[0].direction, Direction::at_most);
   EXPECT_EQ(runs[2].metrics[2].name, "residual_ratio");
   EXPECT_FALSE(runs[2].metrics[2].limit);
-  EXPECT_EQ(runs[2].metrics[3].direction, Direction::at_least);
-  EXPECT_FALSE(runs[2].metrics[3].value);
+  EXPECT_EQ(runs[2].metrics[3].name, "repeatability_mm");  // the present name of scatter_mm
+  EXPECT_EQ(runs[2].metrics[4].direction, Direction::at_least);
+  EXPECT_FALSE(runs[2].metrics[4].value);
 }
 
 TEST_F(ArchiveRuns, AreStoredOnceIfReadTwice) {

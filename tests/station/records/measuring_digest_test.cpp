@@ -61,7 +61,7 @@ TEST_F(MeasuringDigest, ChangesWithMeasuringSetup) {
   is_new("camera_type.yaml", "-0.25", "-0.24");
   is_new("station.yaml", "board_views: 36", "board_views: 35");
   is_new("station.yaml", "check_captures: 36", "check_captures: 30");
-  is_new("station.yaml", "refuse: {blur_px: 2", "refuse: {blur_px: 2.5");
+  is_new("station.yaml", "rejection: {blur_px: 2", "rejection: {blur_px: 2.5");
   is_new("station.yaml", "check_worst_mm: 3", "check_worst_mm: 4");
   is_new("station.yaml", "gates: {check_mean_mm: 0.5}", "gates: {check_mean_mm: 0.6}");
   is_new("station.yaml", "camera_id: golden", "camera_id: other");
@@ -83,7 +83,7 @@ TEST_F(MeasuringDigest, IgnoresOtherSettings) {
   is_same("station.yaml", "board_coverage: 0.7", "board_coverage: 0.70");
   is_same("station.yaml", "records: records.db",
           "records: others.db\nspool: elsewhere\nserial_pattern: '[0-9]{4}'\n"
-          "hook: {command: [./label.sh]}\nkeep: {images_days: 90}\n"
+          "hook: {command: [./label.sh]}\nretention: {images_days: 90}\n"
           "verify_due: {hours: 24}");
   is_same("station.yaml", "results: results", "results: other");
   is_same("lamps.yaml", "[0, 0.28, 1.6]", "[0.0, 0.280, 1.6e0]");

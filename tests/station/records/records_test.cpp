@@ -236,7 +236,10 @@ void check_migration(const std::string& where) {
   EXPECT_EQ(describe(found->metrics[0]), "rms_px is 1.5 px, at most 1 px is asked for");
   EXPECT_EQ(describe(found->metrics[1]), "coverage is not known, at least 0.7 is asked for");
   EXPECT_EQ(found->metrics[2].unit, "deg");
+  EXPECT_EQ(found->metrics[3].name, "world_offset_mm");  // the present name of world_mm
   EXPECT_EQ(found->metrics[3].unit, "mm");
+  EXPECT_THAT(records.trend("world_offset_mm", {}), SizeIs(1));
+  EXPECT_THAT(records.trend("world_mm", {}), SizeIs(1));
   EXPECT_EQ(found->metrics[4].unit, "%");
   EXPECT_FALSE(found->metrics[0].guard);
   EXPECT_THAT(found->images, SizeIs(1));
@@ -472,12 +475,15 @@ TEST(WriteRuns, WritesCsv) {
       first_line(csv),
       "run,kind,station,camera,operator_name,shift,begun_utc,ended_utc,verdict,causes,program,"
       "config_sha256,"
-      "blur_px,focal_percent,center_px,nominal_px,board_bend_mm,mtf50_asymmetry,mtf50,"
-      "local_loss,local_shadow,mtf50_worst_ratio,black_ratio,rms_px,board_print_px,uncertainty_px,"
-      "halves_px,coverage,"
+      "blur_px,focal_percent,principal_point_px,nominal_difference_px,board_warp_mm,mtf50_"
+      "asymmetry,mtf50,"
+      "local_loss,local_shadow,mtf50_worst_ratio,black_ratio,rms_px,board_print_px,expected_max_"
+      "error_px,"
+      "split_half_px,coverage,"
       "views,board_tilt_deg,rotation_px,rotation_spread_px,rotation_sd_px,tilt_deg,lever_arm_"
       "mm,row_time_us,row_time_sd_us,dispersion_mm,"
-      "dispersion_offset_px,world_mm,check_fixes,check_lamps,check_lamps_seen,check_mean_mm,"
+      "dispersion_offset_px,world_offset_mm,check_fix_fraction,check_lamp_inlier_fraction,check_"
+      "lamps_seen,check_mean_mm,"
       "check_worst_mm,check_offset_mm,check_height_mm,check_residual_px");
   EXPECT_THAT(csv, HasSubstr("2026-11-21T13:45:01Z,2026-11-21T13:45:01Z,PASS"));
   EXPECT_THAT(csv, HasSubstr("; second"));
@@ -508,9 +514,9 @@ TEST(WriteRuns, WritesJson) {
   const auto& metrics = runs[0]["figures"];
   EXPECT_THAT(list_keys(metrics), ElementsAre("rms_px", "coverage", "tilt_deg"));
   EXPECT_THAT(list_keys(metrics["tilt_deg"]),
-              ElementsAre("value", "unit", "gate", "at_least", "met"));
+              ElementsAre("value", "unit", "gate", "at_least", "passed"));
   EXPECT_THAT(list_keys(metrics["rms_px"]),
-              ElementsAre("value", "unit", "gate", "at_least", "met", "uncertainty", "guard_k",
+              ElementsAre("value", "unit", "gate", "at_least", "passed", "uncertainty", "guard_k",
                           "conformance_probability"));
   EXPECT_NEAR(metrics["rms_px"]["conformance_probability"].get<double>(), 0.99379, 5e-6);
   EXPECT_EQ(metrics["rms_px"]["value"], 0.25);

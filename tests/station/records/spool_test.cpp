@@ -64,6 +64,15 @@ TEST(ReadRun, ReturnsWrittenRun) {
   EXPECT_EQ(read.images[29].sha256, run.images[29].sha256);
 }
 
+TEST(ReadRun, ReturnsPresentNamesOfMetrics) {
+  const TemporaryFolder folder;
+  RunRecord run = numbered_run(1);
+  run.metrics = {{"check_lamps", "", 1, 0.95, Direction::at_least}};
+  const auto read = read_run(folder.file("run.json", serialize_run({run, "records.db"})));
+  ASSERT_THAT(read.run.metrics, SizeIs(1));
+  EXPECT_EQ(read.run.metrics[0].name, "check_lamp_inlier_fraction");
+}
+
 TEST(ReadRun, AcceptsNamesThatAreInvalidText) {
   const TemporaryFolder folder;
   RunRecord run = numbered_run(1);

@@ -26,7 +26,7 @@ struct StationSteps : testing::Test {
 TEST_F(StationSteps, CheckFixesLocatesAllKnownPoints) {
   const StepResult result = check_fixes(config, calibration, frames, places);
   EXPECT_TRUE(result.ok()) << result.why;
-  EXPECT_EQ(result.metrics[0].name, "check_fixes");
+  EXPECT_EQ(result.metrics[0].name, "check_fix_fraction");
   EXPECT_EQ(result.metrics[0].value, 1);
 }
 

@@ -21,7 +21,7 @@ TEST(VerifyStation, StartsAtTimeOfRunName) {
   StationConfig config = read_station(VLP_SOURCE_DIR "/datasets/station/station.yaml");
   config.golden = {.camera_id = "golden",
                    .calibration = read_calibration(kExample + "calibration.yaml"),
-                   .gates = {{"check_fixes", 0.9}}};
+                   .gates = {{"check_fix_fraction", 0.9}}};
   const std::string run = "20200102T030405Z-0123456789abcdef", before = now_utc();
   const RunRecord record = verify_station(config, folder / "", run, {"test", "0"}, 1).record;
   EXPECT_EQ(record.run, run);

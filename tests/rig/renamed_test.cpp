@@ -1,0 +1,70 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#include "rig/renamed.h"
+
+#include <gmock/gmock.h>
+
+#include "rig/calibration.h"
+#include "rig/samples.h"
+#include "rig/yaml_reader.h"
+#include "support/temporary_folder.h"
+
+namespace vlp {
+namespace {
+
+TEST(FindPresentName, DependsOnTheKind) {
+  EXPECT_EQ(find_present_name(NameKind::key, "uncertainty_px"), "expected_max_error_px");
+  EXPECT_EQ(find_present_name(NameKind::column, "spot"), "pivot");
+  EXPECT_EQ(find_present_name(NameKind::metric, "center_px"), "principal_point_px");
+  EXPECT_EQ(find_present_name(NameKind::option, "--of"), "--position-of");
+  EXPECT_EQ(find_present_name(NameKind::value, "paper"), "chen-guan");
+  EXPECT_EQ(find_present_name(NameKind::key, "spot"), "");
+  EXPECT_EQ(find_present_name(NameKind::key, "rms_px"), "");
+}
+
+TEST(FindFormerName, InvertsFindPresentName) {
+  EXPECT_EQ(find_former_name(NameKind::metric, "missing_fraction"), "missing");
+  EXPECT_EQ(find_former_name(NameKind::column, "missing_fraction"), "");
+}
+
+/// Message on reading the key `present` of a mapping.
+std::string message_on(const std::string& content, const std::string& present) {
+  const TemporaryFolder folder;
+  const auto file = folder.file("some.yaml", content);
+  return refusal(
+      [&](const std::filesystem::path& path) {
+        YamlMap map = read_yaml(path);
+        map.optional(present);
+        map.finish();
+      },
+      file);
+}
+
+TEST(YamlMap, NamesThePresentKey) {
+  EXPECT_EQ(message_on("a: 1\nenough: 2\n", "completion"),
+            "some.yaml:2: key 'enough' is now called 'completion'");
+  EXPECT_EQ(message_on("completion: 1\nenough: 2\n", "completion"),
+            "some.yaml:2: key 'enough' is now called 'completion'");
+  EXPECT_EQ(message_on("center_px: 2\n", "principal_point_px"),
+            "some.yaml:1: key 'center_px' is now called 'principal_point_px'");
+  EXPECT_EQ(message_on("enough: 2\n", "retention"),
+            "some.yaml:1: key 'enough' is unknown here; the keys are: retention");
+  EXPECT_EQ(message_on("enough: 2\n", "enough"), "");
+  const TemporaryFolder folder;
+  const auto file = folder.file("some.yaml", "keep: 1\n");
+  const std::string problem = "some.yaml:1: key 'keep' is now called 'retention'";
+  EXPECT_EQ(refusal([](const auto& path) { read_yaml(path).required("retention"); }, file),
+            problem);
+  EXPECT_EQ(refusal([](const auto& path) { read_yaml(path).has("retention"); }, file), problem);
+}
+
+TEST(ReadCalibration, NamesThePresentKey) {
+  const TemporaryFolder folder;
+  const auto file =
+      folder.file("c.yaml", changed(kCalibrationYaml, "valid_region_px", "region_px"));
+  EXPECT_THAT(refusal(read_calibration, file),
+              testing::HasSubstr("key 'region_px' is now called 'valid_region_px'"));
+}
+
+}  // namespace
+}  // namespace vlp
