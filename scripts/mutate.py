@@ -3,13 +3,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Changes the code of a folder of lib/ in small ways and reports which changes its tests do not notice.
 
-    scripts/mutate.py FOLDER [--count N] [--seed S] [--jobs N] [--preset P]
+    scripts/mutate.py FOLDER [--count N] [--seed S] [--jobs N] [--preset P] [--quick]
 
 Each mutant changes one operator, constant, sign, statement or pair of arguments. It is compiled to an object of its own
 and linked before the folder's library; neither the sources nor the build folder change. Mutants that do not compile are
-drawn again. A mutant is detected if a test of tests/FOLDER fails, crashes or takes ten times as long as without it; the
-slow tests run only if the others pass. Prints each survivor as FILE:LINE with both lines, then the score. Exit code 0;
-2 for bad usage or tests that fail without a mutant.
+drawn again. A mutant is detected if a test of tests/FOLDER fails or crashes, or if the tests take three times the
+processor time; the slow tests run only if the others pass, with --quick never. Prints each survivor as FILE:LINE with
+both lines, then the score. Exit code 0; 1 if the tests are missing or fail without a mutant; 2 for bad usage.
+
+Changes that rarely have an effect are not made:
+- < to <= and the like between floating-point values, which are equal with probability zero (see COUNTS)
+- 1.5 times a constant with a negative exponent: tolerances and steps of difference quotients have that latitude
+- one more iteration, one more element of an array, no reserve()
 
 Build the tests first: PRESET=dev scripts/test.sh FOLDER.
 """
@@ -20,11 +25,11 @@ import os
 import pathlib
 import random
 import re
+import resource
 import shlex
 import subprocess
 import sys
 import tempfile
-import time
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 SKIPPED = re.compile(r'R"(\w*)\((?:.|\n)*?\)\1"|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])+\'|//[^\n]*|/\*(?:.|\n)*?\*/'
@@ -39,7 +44,16 @@ STATEMENT = re.compile(r"^[ \t]*(?!return\b|const\b|using\b|auto\b|break\b|case\
                        r"[\w\[\]().>:*-]+(?:\([^;{}]*\)| [-+*/]?= [^;{}]*);[ \t]*$", re.M)
 ARGUMENTS = re.compile(r"\b[a-z]\w*\(([\w.]+), ([\w.]+)\)")
 MINUS = re.compile(r"(?<=[(=,] )-(?=[a-z(])|(?<=\()-(?=[a-z(])|(?<=return )-(?=[a-z(])")
+# Lines that compare integers: only these get < for <=.
+COUNTS = re.compile(r"\+\+|size|count|rows\(\)|cols\(\)|\bnum_|\bn\b|\b(?:width|height)\b|static_cast<(?:int|std::)")
+# Constants of which one more makes no difference.
+LATITUDE = re.compile(r"\bmax_(?:iterations|halvings|steps|rounds)\b|std::array<[^<>;]*$")
 CONDITION = re.compile(r"\bif \((?=[^;{}]*\))")
+
+
+def is_boundary(old, new):
+    """Whether the change only concerns equal values: < for <=, >= for > and the like."""
+    return old.strip().rstrip("=") == new.strip().rstrip("=") and old.strip()[0] in "<>"
 
 
 def find_mutations(text):
@@ -50,12 +64,16 @@ def find_mutations(text):
         for match in re.finditer((r"\b" if old[0].isalpha() else "") + re.escape(old), masked):
             if re.search(r"template|operator", masked[masked.rfind("\n", 0, match.start()) + 1:match.start()]):
                 continue
-            found += [(match.start(), match.end(), new) for new in news]
+            counts = COUNTS.search(masked[masked.rfind("\n", 0, match.start()) + 1:masked.find("\n", match.end())])
+            found += [(match.start(), match.end(), new) for new in news if counts or not is_boundary(old, new)]
     for match in NUMBER.finditer(masked):
         value = match[0]
+        if "e-" in value or LATITUDE.search(masked[masked.rfind("\n", 0, match.start()) + 1:match.start()]):
+            continue
         found.append((match.start(), match.end(), str(int(value) + 1) if value.isdigit() else f"(1.5 * {value})"))
     for match in STATEMENT.finditer(masked):
-        found.append((match.start(), match.end(), ""))
+        if ".reserve(" not in match[0]:
+            found.append((match.start(), match.end(), ""))
     for match in ARGUMENTS.finditer(masked):
         if match[1] != match[2]:
             found.append((match.start(1), match.end(2), f"{match[2]}, {match[1]}"))
@@ -72,10 +90,13 @@ def find_mutations(text):
     return found
 
 
+MEMORY_KIB = 4 << 20  # a mutant that fills a vector without end crashes there
+
+
 class Folder:
     """Commands that compile, link and run the tests of a folder."""
 
-    def __init__(self, name, preset):
+    def __init__(self, name, preset, quick):
         self.build = ROOT / ("build" if preset == "release" else f"build-{preset}")
         self.test = self.build / "tests" / name / f"test_{name}"
         if not self.test.exists():
@@ -91,28 +112,34 @@ class Folder:
         self.scratch = self.build / "tests" / name / "scratch"
         slow = (ROOT / "tests/slow_tests.txt").read_text().split("\n")
         self.slow = ":".join(line for line in slow if line and not line.startswith("#"))
+        self.quick = quick
 
     def run(self, program, pattern, limit_s):
+        """Whether the tests pass within a limit of processor time."""
+        limits = f"ulimit -v {MEMORY_KIB}; ulimit -t {limit_s}"
         with tempfile.TemporaryDirectory() as scratch:
             try:
-                done = subprocess.run([program, "--gtest_brief=1", "--gtest_fail_fast", f"--gtest_filter={pattern}"],
-                                      cwd=scratch, capture_output=True, timeout=limit_s, check=False)
+                done = subprocess.run(["sh", "-c", limits + '; exec "$0" "$@"', program, "--gtest_brief=1",
+                                       "--gtest_fail_fast", f"--gtest_filter={pattern}"],
+                                      cwd=scratch, capture_output=True, timeout=20 * limit_s, check=False)
             except subprocess.TimeoutExpired:
                 return False
         return done.returncode == 0
 
     def passes(self, program, limits_s):
         return (self.run(program, "-" + self.slow, limits_s[0])
-                and (not self.slow or self.run(program, self.slow, limits_s[1])))
+                and (self.quick or not self.slow or self.run(program, self.slow, limits_s[1])))
 
     def measure(self):
-        """Ten times the seconds of the quick and of the slow tests; exits if one fails."""
+        """Limits of the quick and of the slow tests in seconds; exits if one fails."""
         limits = []
-        for pattern in ("-" + self.slow, self.slow or "-*"):
-            begin = time.monotonic()
+        for pattern in ("-" + self.slow, "-*" if self.quick else self.slow or "-*"):
+            before = resource.getrusage(resource.RUSAGE_CHILDREN)
             if not self.run(self.test, pattern, 3600):
                 sys.exit("mutate.py: the tests fail without a mutant")
-            limits.append(10 * (time.monotonic() - begin) + 10)
+            after = resource.getrusage(resource.RUSAGE_CHILDREN)
+            spent_s = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+            limits.append(int(3 * spent_s) + 10)
         return limits
 
     def judge(self, file, text, limits_s):
@@ -121,7 +148,7 @@ class Folder:
             source, mutant = pathlib.Path(scratch, file.name), pathlib.Path(scratch, "mutant.o")
             source.write_text(text)
             command = re.sub(r" -o \S+ -c \S+$", f" -o {mutant} -c {source}", self.compile[file])
-            command = command.replace(" -Werror", "") + f" -w -iquote {file.parent}"
+            command = command.replace(" -Werror", "") + f" -w -g0 -iquote {file.parent}"
             if subprocess.run(shlex.split(command), cwd=self.build, capture_output=True, check=False).returncode:
                 return None
             program = pathlib.Path(scratch, "test")
@@ -139,8 +166,9 @@ def main():
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--preset", default="dev")
+    parser.add_argument("--quick", action="store_true", help="without the tests of tests/slow_tests.txt")
     options = parser.parse_args()
-    folder = Folder(options.folder, options.preset)
+    folder = Folder(options.folder, options.preset, options.quick)
     limits_s = folder.measure()
     draw = random.Random(options.seed)
     texts = {file: file.read_text() for file in sorted(folder.compile)}

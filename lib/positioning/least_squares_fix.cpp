@@ -84,19 +84,4 @@ std::optional<LeastSquaresFix> estimate_pose_least_squares(std::span<const Sight
   return std::nullopt;
 }
 
-Eigen::Matrix<double, 4, 3> compute_rotation_jacobian(std::span<const Sighting> sightings,
-                                                      const LeastSquaresFix& fix) {
-  const LevelPose camera(fix.pose);
-  Eigen::Matrix<double, 4, 2> gradient = Eigen::Matrix<double, 4, 2>::Zero();
-  for (const Sighting& sighting : sightings) {
-    const Eigen::Matrix2d whitening = sighting.d_pixel_d_z / sighting.sigma_px;
-    gradient += (whitening * predict(camera, sighting.lamp_m).d_z_d_state).transpose() * whitening *
-                tilt_jacobian(sighting.z);
-  }
-  Eigen::Matrix<double, 4, 3> effect;
-  effect << fix.covariance * gradient,
-      Eigen::Vector4d(0, 0, 0, -1);  // yaw compensates a rotation about z
-  return effect;
-}
-
 }  // namespace vlp

@@ -33,10 +33,4 @@ struct LeastSquaresFix {
 std::optional<LeastSquaresFix> estimate_pose_least_squares(std::span<const Sighting> sightings,
                                                            const Pose& start);
 
-/// Returns the derivative of (X, Y, Zs, g) of `fix` by small rotations about the axes of the level
-/// frame. Units: meters and radians per radian.
-/// @pre estimate_pose_least_squares() computed `fix` from `sightings`
-Eigen::Matrix<double, 4, 3> compute_rotation_jacobian(std::span<const Sighting> sightings,
-                                                      const LeastSquaresFix& fix);
-
 }  // namespace vlp

@@ -25,6 +25,7 @@ struct BodyObservations {
   std::size_t num_current = 0;
   /// True if a detector reported every sigma_px.
   bool noise_is_stated = true;
+  int unknown_lamps = 0;
   int rejected_lamps = 0;
   std::array<int, kMaxSightings> rejected_ids = {};
 

@@ -162,8 +162,7 @@ class Positioner::Impl {
 
  private:
   template <typename Frame, typename Add>
-  FixStatus find_lamps(std::span<const Detection> detections, Frame& frame, int& unknown_lamps,
-                       const Add& add) const;
+  FixStatus find_lamps(std::span<const Detection> detections, Frame& frame, const Add& add) const;
   FixStatus sight(std::span<const Detection> detections, const Eigen::Matrix3d& level_from_base,
                   FrameObservations& frame) const;
   std::size_t find_index(int id) const;
@@ -188,7 +187,7 @@ class Positioner::Impl {
                        const InclinationJacobian& d_pose_d_inclination, const Sensors& sensors,
                        const Matrix4& height_and_yaw_covariance, Fix& fix) const;
   FixStatus sight_from_body(std::span<const Detection> detections, double time_s,
-                            BodyObservations& frame, int& unknown_lamps) const;
+                            BodyObservations& frame) const;
   /// Returns std::nullopt if the frame has fewer than two lamps of the map.
   std::optional<Fix> locate_body(std::span<const Detection> detections, const Sensors& sensors,
                                  std::span<const EarlierFrame> earlier) const;
@@ -239,14 +238,14 @@ Positioner::Impl::Impl(const LampMap& map, const Calibration& calibration,
 /// standard deviation, and fills the frame's sighting.
 template <typename Frame, typename Add>
 FixStatus Positioner::Impl::find_lamps(std::span<const Detection> detections, Frame& frame,
-                                       int& unknown_lamps, const Add& add) const {
+                                       const Add& add) const {
   const auto ids_begin = frame.ids.begin() + static_cast<std::ptrdiff_t>(frame.size);
   for (const Detection& detection : detections) {
     const auto lamp =
         std::lower_bound(lamps_.begin(), lamps_.end(), detection.lamp,
                          [](const Lamp& candidate, int id) { return candidate.id < id; });
     if (lamp == lamps_.end() || lamp->id != detection.lamp) {
-      ++unknown_lamps;
+      ++frame.unknown_lamps;
       continue;
     }
     const auto ids_end = frame.ids.begin() + static_cast<std::ptrdiff_t>(frame.size);
@@ -278,7 +277,7 @@ std::size_t Positioner::Impl::find_index(int id) const {
 void Positioner::Impl::reject_outlier_lamps(FrameObservations& frame,
                                             const Eigen::Matrix3d& level_from_base,
                                             ConsistentFix& solution) const {
-  if (solution.status != FixStatus::ok || frame.size < 4) return;
+  if (solution.status != FixStatus::ok) return;
   // If the noise alone explains the residuals, no other error is needed.
   if (solution.fix.chi_squared <= static_cast<double>(2 * frame.size - 4)) return;
   const LevelPose pose(solution.fix.pose);
@@ -348,11 +347,11 @@ FixStatus Positioner::Impl::sight(std::span<const Detection> detections,
     }
     return FixStatus::ok;
   };
-  return find_lamps(detections, frame, frame.unknown_lamps, add);
+  return find_lamps(detections, frame, add);
 }
 
 FixStatus Positioner::Impl::sight_from_body(std::span<const Detection> detections, double time_s,
-                                            BodyObservations& frame, int& unknown_lamps) const {
+                                            BodyObservations& frame) const {
   const auto add = [&](const Detection& detection, const Lamp& lamp, const Lens::Ray& ray,
                        double sigma_px) {
     const Eigen::Vector3d direction = body_from_camera_ * ray.direction;
@@ -364,7 +363,7 @@ FixStatus Positioner::Impl::sight_from_body(std::span<const Detection> detection
                                    time_s + read_s};
     return FixStatus::ok;
   };
-  return find_lamps(detections, frame, unknown_lamps, add);
+  return find_lamps(detections, frame, add);
 }
 
 std::optional<Fix> Positioner::Impl::locate_body(std::span<const Detection> detections,
@@ -381,13 +380,12 @@ std::optional<Fix> Positioner::Impl::locate_body(std::span<const Detection> dete
   if (prior.height) prior.height->z_m -= origin_m_.z();
   Fix fix;
   BodyObservations frame;
-  const FixStatus seen = sight_from_body(detections, 0, frame, fix.unknown_lamps);
+  const FixStatus seen = sight_from_body(detections, 0, frame);
+  fix.unknown_lamps = frame.unknown_lamps;
   if (seen != FixStatus::ok) return without_fix(seen, fix.unknown_lamps);
   frame.num_current = frame.size;
   for (const EarlierFrame& before : earlier) {
-    int unknown_lamps = 0;
-    const FixStatus status =
-        sight_from_body(before.detections, -before.before_s, frame, unknown_lamps);
+    const FixStatus status = sight_from_body(before.detections, -before.before_s, frame);
     if (status != FixStatus::ok) return without_fix(status, fix.unknown_lamps);
   }
   if (frame.num_current < 2) return std::nullopt;
@@ -521,8 +519,6 @@ Fix Positioner::Impl::locate(std::span<const Detection> detections, const Sensor
     fix.estimate = {solution.pose, solution.covariance};
     fix.residual_px = solution.residual_px;
     fix.chi_squared = solution.chi_squared;
-    if (sensors.inclination_sigma_rad > 0)
-      d_pose_d_inclination = compute_rotation_jacobian(frame.span(), solution) * lean.error_axes;
   } else if (frame.size == 1 && sensors.height_and_yaw) {
     const auto readout = motion_at_readout(detections, frame.ids.front(), sensors);
     if (!readout) return without_fix(FixStatus::row_time_unknown, frame.unknown_lamps);

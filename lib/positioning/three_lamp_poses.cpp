@@ -22,7 +22,7 @@ double steep_root(double b, double c, double d) {
   if (slope < 0) {
     // Outside the two extrema, on the side of the root, the cubic is monotone.
     x += (value > 0 ? -1 : 1) * 2 * std::sqrt(-slope / 3);
-  } else if (value != 0) {
+  } else {
     // The root of t^3 + slope t + value is between 0 and both of these.
     const double by_cube = std::cbrt(std::abs(value));
     x += (value > 0 ? -1 : 1) * (slope > 0 ? std::min(by_cube, std::abs(value) / slope) : by_cube);
@@ -135,7 +135,7 @@ ThreeLampPoses compute_three_lamp_poses(const std::array<Eigen::Vector3d, 3>& po
   std::array<Eigen::Vector3d, 2> lines;
   const int count = factor_conic(first + x * second, lines);
   const Eigen::Matrix3d world_frame = compute_point_frame(points_m[0], points_m[1], points_m[2]);
-  if (!(world_frame.col(2).squaredNorm() > 0.5)) return found;  // on one line
+  if (!(world_frame.col(2).squaredNorm() > 0)) return found;  // on one line
   for (int i = 0; i < count; ++i) {
     // Two directions span the line; the conic along a + s b is a quadratic in s.
     const Eigen::Vector3d line = lines[static_cast<std::size_t>(i)].normalized();
@@ -161,7 +161,7 @@ ThreeLampPoses compute_three_lamp_poses(const std::array<Eigen::Vector3d, 3>& po
       const std::array<Eigen::Vector3d, 3> seen{distances[0] * rays[0], distances[1] * rays[1],
                                                 distances[2] * rays[2]};
       const Eigen::Matrix3d seen_frame = compute_point_frame(seen[0], seen[1], seen[2]);
-      if (!(seen_frame.col(2).squaredNorm() > 0.5)) continue;
+      if (!(seen_frame.col(2).squaredNorm() > 0)) continue;
       FreePose pose;
       pose.camera_from_world = seen_frame * world_frame.transpose();
       pose.position_m = points_m[0] - pose.camera_from_world.transpose() * seen[0];

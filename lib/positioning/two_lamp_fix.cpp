@@ -19,7 +19,6 @@ Roots solve_quadratic(double a, double b, double c) {
   const double discriminant = b * b - a * c;
   if (!(discriminant >= 0)) return {};
   const double q = -(b + std::copysign(std::sqrt(discriminant), b));
-  if (q == 0) return {1, {0}};
   if (discriminant == 0) return {1, {q / a}};
   return {2, {q / a, c / q}};
 }
