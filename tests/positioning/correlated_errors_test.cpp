@@ -6,8 +6,12 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/QR>
+#include <cmath>
 #include <tuple>
+#include <vector>
 
+#include "geometry/statistical_bounds.h"
 #include "positioning/positioner.h"
 #include "positioning/stated_rig.h"
 #include "rig/calibration_error.h"
@@ -191,6 +195,27 @@ TEST_F(CommonErrorsTest, MatchesWithAndWithoutRowsOfLamps) {
   EXPECT_TRUE(small.stated() && small.only(CommonErrorSource::lamps).stated());
 }
 
+/// The offset depends on a lamp of the adjustment, whose error is not in the survey.
+TEST_F(CommonErrorsTest, PropagatesAdjustedLampToOffset) {
+  rig.adjust(1);
+  Eigen::Matrix<double, 2, 3> by_position;
+  by_position << 0.5, -0.1, 0.2, 0.1, 0.6, -0.3;
+  Dispersion& dispersion = rig.calibration.dispersion.emplace();
+  dispersion = {{0.4, -0.3}, 0.001, {0, 0}, 12};
+  dispersion.by_zenith = Eigen::Matrix2d::Zero();
+  dispersion.by_lamps = {{2, rig.map.lamps[1].position_m, 0.001, by_position}};
+  const CommonErrors errors(rig.map.lamps, rig.calibration, Correction::all);
+  const Eigen::Matrix3d lamp = rig.calibration.adjustment->covariance.block<3, 3>(19, 19);
+  ASSERT_EQ(errors.joint().rows(), 12 + 2 + 2 + 24);
+  const Eigen::Matrix2d offset = errors.joint().block<2, 2>(14, 14);
+  const Eigen::Matrix<double, 2, 3> mixed = errors.joint().block<2, 3>(14, 19);
+  EXPECT_THAT(offset, IsNear((by_position * lamp * by_position.transpose()).eval(), 1e-18));
+  EXPECT_THAT(mixed, IsNear((by_position * lamp).eval(), 1e-18));
+  EXPECT_EQ(errors.lamps_elsewhere(), 0);
+  rig.map.lamps[1].position_m.x() += 1e-5;
+  EXPECT_EQ(CommonErrors(rig.map.lamps, rig.calibration, Correction::all).lamps_elsewhere(), 1);
+}
+
 TEST_F(CommonErrorsTest, RejectsLampThatNoErrorExplains) {
   rig.adjust(0.3);
   Random random(8);
@@ -219,6 +244,173 @@ TEST_F(CommonErrorsTest, KeepsLampsThatSurveyErrorsExplain) {
     ASSERT_TRUE(fix.ok());
     EXPECT_EQ(fix.rejected_lamps, 0);
   }
+}
+
+/// Four lamps or more seen with z residuals of chosen size, noise of 0.2 px and common errors.
+class FindOutlierLamps : public testing::Test {
+ protected:
+  static constexpr double kFocal_px = 500, kSigma_px = 0.2, kCommonSd = 3e-4;
+  const LeastSquaresFix fix{{{0.1, -0.05, 0}, 0.4}, Matrix4::Identity(), 0, 0};
+  std::vector<Sighting> sightings;
+  std::vector<Matrix2> common;
+
+  /// Sets exact observations of the first lamps.
+  void see_lamps(std::size_t count) {
+    const LampMap map = synthetic_lamps();
+    sightings.clear();
+    for (std::size_t i = 0; i < count; ++i) {
+      const Eigen::Vector3d& lamp_m = map.lamps[i].position_m;
+      sightings.push_back({lamp_m, predict_z(LevelPose(fix.pose), lamp_m),
+                           Matrix2::Identity() * kFocal_px, kSigma_px});
+    }
+    common.assign(count, kCommonSd * kCommonSd * Matrix2::Identity());
+  }
+  OutlierLamps find() const { return find_outlier_lamps(sightings, common, fix); }
+  /// Computes chi-squared of the linear least-squares fit by an orthogonal projection.
+  double compute_chi_squared() const {
+    const double sd = std::hypot(kSigma_px / kFocal_px, kCommonSd);
+    Eigen::MatrixXd jacobian(2 * std::ssize(sightings), 4);
+    Eigen::VectorXd residuals(jacobian.rows());
+    for (std::size_t i = 0; i < sightings.size(); ++i) {
+      const Prediction prediction = predict(LevelPose(fix.pose), sightings[i].lamp_m);
+      const auto row = 2 * static_cast<Eigen::Index>(i);
+      jacobian.middleRows<2>(row) = prediction.d_z_d_state / sd;
+      residuals.segment<2>(row) = (sightings[i].z - prediction.z) / sd;
+    }
+    return (residuals - jacobian * jacobian.householderQr().solve(residuals)).squaredNorm();
+  }
+  /// Displaces a lamp until chi-squared is `factor` times its bound.
+  void displace(std::size_t lamp, double factor) {
+    const Eigen::Vector2d exact = sightings[lamp].z, direction(0.8, -0.6);
+    sightings[lamp].z = exact + direction;
+    const double bound =
+        chi_squared_bound(kSigmasOfOneInTenThousand, 2 * static_cast<double>(sightings.size()) - 4);
+    sightings[lamp].z = exact + std::sqrt(factor * bound / compute_chi_squared()) * direction;
+  }
+};
+
+TEST_F(FindOutlierLamps, RejectsLampWhenChiSquaredExceedsBound) {
+  for (const std::size_t count : {4u, 5u, 8u}) {
+    SCOPED_TRACE(count);
+    see_lamps(count);
+    displace(2, 0.98);
+    EXPECT_EQ(find().count, 0);
+    see_lamps(count);
+    displace(2, 1.02);
+    const OutlierLamps found = find();
+    ASSERT_EQ(found.count, 1);
+    EXPECT_EQ(found.lamps[0], 2);
+  }
+}
+
+TEST_F(FindOutlierLamps, ReturnsNoneWithoutMajorityOfThree) {
+  for (const std::size_t count : {3u, 4u}) {
+    see_lamps(count);
+    sightings[0].z += Eigen::Vector2d(0.02, 0);
+    sightings[1].z += Eigen::Vector2d(0, 0.03);
+    EXPECT_EQ(find().count, 0) << count;
+  }
+}
+
+TEST_F(FindOutlierLamps, RejectsMinorityLargestFirst) {
+  see_lamps(8);
+  sightings[5].z += Eigen::Vector2d(0.02, 0);
+  sightings[2].z += Eigen::Vector2d(0, 0.05);
+  const OutlierLamps found = find();
+  ASSERT_EQ(found.count, 2);
+  EXPECT_EQ(found.lamps[0], 2);
+  EXPECT_EQ(found.lamps[1], 5);
+}
+
+TEST_F(CommonErrorsTest, RejectsOneLampOfFour) {
+  rig.adjust(0.3);
+  SyntheticRig room = rig;
+  room.map.lamps[1].position_m.x() += 0.03;
+  auto detections = seen_from(room, 0.03);
+  ASSERT_EQ(detections.size(), 8);
+  detections.resize(4);
+  const Fix fix = Positioner(rig.map, rig.calibration).locate(detections);
+  ASSERT_TRUE(fix.ok());
+  EXPECT_EQ(fix.rejected_lamps, 1);
+  EXPECT_EQ(fix.rejected_ids[0], 2);
+}
+
+/// Sequential steps; all covariances are combined by hand.
+class StepCovariance : public testing::Test {
+ protected:
+  StatedRig rig;
+  Calibration& calibration = rig.calibration;
+
+  void SetUp() override { rig.calibrate_in_a_row(); }
+  Eigen::Matrix2d per_focal(const Matrix2& covariance_px) const {
+    const Eigen::Vector2d inverse = calibration.camera.focal_px().cwiseInverse();
+    return inverse.asDiagonal() * covariance_px * inverse.asDiagonal();
+  }
+  MatrixX lens() const { return *calibration.intrinsics_report->covariance; }
+  static void expect_equal(const std::optional<Matrix2>& found, const Eigen::Matrix2d& expected) {
+    ASSERT_TRUE(found);
+    EXPECT_THAT(*found, IsNear(expected, 1e-12 * expected.norm()));
+  }
+};
+
+class ComputeZenithCovariance : public StepCovariance {};
+class ComputeOffsetCovariance : public StepCovariance {};
+
+TEST_F(ComputeZenithCovariance, SumsCapturesAndLens) {
+  const RotationCenter& center = *calibration.rotation_center;
+  const MatrixX by_lens = *center.by_intrinsics;
+  expect_equal(compute_zenith_covariance(calibration),
+               per_focal(*center.covariance) + by_lens * lens() * by_lens.transpose());
+  calibration.intrinsics_report.reset();
+  expect_equal(compute_zenith_covariance(calibration), per_focal(*center.covariance));
+  rig.adjust(1);
+  expect_equal(compute_zenith_covariance(calibration),
+               calibration.adjustment->covariance.block<2, 2>(12, 12));
+}
+
+TEST_F(ComputeZenithCovariance, ReturnsNulloptWhenPartIsMissing) {
+  calibration.rotation_center->by_intrinsics.reset();
+  EXPECT_FALSE(compute_zenith_covariance(calibration));
+  SetUp();
+  calibration.rotation_center->covariance.reset();
+  EXPECT_FALSE(compute_zenith_covariance(calibration));
+}
+
+TEST_F(ComputeOffsetCovariance, SumsCapturesLensZenithAndLamps) {
+  Dispersion& dispersion = *calibration.dispersion;
+  Eigen::Matrix<double, 2, 3> by_position;
+  by_position << 0.5, -0.1, 0.2, 0.1, 0.6, -0.3;
+  dispersion.by_lamps = {{1, rig.map.lamps[0].position_m, 0.002, by_position}};
+  const Eigen::Vector2d focal_px = calibration.camera.focal_px();
+  const MatrixX by_lens = *dispersion.by_intrinsics +
+                          *dispersion.by_zenith * *calibration.rotation_center->by_intrinsics;
+  const Eigen::Matrix2d expected =
+      per_focal(*dispersion.covariance) + by_lens * lens() * by_lens.transpose() +
+      *dispersion.by_zenith * per_focal(*calibration.rotation_center->covariance) *
+          dispersion.by_zenith->transpose() +
+      0.002 * 0.002 * by_position * by_position.transpose();
+  expect_equal(compute_offset_covariance(calibration),
+               focal_px.asDiagonal() * expected * focal_px.asDiagonal());
+}
+
+TEST_F(ComputeOffsetCovariance, ReturnsNulloptWhenPartIsMissing) {
+  EXPECT_TRUE(compute_offset_covariance(calibration));
+  calibration.dispersion->by_zenith.reset();
+  EXPECT_FALSE(compute_offset_covariance(calibration));
+  SetUp();
+  calibration.dispersion->by_intrinsics.reset();
+  EXPECT_FALSE(compute_offset_covariance(calibration));
+  SetUp();
+  calibration.dispersion->covariance.reset();
+  EXPECT_FALSE(compute_offset_covariance(calibration));
+  SetUp();
+  calibration.rotation_center->covariance.reset();
+  EXPECT_FALSE(compute_offset_covariance(calibration));
+  calibration.rotation_center.reset();
+  calibration.intrinsics_report.reset();
+  calibration.dispersion->by_intrinsics.reset();
+  const auto alone = compute_offset_covariance(calibration);
+  expect_equal(alone, *calibration.dispersion->covariance);
 }
 
 }  // namespace

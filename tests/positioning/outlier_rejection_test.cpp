@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cmath>
+#include <utility>
 
 #include "support/matchers.h"
 
@@ -43,6 +45,31 @@ TEST(FindConsensus, ReturnsNulloptWithoutMajorityOfThree) {
   ASSERT_TRUE(consensus);
   EXPECT_EQ(consensus->agreeing.to_ulong(), 0b11100u);
   EXPECT_FALSE(find_consensus(std::span(seen).first(4), 0.01)) << "two of four";
+}
+
+TEST(EstimatePoseChecked, ReturnsDegenerateWhenHeightSdExceedsHeight) {
+  auto seen = sightings();
+  for (Sighting& sighting : seen) sighting.lamp_m.z() += 2;  // all of it 2 m higher
+  const ConsistentFix fix = estimate_pose_checked(seen, 1);
+  ASSERT_EQ(fix.status, FixStatus::ok);
+  EXPECT_NEAR(fix.fix.pose.position_m.z(), 2, 1e-9);
+  const double height_m = seen.front().lamp_m.z() - 2;
+  const double height_sd_m = std::sqrt(fix.fix.covariance(2, 2));
+  for (const auto& [factor, status] :
+       {std::pair(0.98, FixStatus::ok), {1.02, FixStatus::degenerate}}) {
+    auto noisy = seen;
+    for (Sighting& sighting : noisy) sighting.sigma_px *= factor * height_m / height_sd_m;
+    EXPECT_EQ(estimate_pose_checked(noisy, 1).status, status) << factor;
+  }
+}
+
+/// The first full step from far below leads above the lamps, and is halved.
+TEST(EstimatePoseLeastSquares, ConvergesFromFarBelowLamps) {
+  const auto seen = sightings();
+  const auto fix = estimate_pose_least_squares(seen, {{0, 0, -5}, 0.3});
+  ASSERT_TRUE(fix);
+  EXPECT_THAT(fix->pose.position_m, IsNear(kTruth.position_m, 1e-9));
+  EXPECT_NEAR(fix->pose.yaw_rad, kTruth.yaw_rad, 1e-9);
 }
 
 }  // namespace

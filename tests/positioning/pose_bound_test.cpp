@@ -42,6 +42,19 @@ std::optional<Matrix4> compute_limit(const BodyRig& rig, const Sensors& sensors)
   return exact.noise_covariance;
 }
 
+TEST(MayMove, ReturnsTrueForAnyFreeVelocityOrYawRate) {
+  BodyPrior prior;
+  EXPECT_FALSE(may_move(prior) || is_free(prior));
+  prior.velocity_sd_m_per_s = 0.01;
+  EXPECT_TRUE(may_move(prior) && is_free(prior));
+  prior.velocity_sd_m_per_s = 0;
+  prior.yaw_rate_sd_rad_per_s = 0.01;
+  EXPECT_TRUE(may_move(prior) && is_free(prior));
+  prior.yaw_rate_sd_rad_per_s = 0;
+  prior.inclination_sd_rad = 0.01;
+  EXPECT_TRUE(!may_move(prior) && is_free(prior));
+}
+
 /// Four or five lamps of a ceiling, tilt of up to 80 degrees known from the image alone: errors at
 /// most 1.5 times the bound of six states.
 TEST(BodyLimit, FixErrorsStayNearBoundForAnyTilt) {

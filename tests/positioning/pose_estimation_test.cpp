@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <vector>
 
 #include "positioning/three_lamp_poses.h"
 #include "support/body_rig.h"
@@ -217,6 +218,31 @@ TEST(WhitenedPixelFromRay, MatchesLens) {
   }
 }
 
+TEST(ComputeChiSquared, SumsPixelsAndPriors) {
+  constexpr double focal_px = 500, sigma_px = 0.5;
+  Eigen::Matrix<double, 3, 2> d_ray_d_pixel = Eigen::Matrix<double, 3, 2>::Zero();
+  d_ray_d_pixel.topRows<2>().diagonal().setConstant(1 / focal_px);
+  const Eigen::Vector3d axis(0, 0, 1);
+  const auto whitened = whitened_pixel_from_ray(axis, d_ray_d_pixel, sigma_px);
+  ASSERT_TRUE(whitened);
+  // The lamp is 2 m above the camera, and 25 px and 50 px away from the optical axis.
+  std::vector<BodyObservation> seen{{{0.1, 0.2, 2.5}, axis, *whitened, sigma_px, 0}};
+  const Eigen::Vector3d arm_m(0, 0, 0.5);
+  BodyPrior prior;
+  EXPECT_NEAR(compute_chi_squared(seen, arm_m, prior, {}).value_or(0), 50 * 50 + 100 * 100, 1e-6);
+  prior.height = KnownHeight{0.1, 0.05};
+  prior.mean.velocity_m_per_s = {0.3, 0};
+  prior.velocity_sd_m_per_s = 0.1;
+  prior.mean.yaw_rate_rad_per_s = 0.8;
+  prior.yaw_rate_sd_rad_per_s = 0.2;
+  prior.mean.inclination = {0, -0.5};
+  prior.inclination_sd_rad = 0.1;
+  EXPECT_NEAR(compute_chi_squared(seen, arm_m, prior, {}).value_or(0),
+              50 * 50 + 100 * 100 + 2 * 2 + 3 * 3 + 4 * 4 + 5 * 5, 1e-6);
+  seen.push_back({{0.1, 0.2, -1}, axis, *whitened, sigma_px, 0});
+  EXPECT_FALSE(compute_chi_squared(seen, arm_m, prior, {})) << "the second lamp is behind";
+}
+
 TEST(ComputeThreeLampPoses, ContainsTruth) {
   Random random(6);
   int exact = 0;
@@ -250,6 +276,27 @@ TEST(ComputeThreeLampPoses, ReturnsNoneForCollinearLamps) {
   std::array<Eigen::Vector3d, 3> rays;
   for (std::size_t i = 0; i < 3; ++i) rays[i] = lamps_m[i].normalized();
   EXPECT_EQ(compute_three_lamp_poses(lamps_m, rays).count, 0);
+}
+
+/// Noise may remove two nearly equal solutions; which of them are kept does not depend on the unit
+/// of length.
+TEST(ComputeThreeLampPoses, ReturnsScaledPosesForScaledLamps) {
+  Random random(9);
+  int poses = 0;
+  for (int i = 0; i < 2000; ++i) {
+    std::array<Eigen::Vector3d, 3> lamps_m, lamps_cm, rays;
+    for (std::size_t k = 0; k < 3; ++k) {
+      lamps_m[k] = {random.uniform(-2, 2), random.uniform(-2, 2), random.uniform(1.7, 2.3)};
+      lamps_cm[k] = 100 * lamps_m[k];
+      rays[k] = lamps_m[k] + 0.05 * Eigen::Vector3d(random.normal(), random.normal(), 0);
+      rays[k].normalize();
+    }
+    const ThreeLampPoses found = compute_three_lamp_poses(lamps_m, rays);
+    const ThreeLampPoses scaled = compute_three_lamp_poses(lamps_cm, rays);
+    ASSERT_EQ(scaled.count, found.count) << i;
+    poses += found.count;
+  }
+  EXPECT_GT(poses, 2000);
 }
 
 /// A lamp with equal distances and angles to both others: one of the conics is a pair of lines.

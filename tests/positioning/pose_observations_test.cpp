@@ -188,6 +188,25 @@ TEST_F(PositionerLocateBody, DetectsMirroredMap) {
   EXPECT_EQ(locate(in_hand, leaning()).status, FixStatus::mirrored_map);
 }
 
+/// In a room and in a hall of ten times its size.
+TEST_F(PositionerLocateBody, RejectsTwoSwappedLamps) {
+  for (const double scale : {1, 10}) {
+    for (Lamp& lamp : rig.map.lamps) lamp.position_m *= scale;
+    rig.body.pose.position_m *= scale;
+    for (std::size_t a = 0; a < 8; ++a) {
+      for (std::size_t b = a + 1; b < 8; ++b) {
+        auto detections = seen();
+        ASSERT_EQ(detections.size(), 8);
+        std::swap(detections[a].lamp, detections[b].lamp);
+        SCOPED_TRACE(testing::Message() << a << " and " << b << ", scale " << scale);
+        const Fix fix = locate(detections, driving());
+        expect_truth(fix);
+        EXPECT_EQ(fix.rejected_lamps, 2);
+      }
+    }
+  }
+}
+
 /// A lamp 36 mm away from its position in the map.
 TEST_F(PositionerLocateBody, RejectsMovedLamp) {
   for (const bool leans : {false, true}) {
@@ -210,6 +229,25 @@ TEST_F(PositionerLocateBody, ReturnsInconsistentForImpossibleMotion) {
   EXPECT_EQ(locate(seen(), slow).status, FixStatus::inconsistent);
 }
 
+/// The lamps determine each state to a few percent of its prior.
+TEST_F(PositionerLocateBody, ReturnsInconsistentBeyondFiveSigmasOfPrior) {
+  Sensors known;
+  known.motion = KnownMotion{{0, 0}, 0, 0.4, 0.4};
+  known.inclination_sigma_rad = 0.02;
+  for (const auto& [sigmas, status] :
+       {std::pair(4.7, FixStatus::ok), {5.4, FixStatus::inconsistent}}) {
+    for (const int which : {0, 1, 2}) {
+      stand();
+      BodyMotion& motion = rig.body.motion;
+      motion.inclination = {0, 0};
+      if (which == 0) motion.velocity_m_per_s = {0.8 * sigmas * 0.4, -0.6 * sigmas * 0.4};
+      if (which == 1) motion.yaw_rate_rad_per_s = sigmas * 0.4;
+      if (which == 2) motion.inclination = {0.6 * sigmas * 0.02, 0.8 * sigmas * 0.02};
+      EXPECT_EQ(locate(seen_from(rig, 0.01), known).status, status) << which << ", " << sigmas;
+    }
+  }
+}
+
 /// A tilted camera with a level prior is inconsistent; with free roll and pitch it is located.
 TEST_F(PositionerLocateBody, ReturnsInconsistentForUnmodeledTilt) {
   rig.body.motion = {{0, 0}, 0, {0.7, -0.5}};
@@ -227,6 +265,68 @@ TEST_F(PositionerLocateBody, MatchesTruthInNationalCoordinates) {
   Sensors sensors = held();
   sensors.height = KnownHeight{origin_m.z(), 0.1};
   expect_truth(locate(seen(), sensors));
+}
+
+/// Noise of 2.5 times the reported one: a lamp is rejected only if that explains the residuals a
+/// hundred times better.
+TEST_F(PositionerLocateBody, KeepsMovedLampThatExplainsLittle) {
+  for (const auto& [moved_px, rejected] : {std::pair(7.0, 0), {25.0, 1}}) {
+    auto detections = with_noise(seen_from(rig, 2.5 * kBodyNoise_px), random);
+    ASSERT_EQ(detections.size(), 8);
+    for (Detection& detection : detections) detection.sigma_px = kBodyNoise_px;
+    detections[5].pixel.x() += moved_px;
+    const Fix fix = locate(detections, driving());
+    ASSERT_TRUE(fix.ok()) << to_string(fix.status);
+    EXPECT_GT(fix.chi_squared, (rejected == 0 ? 100 : 2) * fix.redundancy);
+    EXPECT_EQ(fix.rejected_lamps, rejected) << moved_px << " px";
+  }
+}
+
+/// Three lamps determine position and tilt exactly: without any of four the others agree.
+TEST_F(PositionerLocateBody, KeepsAllOfFourLampsWithFreeTilt) {
+  stand();
+  for (std::size_t moved = 0; moved < 4; ++moved) {
+    auto detections = seen_from(rig, kBodyNoise_px);
+    ASSERT_EQ(detections.size(), 8);
+    detections.resize(4);
+    detections[moved].pixel += Eigen::Vector2d(6, 4);
+    const Fix fix = locate(detections, leaning());
+    ASSERT_TRUE(fix.ok()) << to_string(fix.status);
+    EXPECT_GT(fix.chi_squared, 25 * fix.redundancy);
+    EXPECT_EQ(fix.rejected_lamps, 0) << moved;
+  }
+}
+
+TEST_F(PositionerLocateBody, CountsLampsAndSightingsOfEarlierFrames) {
+  stand();
+  auto before = seen_from(rig, kBodyNoise_px);
+  ASSERT_EQ(before.size(), 8);
+  auto now = before;
+  now.resize(5);
+  now[4].lamp = 77;
+  before[0].lamp = 78;
+  const EarlierFrame earlier{before, 0.05};
+  const Fix fix = rig.positioner().locate(now, driving(), {&earlier, 1});
+  ASSERT_TRUE(fix.ok());
+  EXPECT_EQ(fix.lamps, 4);
+  EXPECT_EQ(fix.sightings, 4 + 7);
+  EXPECT_EQ(fix.unknown_lamps, 1);
+  EXPECT_NEAR(fix.redundancy, 2 * 11 - 7, 0.1);
+  EXPECT_THAT(fix.estimate.pose.position_m, IsNear(rig.body.pose.position_m, 1e-8));
+}
+
+TEST_F(PositionerLocateBody, MatchesTruthOfMovingBodyWithEarlierFrame) {
+  const double before_s = 0.05;
+  const auto now = seen_from(rig, kBodyNoise_px), before = seen_from(rig, kBodyNoise_px, -before_s);
+  ASSERT_TRUE(now.size() == 8 && before.size() == 8);
+  const EarlierFrame earlier{before, before_s};
+  Sensors sensors;
+  sensors.motion = KnownMotion{{0, 0}, 0, 1e3, 1e3};
+  const Fix fix = rig.positioner().locate(now, sensors, {&earlier, 1});
+  ASSERT_TRUE(fix.ok()) << to_string(fix.status);
+  EXPECT_THAT(fix.estimate.pose.position_m, IsNear(rig.body.pose.position_m, 1e-7));
+  ASSERT_TRUE(fix.body);
+  EXPECT_NEAR(fix.body->yaw_rate_rad_per_s, 0.5, 1e-5);
 }
 
 }  // namespace

@@ -65,6 +65,28 @@ TEST_F(PositionerOutlierRejection, RejectsTwoSwappedLampsOfFiveOrMore) {
   }
 }
 
+/// The fix lists 32 ids of rejected lamps.
+TEST_F(PositionerOutlierRejection, ListsFirstIdsOfManyRejectedLamps) {
+  std::vector<Eigen::Vector3d> positions_m;
+  for (int i = 0; i < 100; ++i) {
+    positions_m.emplace_back(0.15 * (i % 10) - 0.7, 0.1 * (i / 10) - 0.5, 1.6);
+  }
+  rig.map = make_lamp_map(positions_m);
+  for (const int wrong : {1, 40}) {
+    auto detections = seen(100);
+    for (int i = 0; i < wrong; ++i) {
+      detections[static_cast<std::size_t>(2 * i)].pixel += Eigen::Vector2d(60 + 3 * i, 40 - 2 * i);
+    }
+    const Fix fix = locate(detections);
+    expect_truth(fix);
+    EXPECT_EQ(fix.lamps, 100 - wrong);
+    EXPECT_EQ(fix.rejected_lamps, wrong);
+    for (int i = 0; i < std::ssize(fix.rejected_ids); ++i) {
+      EXPECT_EQ(fix.rejected_ids[static_cast<std::size_t>(i)], i < wrong ? 2 * i + 1 : 0);
+    }
+  }
+}
+
 TEST_F(PositionerOutlierRejection, RejectsOutlierWithManyHeightsAndTilt) {
   for (std::size_t i = 0; i < rig.map.lamps.size(); ++i) {
     rig.map.lamps[i].position_m.z() += i % 2 ? 0.3 : -0.1;
@@ -105,6 +127,24 @@ TEST_F(PositionerOutlierRejection, RejectsSmallDisplacementOnlyWhenSigmaIsReport
       EXPECT_EQ(locate(detections).rejected_lamps, 0);
     }
   }
+}
+
+/// The limit of the residuals follows from the nearest neighbor of each lamp.
+TEST_F(PositionerOutlierRejection, RejectsLampTakenForItsNeighbor) {
+  rig.map = make_lamp_map({{-0.7, -0.4, 1.6},
+                           {0.7, -0.4, 1.6},
+                           {0.7, 0.4, 1.6},
+                           {-0.7, 0.4, 1.6},
+                           {0, 0.1, 1.6},
+                           {0.01, 0.15, 1.6}});
+  auto detections = seen(5);
+  for (Detection& detection : detections) detection.sigma_px.reset();
+  EXPECT_EQ(locate(detections).rejected_lamps, 0);
+  detections[4].lamp = 6;
+  const Fix fix = locate(detections);
+  expect_truth(fix);
+  EXPECT_EQ(fix.rejected_lamps, 1);
+  EXPECT_EQ(fix.rejected_ids[0], 6);
 }
 
 /// In a grid of lamps scale and rotation can hide a wrong identity.

@@ -37,8 +37,11 @@ TEST(SumResiduals, IgnoresFixesWithoutRedundancy) {
 }
 
 TEST(SumResiduals, ExcludesFixWithWrongLamp) {
-  const std::vector<Fix> fixes{fix_with(5, 0, 4), fix_with(4, 0, 4), fix_with(3000, 0, 4)};
-  EXPECT_EQ(sum_squared_residuals(fixes).chi_squared, 9);
+  // The median of 1, 1.25 and the third one's ratio is 1.25, and 25 times that is 31.25.
+  for (const auto& [chi_squared, sum] : {std::pair(124.0, 133.0), {126.0, 9.0}, {3000.0, 9.0}}) {
+    const std::vector<Fix> fixes{fix_with(5, 0, 4), fix_with(4, 0, 4), fix_with(chi_squared, 0, 4)};
+    EXPECT_EQ(sum_squared_residuals(fixes).chi_squared, sum);
+  }
 }
 
 TEST(EstimateNoiseFactor, SubtractsCommonErrors) {

@@ -8,6 +8,8 @@
 
 #include <Eigen/Cholesky>
 #include <numeric>
+#include <span>
+#include <vector>
 
 #include "geometry/symmetric.h"
 #include "positioning/floor_limits.h"
@@ -228,6 +230,26 @@ TEST(UnitErrors, StatedReportsKnownParts) {
   rig.map.lamps[3].sd_m.reset();
   rig.calibration.dispersion->covariance.reset();
   EXPECT_FALSE(stated(CommonErrorSource::lamps) || stated(CommonErrorSource::offset));
+}
+
+TEST(UnitErrors, BudgetReturnsNulloptForTooFewOrTooManyLamps) {
+  StatedRig rig;
+  std::vector<Eigen::Vector3d> positions_m;
+  for (int i = 0; i < 300; ++i) positions_m.emplace_back(0.01 * (i % 20), 0.01 * (i / 20), 1.6);
+  rig.map = make_lamp_map(positions_m);
+  rig.calibration.camera.row_time_s = 55e-6;
+  rig.calibration.camera.readout = Readout::rows;
+  BodyPrior prior;
+  prior.velocity_sd_m_per_s = 1;
+  const UnitErrors unit(rig.map, rig.calibration);
+  std::vector<std::size_t> lamps(300);
+  std::iota(lamps.begin(), lamps.end(), 0U);
+  for (const std::size_t count : {1u, 2u, 256u, 257u, 300u}) {
+    const std::span<const std::size_t> some(lamps.data(), count);
+    const bool possible = count == 2 || count == 256;
+    EXPECT_EQ(unit.budget(rig.camera, some, kNoise_px).has_value(), possible) << count;
+    EXPECT_EQ(unit.budget(rig.camera, some, kNoise_px, prior).has_value(), possible) << count;
+  }
 }
 
 TEST(UnitErrors, LampsSeenFromAppliesTilt) {

@@ -128,6 +128,7 @@ TEST_F(CInterface, LocateMatchesCppForMovingTiltedBody) {
   EXPECT_EQ(c.roll_rad, fix.body->inclination.roll_rad);
   EXPECT_EQ(c.pitch_rad, fix.body->inclination.pitch_rad);
   EXPECT_EQ(c.velocity_m_per_s[1], fix.body->velocity_m_per_s.y());
+  EXPECT_EQ(c.yaw_rate_rad_per_s, fix.body->yaw_rate_rad_per_s);
   const Covariance6 covariance(c.covariance);
   EXPECT_GT(covariance(3, 3), 0);
   EXPECT_EQ(covariance(0, 3), fix.body->covariance(0, kBodyRoll));
@@ -140,6 +141,28 @@ TEST_F(CInterface, LocateMatchesCppForMovingTiltedBody) {
   EXPECT_EQ(noise(4, 4), fix.body->noise_covariance(kBodyPitch, kBodyPitch));
   EXPECT_LT(noise(4, 4), covariance(4, 4));
   EXPECT_LT(fix.body->noise_covariance(kBodyVelocity, kBodyVelocity), c.velocity_covariance[0]);
+}
+
+TEST_F(CInterface, LocateAppliesOptions) {
+  rig.body.motion = {};
+  seen = seen_from(rig, 0.1);
+  seen[1].pixel.x() += 4;
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    given[i] = {seen[i].lamp, seen[i].pixel.x(), seen[i].pixel.y(), 0};
+    seen[i].sigma_px.reset();
+  }
+  vlp_options options = {};
+  options.unstated_sigma_px = 3;
+  const vlp_fix fix = located(open(&options).get(), nullptr);
+  PositionerOptions same;
+  same.unstated_sigma_px = 3;
+  expect_same(fix, Positioner(rig.map, rig.calibration, same).locate(seen));
+  EXPECT_EQ(fix.rejected_lamps, 0);
+  options.max_residual_share = 0.003;
+  const vlp_fix strict = located(open(&options).get(), nullptr);
+  ASSERT_EQ(strict.status, VLP_OK);
+  EXPECT_EQ(strict.rejected_lamps, 1);
+  EXPECT_EQ(strict.rejected_ids[0], seen[1].lamp);
 }
 
 TEST_F(CInterface, LocateMatchesCppForOneLampWithAllSensors) {
@@ -167,6 +190,7 @@ TEST_F(CInterface, LocateMatchesCppForOneLampWithAllSensors) {
   EXPECT_DOUBLE_EQ(Covariance6(fix.covariance)(4, 4), 1e-4);
   EXPECT_DOUBLE_EQ(fix.velocity_m_per_s[0], 2 * std::cos(0.4));
   EXPECT_DOUBLE_EQ(fix.velocity_m_per_s[1], 2 * std::sin(0.4));
+  EXPECT_EQ(fix.yaw_rate_rad_per_s, 0.1);
   EXPECT_DOUBLE_EQ(fix.velocity_covariance[8], 0.04);
 }
 
