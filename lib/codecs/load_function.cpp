@@ -8,8 +8,9 @@
 
 namespace vlp {
 
-void* load_function(const char* library, const char* function, const std::string& problem) {
-  void* const loaded = ::dlopen(library, RTLD_LAZY | RTLD_LOCAL);
+void* load_function(const char* library, const char* function, const std::string& problem,
+                    int binding) {
+  void* const loaded = ::dlopen(library, binding | RTLD_LOCAL);
   if (loaded == nullptr) {
     throw std::runtime_error(problem + ": " + ::dlerror() + ": install the programs again");
   }

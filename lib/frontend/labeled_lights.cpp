@@ -65,6 +65,11 @@ std::vector<LightPeriod> collect_periods(const std::vector<Observation>& images,
   };
   for (std::size_t i = 0; i < images.size(); ++i) {
     const Observation& image = images[i];
+    // Copies and images of other cameras are no evidence; other rejected images may still be.
+    if (image.rejection && (image.rejection->reason == RejectionReason::same_image ||
+                            image.rejection->reason == RejectionReason::used_elsewhere)) {
+      continue;
+    }
     if (labels.empty()) {
       for (const Light& light : image.lights) {
         if (may_be_lamp(light, image.size_px)) add(i, light, std::nullopt);

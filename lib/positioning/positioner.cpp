@@ -277,7 +277,8 @@ std::size_t Positioner::Impl::find_index(int id) const {
 void Positioner::Impl::reject_outlier_lamps(FrameObservations& frame,
                                             const Eigen::Matrix3d& level_from_base,
                                             ConsistentFix& solution) const {
-  if (solution.status != FixStatus::ok) return;
+  constexpr std::size_t min_lamps = 4;  // fewer identify no outlier
+  if (solution.status != FixStatus::ok || frame.size < min_lamps) return;
   // If the noise alone explains the residuals, no other error is needed.
   if (solution.fix.chi_squared <= static_cast<double>(2 * frame.size - 4)) return;
   const LevelPose pose(solution.fix.pose);

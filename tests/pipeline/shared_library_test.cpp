@@ -76,8 +76,8 @@ TEST(SharedLibrary, ExportsOnlyDeclaredSymbols) {
     functions.insert(symbol.substr(0, symbol.find('(')));
   }
   for (const char* function :
-       {"vlp::Positioner::locate", "vlp::read_calibration", "vlp::read_lamp_map",
-        "vlp::describe", "vlp::InputError::InputError", "vlp::LampDetector::LampDetector",
+       {"vlp::Positioner::locate", "vlp::read_calibration", "vlp::read_lamp_map", "vlp::describe",
+        "vlp::InputError::InputError", "vlp::LampDetector::LampDetector",
         "vlp::LampDetector::detect", "vlp_open", "vlp_detect", "vlp_locate"}) {
     EXPECT_THAT(functions, testing::Contains(function));
   }

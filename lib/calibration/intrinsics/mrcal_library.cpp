@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calibration/intrinsics/mrcal_library.h"
 
+#include <dlfcn.h>
+
 #include "codecs/load_function.h"
 
 namespace vlp {
@@ -11,7 +13,7 @@ const MrcalFunctions& mrcal_functions() {
   using Get = const MrcalFunctions* (*)();
   // POSIX allows the conversion of a symbol's address to a function pointer.
   static const auto get = reinterpret_cast<Get>(  // NOLINT
-      load_function(VLP_MRCAL_LIBRARY, "vlp_mrcal_functions", "lenses cannot be solved"));
+      load_function(VLP_MRCAL_LIBRARY, "vlp_mrcal_functions", "lenses cannot be solved", RTLD_NOW));
   return *get();
 }
 
