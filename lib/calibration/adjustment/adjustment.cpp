@@ -320,7 +320,7 @@ class Contradictions {
   const std::vector<bool>& moved() const { return moved_; }
   /// Returns true if most lamps contradict their survey, so that the moved ones cannot be
   /// identified.
-  bool most_contradict() const { return most_contradict_; }
+  bool has_contradicting_majority() const { return has_contradicting_majority_; }
   double sd_m(std::size_t lamp) const { return sd_m_[lamp]; }
 
   /// Rejects everything far from the robust solution, which outliers do not bias.
@@ -377,11 +377,11 @@ class Contradictions {
       worst_chi = chi;
       worst_lamp = i;
     }
-    if (worst_lamp == sd_m_.size() || most_contradict_) return false;
+    if (worst_lamp == sd_m_.size() || has_contradicting_majority_) return false;
     const auto seen = std::count(all_.lamp_seen.begin(), all_.lamp_seen.end(), true);
     const auto released = std::count(moved_.begin(), moved_.end(), true);
     if (2 * (released + 1) >= seen) {
-      most_contradict_ = true;
+      has_contradicting_majority_ = true;
       for (std::size_t i = 0; i < sd_m_.size(); ++i) all_.problem.lamps[i].sd_m = sd_m_[i];
       moved_.assign(moved_.size(), false);
       return true;
@@ -400,7 +400,7 @@ class Contradictions {
   std::vector<double> sd_m_;
   std::vector<bool> moved_;
   std::set<std::size_t> reinstated_, reinstated_places_;
-  bool most_contradict_ = false;
+  bool has_contradicting_majority_ = false;
 };
 
 /// Noise of the detections.
@@ -668,7 +668,7 @@ void set_map(const AssembledProblem& all, const Contradictions& contradictions,
     lamp.position_m += correction_m;
     lamp.sd_m = std::sqrt(found.trace() / 3);
   }
-  if (contradictions.most_contradict()) {
+  if (contradictions.has_contradicting_majority()) {
     result.notes.emplace_back(
         "the captures contradict the survey of half the lamps or more: is its sd_m right?");
   }
