@@ -9,7 +9,7 @@
 #include "captures/detections_table.h"
 #include "frontend/observation.h"
 #include "lamps/signal/lamp_classifier.h"
-#include "lamps/signal/period_groups.h"
+#include "lamps/signal/row_time.h"
 
 namespace vlp {
 

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "lamps/signal/modulation_map.h"
 
+#include <Eigen/Core>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 #include <utility>
@@ -21,18 +21,8 @@ constexpr float kMinCellDepth = 0.25F;
 /// are merged.
 constexpr float kSaddleFraction = 0.6F;
 
-/// Grid of values by bin and cell.
-class CellGrid {
- public:
-  CellGrid(int rows, int columns)
-      : columns_(columns), values_(std::size_t(rows) * std::size_t(columns)) {}
-  float* row(int i) { return values_.data() + std::ptrdiff_t(i) * columns_; }
-  const float* row(int i) const { return values_.data() + std::ptrdiff_t(i) * columns_; }
-
- private:
-  int columns_;
-  std::vector<float> values_;
-};
+/// Values by bin and cell.
+using CellArray = Eigen::Array<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 template <typename Level>
 void sum_line(const Level* pixels, int width, float* sums, int cells) {
@@ -48,80 +38,33 @@ void sum_line(const Level* pixels, int width, float* sums, int cells) {
   sums[whole] += float(sum) * float(kCellWidth_px) / float(width - whole * kCellWidth_px);
 }
 
-/// Position between two rows of cumulative sums.
-struct SumPlace {
-  int row;
-  float fraction;
-};
-
-SumPlace sum_place_at(double t, int rows) {
-  t = std::clamp(t, 0.0, double(rows));
-  const int row = std::min(static_cast<int>(t), rows - 1);
-  return {row, static_cast<float>(t - row)};
+/// Returns the mean over `length` bins around each bin; values outside are 0.
+CellArray compute_moving_mean(const CellArray& values, double length) {
+  const Eigen::Index bins = values.rows();
+  CellArray sums = CellArray::Zero(bins + 1, values.cols()), means(bins, values.cols());
+  for (Eigen::Index bin = 0; bin < bins; ++bin) {
+    sums.row(bin + 1) = sums.row(bin) + values.row(bin);
+  }
+  const auto add_integral = [&](Eigen::Index bin, double end, float factor) {
+    const double t = std::clamp(end, 0.0, double(bins));
+    const Eigen::Index whole = std::min(static_cast<Eigen::Index>(t), bins - 1);
+    const auto fraction = static_cast<float>(t - double(whole));
+    means.row(bin) += factor * (sums.row(whole) + fraction * values.row(whole));
+  };
+  means.setZero();
+  for (Eigen::Index bin = 0; bin < bins; ++bin) {
+    const double middle = double(bin) + 0.5;
+    add_integral(bin, middle + length / 2, static_cast<float>(1 / length));
+    add_integral(bin, middle - length / 2, static_cast<float>(-1 / length));
+  }
+  return means;
 }
 
-/// Moving mean over `length` bins around each bin, from cumulative sums; values outside are 0.
-class MovingMean {
- public:
-  MovingMean(int bins, int cells, double length)
-      : bins_(bins), cells_(cells), length_(length), sums_(bins + 1, cells) {}
-
-  void restart() { std::fill_n(sums_.row(0), cells_, 0.F); }
-  /// Return the row of the cumulative sum after `bin`, and that before it.
-  float* after(int bin) { return sums_.row(bin + 1); }
-  const float* before(int bin) const { return sums_.row(bin); }
-
-  void mean_at(int bin, float* mean) const {
-    const SumPlace low = sum_place_at(bin + 0.5 - length_ / 2, bins_);
-    const SumPlace high = sum_place_at(bin + 0.5 + length_ / 2, bins_);
-    const float *a = sums_.row(low.row), *b = sums_.row(low.row + 1);
-    const float *d = sums_.row(high.row), *e = sums_.row(high.row + 1);
-    const auto scale = static_cast<float>(1 / length_);
-    for (int c = 0; c < cells_; ++c) {
-      mean[c] =
-          scale * (d[c] + high.fraction * (e[c] - d[c]) - a[c] - low.fraction * (b[c] - a[c]));
-    }
-  }
-
- private:
-  int bins_, cells_;
-  double length_;
-  CellGrid sums_;
-};
-
-/// Moving mean applied twice with the same length, to values times a factor for each bin.
-class TwiceMean {
- public:
-  TwiceMean(int bins, int cells, double length)
-      : bins_(bins),
-        cells_(cells),
-        first_(bins, cells, length),
-        second_(bins, cells, length),
-        mean_(std::size_t(cells)) {}
-
-  void apply(const CellLevels& cells, std::span<const float> factors) {
-    first_.restart();
-    second_.restart();
-    for (int bin = 0; bin < bins_; ++bin) {
-      const float factor = factors[std::size_t(bin)];
-      const float *level = cells.row(bin), *before = first_.before(bin);
-      float* after = first_.after(bin);
-      for (int c = 0; c < cells_; ++c) after[c] = before[c] + factor * level[c];
-    }
-    for (int bin = 0; bin < bins_; ++bin) {
-      first_.mean_at(bin, mean_.data());
-      const float* before = second_.before(bin);
-      float* after = second_.after(bin);
-      for (int c = 0; c < cells_; ++c) after[c] = before[c] + mean_[std::size_t(c)];
-    }
-  }
-  void mean_at(int bin, float* mean) const { second_.mean_at(bin, mean); }
-
- private:
-  int bins_, cells_;
-  MovingMean first_, second_;
-  std::vector<float> mean_;
-};
+/// Applies the moving mean twice to the levels of the cells, times a factor for each bin.
+CellArray filter_cells(const CellLevels& cells, const Eigen::ArrayXf& factors, double length) {
+  const Eigen::Map<const CellArray> levels(cells.levels.data(), cells.bins, cells.cells);
+  return compute_moving_mean(compute_moving_mean(levels.colwise() * factors, length), length);
+}
 
 /// Watershed of find_modulated_regions().
 class Watershed {
@@ -234,36 +177,23 @@ ModulationMap map_modulation(const CellLevels& cells, std::span<const double> pe
                     kBinsPerStep * cells.lines_per_bin,
                     {},
                     {}};
-  const std::size_t size = map.index(map.steps, 0), count = std::size_t(cells.cells);
-  map.amplitude.assign(size, 0);
-  map.mean.assign(size, 0);
-  std::vector<float> cosines(std::size_t(cells.bins)), sines(cosines.size()),
-      ones(cosines.size(), 1);
-  std::vector<float> real(count), imaginary(count), mean(count);
+  map.amplitude.assign(map.index(map.steps, 0), 0);
+  map.mean.assign(map.amplitude.size(), 0);
+  const Eigen::ArrayXf bins = Eigen::ArrayXf::LinSpaced(cells.bins, 0, float(cells.bins - 1));
   for (const double period_lines : periods_lines) {
     const double period = period_lines / cells.lines_per_bin;
-    for (std::size_t bin = 0; bin < cosines.size(); ++bin) {
-      const double angle = 2 * std::numbers::pi * (double(bin) + 0.5) / period;
-      cosines[bin] = static_cast<float>(std::cos(angle));
-      sines[bin] = static_cast<float>(std::sin(angle));
-    }
-    std::array filters{TwiceMean(cells.bins, cells.cells, period),
-                       TwiceMean(cells.bins, cells.cells, period),
-                       TwiceMean(cells.bins, cells.cells, period)};
-    filters[0].apply(cells, cosines);
-    filters[1].apply(cells, sines);
-    filters[2].apply(cells, ones);
+    const Eigen::ArrayXf angles = (bins + 0.5F) * float(2 * std::numbers::pi / period);
+    const CellArray real = filter_cells(cells, angles.cos(), period);
+    const CellArray imaginary = filter_cells(cells, angles.sin(), period);
+    const CellArray mean = filter_cells(cells, Eigen::ArrayXf::Ones(cells.bins), period);
     for (int step = 0; step < map.steps; ++step) {
       const int bin = std::min(step * kBinsPerStep + kBinsPerStep / 2, cells.bins - 1);
-      filters[0].mean_at(bin, real.data());
-      filters[1].mean_at(bin, imaginary.data());
-      filters[2].mean_at(bin, mean.data());
-      for (std::size_t c = 0; c < count; ++c) {
-        const std::size_t k = map.index(step, static_cast<int>(c));
-        const float amplitude = 2 * std::sqrt(real[c] * real[c] + imaginary[c] * imaginary[c]);
+      for (int cell = 0; cell < map.cells; ++cell) {
+        const std::size_t k = map.index(step, cell);
+        const float amplitude = 2 * std::hypot(real(bin, cell), imaginary(bin, cell));
         if (amplitude <= map.amplitude[k]) continue;
         map.amplitude[k] = amplitude;
-        map.mean[k] = mean[c];
+        map.mean[k] = mean(bin, cell);
       }
     }
   }

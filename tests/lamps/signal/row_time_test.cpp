@@ -6,7 +6,6 @@
 
 #include <cmath>
 
-#include "lamps/signal/period_groups.h"
 #include "support/random.h"
 
 namespace vlp {
