@@ -65,12 +65,6 @@ Light make_light_without_outline(const ImageView& lines, const ModulatedLight& f
 
 }  // namespace
 
-PixelBox grow(const PixelBox& box, int margin_px, const ImageSize& size) {
-  return intersection(
-      {box.x - margin_px, box.y - margin_px, box.width + 2 * margin_px, box.height + 2 * margin_px},
-      {0, 0, size.width, size.height});
-}
-
 Light make_light_from_modulation(const ImageView& lines, const ModulatedLight& found,
                                  std::span<const Blob> blobs, const Background& background,
                                  const LightShape& shape) {

@@ -13,9 +13,6 @@
 
 namespace vlp {
 
-/// Returns the box extended by `margin_px` on each side and clipped to an image of `size`.
-PixelBox grow(const PixelBox& box, int margin_px, const ImageSize& size);
-
 /// Converts a light that was found by its modulation to a Light. The outline is the rim, see
 /// fit_rim(), if the rim is clear. Otherwise the light has no outline, and its center is the
 /// centroid of the lit area. Kind, reason and lamp are not set.

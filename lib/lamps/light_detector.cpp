@@ -13,14 +13,12 @@
 #include "geometry/frames.h"
 #include "geometry/median.h"
 #include "lamps/image/background.h"
-#include "lamps/image/levels.h"
 #include "lamps/image/pixel_runs.h"
 #include "lamps/image/scanlines.h"
 #include "lamps/light_by_modulation.h"
 #include "lamps/shape/rectangle.h"
 #include "lamps/shape/rim.h"
 #include "lamps/shape/unknown_lens.h"
-#include "lamps/signal/coherence.h"
 #include "lamps/signal/frequency_identification.h"
 #include "lamps/signal/modulated_lights.h"
 #include "rig/detection.h"
@@ -73,9 +71,17 @@ double clipped_fraction(const ImageView& lines, const Eigen::Vector2d& low,
                                        static_cast<int>(std::lround(size.x())),
                                        static_cast<int>(std::lround(size.y()))});
   if (pixels.empty()) return 0;
-  const int brightest = brightest_level(pixels);
+  int brightest = 0, count = 0;
+  for (int row = 0; row < pixels.height; ++row) {
+    for (int column = 0; column < pixels.width; ++column) {
+      const int level = pixels.level_at(column, row);
+      if (level > brightest) count = 0;
+      brightest = std::max(brightest, level);
+      count += level == brightest ? 1 : 0;
+    }
+  }
   if (!is_full_scale(brightest, pixels.bits)) return 0;
-  return double(count_pixels_at(pixels, brightest)) / (double(pixels.width) * pixels.height);
+  return double(count) / (double(pixels.width) * pixels.height);
 }
 
 /// Adds the error of an unknown lens to the sigma of the lights. Must be called last, because
@@ -268,35 +274,29 @@ void LightDetector::add_by_modulation(const ImageView& lines, const std::vector<
 
 void LightDetector::measure(const ImageView& lines, const Background& background,
                             Light& light) const {
-  const Eigen::Vector2d low = shape_.turned(light.low), high = shape_.turned(light.high);
-  const auto measure_signal = [&](const std::vector<double>& signal) {
-    const Eigen::Vector2d from = shape_.turned(light.low), to = shape_.turned(light.high);
-    light.stripes = measure_stripes(signal);
-    light.peak = signal.empty() ? 0 : *std::max_element(signal.begin(), signal.end());
-    if (light.stripes.period_lines > 0) {
-      const auto chords = is_disc(light)
-                              ? find_chords_in_ellipse(from, to, lines.size())
-                              : find_chords_in_polygon(shape_.turned(light.face), lines.size());
-      light.coherence = compute_coherence(lines, chords, background, light.stripes.period_lines);
+  if (is_disc(light)) {
+    const DiscImage disc{shape_.turned(light.low), shape_.turned(light.high),
+                         shape_.turned(light.pixel)};
+    auto outline = refine_outline(lines, light.outline, disc, background);
+    auto better = shape_.fit_light(std::move(outline.points), background, outline.is_mottled);
+    if (better && 2 * better->outline.size() > light.outline.size()) {
+      better->roundness = light.roundness;
+      better->outside = light.outside;
+      better->is_doubtful = light.is_doubtful;
+      light = std::move(*better);
     }
-    if (light.stripes.contrast < kMinContrast) light.clipped = clipped_fraction(lines, from, to);
-  };
-  if (!is_disc(light)) {
-    const auto chords = find_chords_in_polygon(shape_.turned(light.face), lines.size());
-    return measure_signal(compute_line_signal(lines, chords, background.level));
   }
-  const DiscImage disc{low, high, shape_.turned(light.pixel)};
-  auto outline = refine_outline(lines, light.outline, disc, background);
-  auto better = shape_.fit_light(std::move(outline.points), background, outline.is_mottled);
-  if (better && 2 * better->outline.size() > light.outline.size()) {
-    better->roundness = light.roundness;
-    better->outside = light.outside;
-    better->is_doubtful = light.is_doubtful;
-    light = std::move(*better);
+  const Eigen::Vector2d low = shape_.turned(light.low), high = shape_.turned(light.high);
+  const auto chords = is_disc(light)
+                          ? find_chords_in_ellipse(low, high, lines.size())
+                          : find_chords_in_polygon(shape_.turned(light.face), lines.size());
+  const auto signal = compute_line_signal(lines, chords, background.level);
+  light.stripes = measure_stripes(signal);
+  light.peak = signal.empty() ? 0 : *std::max_element(signal.begin(), signal.end());
+  if (light.stripes.period_lines > 0) {
+    light.coherence = compute_coherence(lines, chords, background, light.stripes.period_lines);
   }
-  const auto chords =
-      find_chords_in_ellipse(shape_.turned(light.low), shape_.turned(light.high), lines.size());
-  measure_signal(compute_line_signal(lines, chords, background.level));
+  if (light.stripes.contrast < kMinContrast) light.clipped = clipped_fraction(lines, low, high);
 }
 
 void LightDetector::correct_shear(std::vector<Light>& lights) const {

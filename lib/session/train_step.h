@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "frontend/labeled_lights.h"
-#include "lamps/signal/confusion.h"
+#include "lamps/signal/lamp_classifier.h"
 #include "session/row_time_step.h"
 
 namespace vlp {

@@ -74,7 +74,7 @@ std::uint8_t count_above(const ImageView& image, const PixelBox& box, Level thre
 /// Calls `function` with the column and row of a tile and of each of its neighbors.
 template <typename Function>
 void for_each_around(const TileMask& mask, int column, int row, Function&& function) {
-  const PixelBox box = intersection({column - 1, row - 1, 3, 3}, {0, 0, mask.columns, mask.rows});
+  const PixelBox box = grow({column, row, 1, 1}, 1, {mask.columns, mask.rows});
   for (int y = box.y; y < box.bottom(); ++y) {
     for (int x = box.x; x < box.right(); ++x) function(x, y);
   }

@@ -38,4 +38,19 @@ inline PixelBox around(const PixelBox& a, const PixelBox& b) {
   return {x, y, std::max(a.right(), b.right()) - x, std::max(a.bottom(), b.bottom()) - y};
 }
 
+/// Returns the box extended by `margin_px` on each side and clipped to an image of `size`.
+inline PixelBox grow(const PixelBox& box, int margin_px, const ImageSize& size) {
+  return intersection(
+      {box.x - margin_px, box.y - margin_px, box.width + 2 * margin_px, box.height + 2 * margin_px},
+      {0, 0, size.width, size.height});
+}
+
+/// Returns the distance between two boxes along the axis in which it is larger; negative if they
+/// overlap.
+inline int compute_gap(const PixelBox& a, const PixelBox& b) {
+  const int across = std::max(a.x, b.x) - std::min(a.right(), b.right());
+  const int along = std::max(a.y, b.y) - std::min(a.bottom(), b.bottom());
+  return std::max(across, along);
+}
+
 }  // namespace vlp

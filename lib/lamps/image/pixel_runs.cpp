@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <numeric>
 
 namespace vlp {
 namespace {
@@ -97,6 +98,13 @@ PixelBox Blob::box() const {
     end = std::max(end, run.end);
   }
   return {begin, top(), end - begin, bottom() + 1 - top()};
+}
+
+double mean_level(const ImageView& image, const PixelRun& run) {
+  return visit_levels(image, [&](auto level) {
+    const auto* row = image.row<decltype(level)>(run.row);
+    return std::accumulate(row + run.begin, row + run.end, 0.0) / run.width();
+  });
 }
 
 std::vector<PixelRun> find_pixel_runs(const ImageView& image, double threshold,

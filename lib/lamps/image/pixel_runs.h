@@ -17,6 +17,9 @@ struct PixelRun {
   int width() const { return end - begin; }
 };
 
+/// Returns the mean level of the pixels of a run.
+double mean_level(const ImageView& image, const PixelRun& run);
+
 /// Finds the runs of pixels above `threshold`, row by row. Gaps of up to two pixels do not end a
 /// run; runs of less than three pixels are discarded as noise. Searches the nonzero tiles of `lit`,
 /// or all tiles if `lit` is empty.

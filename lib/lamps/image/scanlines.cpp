@@ -36,10 +36,6 @@ std::shared_ptr<void> black_pixels(const ImageSize& size, int bits) {
   return {memory, [bytes](void* used) { munmap(used, bytes); }};
 }
 
-PixelBox grown(const PixelBox& tiles, int by) {
-  return {tiles.x - by, tiles.y - by, tiles.width + 2 * by, tiles.height + 2 * by};
-}
-
 /// Fills a margin around each group of lit tiles with the background level. The margin is the size
 /// of the group.
 template <typename Level>
@@ -47,7 +43,8 @@ void fill_around(const TileMask& lit, Level level, const Pixels<Level>& pixels) 
   for (const PixelBox& tiles : find_group_boxes(lit)) {
     const int size = std::max(tiles.width, tiles.height);
     if (size == 1) continue;  // the tiles around it are transposed
-    const PixelBox box = to_pixel_box(grown(tiles, size), {pixels.width, pixels.height});
+    const PixelBox box =
+        to_pixel_box(grow(tiles, size, {lit.columns, lit.rows}), {pixels.width, pixels.height});
     for (int y = box.y; y < box.bottom(); ++y) std::fill_n(pixels.row(y) + box.x, box.width, level);
   }
 }

@@ -17,10 +17,8 @@ bool contains_point(const Light& light, const Eigen::Vector2d& pixel) {
 
 /// Returns true if two blobs may be parts of one light.
 bool may_belong_together(const PixelBox& a, const PixelBox& b) {
-  const int gap_across = std::max(a.x, b.x) - std::min(a.x + a.width, b.x + b.width);
-  const int gap_along = std::max(a.y, b.y) - std::min(a.y + a.height, b.y + b.height);
   const int size = std::max({a.width, a.height, b.width, b.height});
-  return 2 * gap_across < size && 2 * gap_along < size;
+  return 2 * compute_gap(a, b) < size;
 }
 
 /// Returns true if a part is not a piece of a light that an occluder splits.

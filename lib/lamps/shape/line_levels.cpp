@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 
 #include "lamps/signal/lamp_map_check.h"
 #include "lamps/signal/stripes.h"
@@ -18,13 +17,13 @@ struct ChordSums {
   double middle, mean, moment, spread;
 };
 
-template <typename Level>
-ChordSums sum_chord(const Level* pixels, const PixelRun& chord, double dark) {
+ChordSums sum_chord(const ImageView& lines, const PixelRun& chord, double dark) {
   const double count = chord.width(), middle = (chord.begin + chord.end - 1) / 2.0;
   double sum = 0, moment = 0;
   for (int column = chord.begin; column < chord.end; ++column) {
-    sum += pixels[column] - dark;
-    moment += (pixels[column] - dark) * (column - middle);
+    const double level = lines.level_at(column, chord.row) - dark;
+    sum += level;
+    moment += level * (column - middle);
   }
   return {middle, sum / count, moment, count * (count * count - 1) / 12};
 }
@@ -39,9 +38,7 @@ LineLevels::LineLevels(const ImageView& lines, const std::vector<PixelRun>& chor
   sums.reserve(chords.size());
   double moment = 0, spread = 0;
   for (const PixelRun& chord : chords) {
-    sums.push_back(visit_levels(lines, [&](auto level) {
-      return sum_chord(lines.row<decltype(level)>(chord.row), chord, background.level);
-    }));
+    sums.push_back(sum_chord(lines, chord, background.level));
     middle_ += sums.back().middle / double(chords.size());
     moment += sums.back().moment;
     spread += std::max(0.0, sums.back().mean) * sums.back().spread;

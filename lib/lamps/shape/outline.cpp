@@ -5,19 +5,38 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdint>
 #include <numbers>
 
 #include "geometry/median.h"
 #include "geometry/normal_equations.h"
-#include "lamps/shape/profile.h"
 
 namespace vlp {
 namespace {
 
-template <typename Level>
-void add_edge(const Profile<Level>& profile, int width, int row, double dark,
-              std::vector<EdgePoint>& points) {
+/// Profile of a row from outside a light towards its inside: pixel i is in column `edge + direction
+/// * i`.
+struct Profile {
+  const ImageView& image;
+  int row, edge, direction;
+
+  bool has(int i) const {
+    const int column = edge + direction * i;
+    return column >= 0 && column < image.width;
+  }
+  double operator()(int i) const { return image.level_at(edge + direction * i, row); }
+
+  /// Returns the first position from `begin` to before `end` where the profile rises through
+  /// `level`; std::nullopt if there is none.
+  std::optional<double> crossing(double level, int begin, int end) const {
+    for (int i = begin; i < end && has(i) && has(i + 1); ++i) {
+      const double below = (*this)(i), above = (*this)(i + 1);
+      if (below < level && above >= level) return i + (level - below) / (above - below);
+    }
+    return std::nullopt;
+  }
+};
+
+void add_edge(const Profile& profile, int width, double dark, std::vector<EdgePoint>& points) {
   constexpr int outside = -6, inside = 3, samples = 4;
   if (!profile.has(outside)) return;
   // Samples a few pixels of the light from 3 px inside on; further inside for soft edges, whose run
@@ -37,27 +56,10 @@ void add_edge(const Profile<Level>& profile, int width, int row, double dark,
   const auto high = profile.crossing(dark + 3 * level / 4, outside, reach);
   if (!at || level <= 0) return;
   const double rise_px = low && high ? *high - *low : reach;
-  points.push_back(
-      {{profile.edge + profile.direction * *at, row}, level, rise_px, profile.direction > 0});
-}
-
-template <typename Level>
-std::vector<EdgePoint> outline(const ImageView& image, const Blob& blob, double dark) {
-  constexpr int min_width = 8;
-  std::vector<EdgePoint> points;
-  points.reserve(2 * blob.runs.size());
-  for (const PixelRun& run : blob.runs) {
-    if (run.width() < min_width) continue;
-    const auto* row = image.row<Level>(run.row);
-    add_edge(Profile<Level>{row, image.width, run.begin, 1}, run.width(), run.row, dark, points);
-    add_edge(Profile<Level>{row, image.width, run.end - 1, -1}, run.width(), run.row, dark, points);
-  }
-  // Between the stripes of a saturated lamp, spilled charge has no outline of its own.
-  constexpr double min_fraction = 0.35;
-  double brightest = 0;
-  for (const EdgePoint& point : points) brightest = std::max(brightest, point.level);
-  std::erase_if(points, [&](const EdgePoint& p) { return p.level < min_fraction * brightest; });
-  return points;
+  points.push_back({{profile.edge + profile.direction * *at, profile.row},
+                    level,
+                    rise_px,
+                    profile.direction > 0});
 }
 
 /// Axis-aligned ellipse of a disc's rim in its box.
@@ -127,13 +129,10 @@ constexpr int kBefore = 8, kSamples = 8;
 /// Variance of the pixel positions of a line fit.
 constexpr double kVariance = (kSamples * kSamples - 1) / 12.0;
 
-template <typename Level>
-Profile<Level> make_profile(const ImageView& image, const InnerLevel& inner) {
-  return {image.row<Level>(static_cast<int>(inner.point.pixel.y())), image.width, inner.origin,
-          inner.direction()};
+Profile make_profile(const ImageView& image, const InnerLevel& inner) {
+  return {image, static_cast<int>(inner.point.pixel.y()), inner.origin, inner.direction()};
 }
 
-template <typename Level>
 std::vector<InnerLevel> inner_levels(const ImageView& image, const std::vector<EdgePoint>& points,
                                      const RimEllipse& rim, double dark) {
   constexpr double flattest = 0.35, depth_px = 3, max_relative_change = 0.35;
@@ -151,7 +150,7 @@ std::vector<InnerLevel> inner_levels(const ImageView& image, const std::vector<E
     inner.origin = static_cast<int>(std::lround(point.pixel.x())) - inner.direction() * kBefore;
     inner.first = kBefore + static_cast<int>(std::lround(depth));
     inner.middle = inner.first + (kSamples - 1) / 2.0;
-    const auto profile = make_profile<Level>(image, inner);
+    const auto profile = make_profile(image, inner);
     if (!profile.has(0) || !profile.has(inner.first + kSamples)) continue;
     double sum = 0, moment = 0;
     for (int i = inner.first; i < inner.first + kSamples; ++i) {
@@ -169,9 +168,8 @@ std::vector<InnerLevel> inner_levels(const ImageView& image, const std::vector<E
 
 /// Fits the edge of a profile near `at` to all pixels there; `width` is the standard deviation of
 /// the blur along the profile. See refine_outline().
-template <typename Level>
-std::optional<double> blurred_edge(const Profile<Level>& profile, double at, double width,
-                                   double level, double dark) {
+std::optional<double> blurred_edge(const Profile& profile, double at, double width, double level,
+                                   double dark) {
   constexpr int num_iterations = 4;
   constexpr double reach = 3, min_reach_px = 2, further_in_px = 1, far = 2;
   const double reach_px =
@@ -228,14 +226,13 @@ double estimate_curvature(const std::vector<InnerLevel>& levels, const RimEllips
 /// beyond chance and enough to move the outline. For pure noise the mean product of neighbors is
 /// -1/4 of the mean square, because a line was fitted. With the n = 6 degrees of freedom of 8
 /// pixels per line, its standard deviation is 1 / sqrt(n).
-template <typename Level>
 bool is_mottled(const ImageView& image, const std::vector<InnerLevel>& levels,
                 const RimEllipse& rim, double curvature, double dark) {
   constexpr double expected_correlation = -0.25, beyond_chance = 3.5, min_fraction = 0.003;
   constexpr int left = kSamples - 2;
   double squares = 0, products = 0, level_squares = 0;
   for (const InnerLevel& inner : levels) {
-    const auto profile = make_profile<Level>(image, inner);
+    const auto profile = make_profile(image, inner);
     const double quadratic =
         inner.level * curvature / std::pow(rim.half_width_px(inner.point.begins), 2);
     double before = 0;
@@ -255,22 +252,24 @@ bool is_mottled(const ImageView& image, const std::vector<InnerLevel>& levels,
          beyond > min_fraction * min_fraction * level_squares;
 }
 
-template <typename Level>
-RefinedOutline refine(const ImageView& image, const std::vector<EdgePoint>& points,
-                      const DiscImage& disc, double dark) {
+}  // namespace
+
+RefinedOutline refine_outline(const ImageView& image, const std::vector<EdgePoint>& points,
+                              const DiscImage& disc, const Background& background) {
   // With more blur its tail reaches the samples and is mistaken for curvature.
   constexpr double max_blur_to_bend_px = 1.3;
   // Variance that interpolation between pixels adds to the measured rises.
   constexpr double between_pixels = 1 / 8.0;
   constexpr double min_width_px = 0.4;
   if (points.empty()) return {};
+  const double dark = background.level;
   const RimEllipse rim(disc);
   const double blur = blur_px(points, rim), square = blur * blur;
   const double square_across = std::max(0.0, square - between_pixels);
-  const auto levels = inner_levels<Level>(image, points, rim, dark);
+  const auto levels = inner_levels(image, points, rim, dark);
   const bool inside_only = blur < max_blur_to_bend_px;
   const double curvature = inside_only ? estimate_curvature(levels, rim) : 0;
-  RefinedOutline result{{}, inside_only && is_mottled<Level>(image, levels, rim, curvature, dark)};
+  RefinedOutline result{{}, inside_only && is_mottled(image, levels, rim, curvature, dark)};
   result.points.reserve(levels.size());
   for (const InnerLevel& inner : levels) {
     const bool begins = inner.point.begins;
@@ -278,7 +277,7 @@ RefinedOutline refine(const ImageView& image, const std::vector<EdgePoint>& poin
     const double quadratic = curvature * (back * back - kVariance) / (width_px * width_px);
     const double level = inner.level * (1 + quadratic) - inner.slope * back;
     if (level <= 0) continue;
-    const auto profile = make_profile<Level>(image, inner);
+    const auto profile = make_profile(image, inner);
     const auto at = profile.crossing(dark + level / 2, 0, inner.first);
     if (!at) continue;
     // Slope of the lamp's own profile at its rim, inwards. Vignetting acts on levels that are
@@ -305,15 +304,6 @@ RefinedOutline refine(const ImageView& image, const std::vector<EdgePoint>& poin
   return result;
 }
 
-}  // namespace
-
-RefinedOutline refine_outline(const ImageView& image, const std::vector<EdgePoint>& points,
-                              const DiscImage& disc, const Background& background) {
-  return visit_levels(image, [&](auto level) {
-    return refine<decltype(level)>(image, points, disc, background.level);
-  });
-}
-
 std::vector<EdgePoint> select_outermost(std::vector<EdgePoint> points) {
   const auto further_out = [](const EdgePoint& a, const EdgePoint& b) {
     if (a.pixel.y() != b.pixel.y()) return a.pixel.y() < b.pixel.y();
@@ -330,8 +320,20 @@ std::vector<EdgePoint> select_outermost(std::vector<EdgePoint> points) {
 
 std::vector<EdgePoint> find_outline(const ImageView& image, const Blob& blob,
                                     const Background& background) {
-  return visit_levels(
-      image, [&](auto level) { return outline<decltype(level)>(image, blob, background.level); });
+  constexpr int min_width = 8;
+  std::vector<EdgePoint> points;
+  points.reserve(2 * blob.runs.size());
+  for (const PixelRun& run : blob.runs) {
+    if (run.width() < min_width) continue;
+    add_edge({image, run.row, run.begin, 1}, run.width(), background.level, points);
+    add_edge({image, run.row, run.end - 1, -1}, run.width(), background.level, points);
+  }
+  // Between the stripes of a saturated lamp, spilled charge has no outline of its own.
+  constexpr double min_fraction = 0.35;
+  double brightest = 0;
+  for (const EdgePoint& point : points) brightest = std::max(brightest, point.level);
+  std::erase_if(points, [&](const EdgePoint& p) { return p.level < min_fraction * brightest; });
+  return points;
 }
 
 }  // namespace vlp

@@ -364,14 +364,15 @@ std::optional<double> estimate_jackknife_sd_px(const Light& light, const Backgro
 
 /// Returns the level above the dark level that one line of ten exceeds at the middle or the
 /// quarters of its runs.
-template <typename Level>
 double bright_level(const ImageView& image, const Blob& blob, double dark) {
-  std::vector<Level> levels;
+  std::vector<int> levels;
   levels.reserve(blob.runs.size());
   for (const PixelRun& run : blob.runs) {
-    const auto* row = image.row<Level>(run.row) + run.begin;
-    const std::ptrdiff_t quarter = run.width() / 4;
-    levels.push_back(std::max({row[quarter], row[2 * quarter], row[3 * quarter]}));
+    int& level = levels.emplace_back(0);
+    for (const int quarters : {1, 2, 3}) {
+      const int column = run.begin + quarters * (run.width() / 4);
+      level = std::max(level, image.level_at(column, run.row));
+    }
   }
   const auto tenth = levels.begin() + std::ptrdiff_t(levels.size() * 9 / 10);
   std::nth_element(levels.begin(), tenth, levels.end());
@@ -440,10 +441,7 @@ bool is_unevenly_lit(const ImageView& image, const Blob& blob,
   std::vector<double> levels;
   levels.reserve(outline.size());
   for (const EdgePoint& point : outline) levels.push_back(point.level);
-  const double inside = visit_levels(image, [&](auto level) {
-    return bright_level<decltype(level)>(image, blob, background.level);
-  });
-  return inside > much * upper_median(std::move(levels));
+  return bright_level(image, blob, background.level) > much * upper_median(std::move(levels));
 }
 
 std::optional<Rim> fit_rim(const ImageView& image, const Blob& blob, const Background& background,
@@ -453,9 +451,7 @@ std::optional<Rim> fit_rim(const ImageView& image, const Blob& blob, const Backg
   const PixelBox box = blob.box();
   if (std::min(box.width, box.height) < min_size) return std::nullopt;
   const int margin_px = static_cast<int>(margin * std::max(box.width, box.height));
-  const PixelBox wide = intersection(
-      {box.x - margin_px, box.y - margin_px, box.width + 2 * margin_px, box.height + 2 * margin_px},
-      {0, 0, image.width, image.height});
+  const PixelBox wide = grow(box, margin_px, image.size());
   // Window sizes for the search of the ring and for the rim.
   const int size = std::max(wide.width, wide.height);
   const int fine = std::clamp(size / 30, 2, 6), coarse = std::max(fine, size / 50);

@@ -11,7 +11,6 @@
 
 #include "geometry/median.h"
 #include "geometry/normal_equations.h"
-#include "lamps/image/levels.h"
 #include "lamps/shape/m_estimate.h"
 
 namespace vlp {
@@ -30,7 +29,13 @@ class Levels {
     const int x = static_cast<int>(low.x()), y = static_cast<int>(low.y());
     const PixelBox box{x, y, static_cast<int>(high.x()) + 1 - x,
                        static_cast<int>(high.y()) + 1 - y};
-    const int brightest = brightest_level(image.part(box));
+    int brightest = 0;
+    const ImageView pixels = image.part(box);
+    for (int row = 0; row < pixels.height; ++row) {
+      for (int column = 0; column < pixels.width; ++column) {
+        brightest = std::max(brightest, pixels.level_at(column, row));
+      }
+    }
     if (brightest > 0) scale_ = 255.0 / brightest;
   }
 

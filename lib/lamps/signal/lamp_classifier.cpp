@@ -3,9 +3,11 @@
 #include "lamps/signal/lamp_classifier.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <limits>
 #include <map>
+#include <set>
 #include <string>
 
 #include <Eigen/Cholesky>
@@ -75,6 +77,11 @@ void fit(std::span<const LabeledLight> lights, const std::vector<bool>& used,
 
 }  // namespace
 
+LampFeatures compute_lamp_features(const Stripes& stripes) {
+  assert(stripes.period_lines > 0);
+  return {std::log(stripes.period_lines), stripes.duty, stripes.count_per_line, stripes.lit_area};
+}
+
 LampClassifier train_classifier(std::span<const LabeledLight> lights) {
   LampClassifier classifier;
   standardize(lights, classifier);
@@ -127,6 +134,29 @@ std::vector<LampDistance> find_inseparable_lamps(const LampClassifier& classifie
     }
   }
   return pairs;
+}
+
+Confusion cross_validate(std::span<const LabeledLight> lights, const TrainClassifier& train) {
+  std::set<int> lamps;
+  for (const LabeledLight& light : lights) lamps.insert(light.lamp);
+  const auto unknown = static_cast<Eigen::Index>(lamps.size());
+  Confusion confusion{{lamps.begin(), lamps.end()}, Eigen::MatrixXi::Zero(unknown, unknown + 1)};
+  const auto index_of = [&](int lamp) -> Eigen::Index {
+    const auto place = std::ranges::find(confusion.lamps, lamp);
+    return place - confusion.lamps.begin();
+  };
+  for (int fold = 0; fold < kFolds; ++fold) {
+    std::vector<LabeledLight> others, held_out;
+    for (const LabeledLight& light : lights) {
+      (light.image % kFolds == std::size_t(fold) ? held_out : others).push_back(light);
+    }
+    const LampClassifier classifier = train(others);
+    for (const LabeledLight& light : held_out) {
+      const auto answer = identify_lamp(classifier, light.stripes);
+      ++confusion.counts(index_of(light.lamp), answer ? index_of(*answer) : unknown);
+    }
+  }
+  return confusion;
 }
 
 namespace {

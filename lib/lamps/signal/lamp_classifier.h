@@ -3,14 +3,36 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <span>
+#include <string_view>
 #include <vector>
 
-#include "lamps/signal/lamp_features.h"
+#include "lamps/signal/stripes.h"
 
 namespace vlp {
+
+/// Features of a lamp's light (Chen and Guan, section 2.1), in the order of kLampFeatures. No
+/// feature depends on the distance of the lamp: at twice the distance it has half the scanlines and
+/// stripes.
+///
+/// - log_period_lines: logarithm of the stripe period in scanlines, 1 / (frequency row_time), so
+///   that its errors are relative
+/// - duty: lit fraction of a period, 0 to 1
+/// - count_per_line: number of stripes per scanline; stripes are counted in steps of a half, so
+///   that it is coarser than 1 / period
+/// - lit_area: fraction of the disc's area that is lit, 0 to 1
+using LampFeatures = Eigen::Vector4d;
+
+/// Names of the features.
+inline constexpr std::array<std::string_view, 4> kLampFeatures{"log_period_lines", "duty",
+                                                               "count_per_line", "lit_area"};
+
+/// Returns the features of a light's stripes. @pre The stripes have a period.
+LampFeatures compute_lamp_features(const Stripes& stripes);
 
 /// Light with the id of its lamp.
 struct LabeledLight {
@@ -74,6 +96,29 @@ struct LampDistance {
 /// Returns the pairs of lamps that identify_lamp() cannot separate, with a distance below 6. At
 /// distance 6 one light in forty is unknown.
 std::vector<LampDistance> find_inseparable_lamps(const LampClassifier& classifier);
+
+/// Confusion matrix of a classifier for lights of known lamps.
+struct Confusion {
+  /// Ids of the lamps, sorted.
+  std::vector<int> lamps;
+  /// Number of lights by lamp (row) and by result (column); the last column is "unknown".
+  Eigen::MatrixXi counts;
+
+  int right() const { return counts.diagonal().sum(); }
+  /// Returns the number of lights that are identified as another lamp.
+  int wrong() const { return counts.sum() - right() - unknown(); }
+  int unknown() const { return counts.rightCols<1>().sum(); }
+};
+
+/// Number of folds of the cross-validation.
+inline constexpr int kFolds = 5;
+
+using TrainClassifier = std::function<LampClassifier(std::span<const LabeledLight>)>;
+
+/// Computes the confusion matrix by cross-validation. `train` makes a classifier of all images but
+/// every fifth one; this classifier is applied to the lights of the held-out images. The folds are
+/// deterministic. `lights` as for train_classifier().
+Confusion cross_validate(std::span<const LabeledLight> lights, const TrainClassifier& train);
 
 /// Reads a file of format `vlp-classifier/1`. Its keys are the names of the fields above, and
 /// `features`, which has to be kLampFeatures.

@@ -203,13 +203,6 @@ RegionCandidate examine(const CellLevels& cells, const ModulationMap& map, Modul
   return candidate;
 }
 
-/// Returns the distance between two boxes along the axis in which it is larger.
-int compute_gap(const PixelBox& a, const PixelBox& b) {
-  const int across = std::max(a.x, b.x) - std::min(a.right(), b.right());
-  const int along = std::max(a.y, b.y) - std::min(a.bottom(), b.bottom());
-  return std::max(across, along);
-}
-
 /// Returns true if two candidates are parts of one light.
 bool are_parts_of_one_light(const RegionCandidate& a, const RegionCandidate& b) {
   if (a.lamp != b.lamp) return false;

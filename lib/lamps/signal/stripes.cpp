@@ -182,36 +182,24 @@ Stripes measure_stripes(const std::vector<double>& signal) {
 
 namespace {
 
-/// Returns the level of a scanline between two columns: the second brightest of five parts. An
-/// object may hide some of them, and a speck may brighten one.
-template <typename Level>
-double measure_level(const Level* pixels, int begin, int end) {
-  constexpr int parts = 5;
-  double brightest = 0, second = 0;
-  int counted = 0;
-  for (int part = 0; part < parts; ++part) {
-    const int from = begin + (end - begin) * part / parts;
-    const int to = begin + (end - begin) * (part + 1) / parts;
-    if (from == to) continue;
-    double sum = 0;
-    for (int column = from; column < to; ++column) sum += pixels[column];
-    const double mean = sum / (to - from);
-    second = std::max(second, std::min(brightest, mean));
-    brightest = std::max(brightest, mean);
-    ++counted;
-  }
-  return counted > 1 ? second : brightest;
-}
+/// Levels of five parts of a scanline.
+using PartLevels = Eigen::Array<double, 5, 1>;
 
-template <typename Level>
-std::vector<double> measure_signal(const ImageView& image, const std::vector<PixelRun>& chords,
-                                   double dark) {
-  std::vector<double> signal;
-  signal.reserve(chords.size());
-  for (const auto& [row, begin, end] : chords) {
-    signal.push_back(measure_level(image.row<Level>(row), begin, end) - dark);
+/// Returns the mean levels of the parts of each chord above `dark`.
+std::vector<PartLevels> measure_parts(const ImageView& image, const std::vector<PixelRun>& chords,
+                                      double dark) {
+  constexpr int parts = PartLevels::SizeAtCompileTime;
+  std::vector<PartLevels> levels;
+  levels.reserve(chords.size());
+  for (const PixelRun& chord : chords) {
+    PartLevels& line = levels.emplace_back();
+    for (int part = 0; part < parts; ++part) {
+      const int from = chord.begin + chord.width() * part / parts;
+      const int to = std::max(from + 1, chord.begin + chord.width() * (part + 1) / parts);
+      line[part] = mean_level(image, {chord.row, from, to}) - dark;
+    }
   }
-  return signal;
+  return levels;
 }
 
 }  // namespace
@@ -236,8 +224,44 @@ std::vector<PixelRun> find_chords_in_ellipse(const Eigen::Vector2d& low,
 
 std::vector<double> compute_line_signal(const ImageView& image, const std::vector<PixelRun>& chords,
                                         double dark) {
-  return visit_levels(
-      image, [&](auto level) { return measure_signal<decltype(level)>(image, chords, dark); });
+  std::vector<double> signal;
+  signal.reserve(chords.size());
+  for (PartLevels& parts : measure_parts(image, chords, dark)) {
+    std::sort(parts.begin(), parts.end());
+    signal.push_back(parts[3]);
+  }
+  return signal;
+}
+
+double compute_coherence(const ImageView& lines, const std::vector<PixelRun>& chords,
+                         const Background& background, double period_lines) {
+  constexpr double fraction = 0.05;
+  constexpr std::size_t min_values = 3;
+  const std::vector<PartLevels> levels = measure_parts(lines, chords, background.level);
+  const auto quarter = static_cast<std::size_t>(std::max(1L, std::lround(period_lines / 4)));
+  if (levels.size() + 1 < min_values + 2 * quarter) return 0;
+  double brightest = 0;
+  std::vector<PartLevels> sums{PartLevels::Zero()};  // cumulative
+  sums.reserve(levels.size() + 1);
+  for (const PartLevels& line : levels) {
+    sums.emplace_back(sums.back() + line);
+    brightest = std::max(brightest, line.mean());
+  }
+  const double soft = (background.threshold - background.level) / 2 + fraction * brightest;
+  PartLevels cross_sums = PartLevels::Zero(), own_squares = cross_sums, other_squares = cross_sums;
+  for (std::size_t line = quarter; line + quarter <= levels.size(); ++line) {
+    const PartLevels before = (sums[line] - sums[line - quarter]) / double(quarter);
+    const PartLevels after = (sums[line + quarter] - sums[line]) / double(quarter);
+    const PartLevels step = ((after.max(0) + soft) / (before.max(0) + soft)).log();
+    const PartLevels other_parts = step.sum() - step;
+    cross_sums += step * other_parts;
+    own_squares += step.square();
+    other_squares += other_parts.square();
+  }
+  const PartLevels scales = (own_squares * other_squares).sqrt();
+  PartLevels coherences = (scales > 0).select(cross_sums / scales, 0);
+  std::sort(coherences.begin(), coherences.end());
+  return coherences[1];
 }
 
 }  // namespace vlp

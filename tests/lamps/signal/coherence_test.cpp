@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "lamps/signal/coherence.h"
+#include "lamps/signal/stripes.h"
 
 #include <gtest/gtest.h>
 

@@ -5,8 +5,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
-#include "lamps/signal/confusion.h"
 #include "lamps/signal/square_wave.h"
 
 namespace vlp {
@@ -32,6 +32,12 @@ std::vector<LabeledLight> make_lights(const std::vector<LampSpec>& lamps, std::s
     }
   }
   return lights;
+}
+
+/// Returns the confusion matrix of a classifier for lights of lamps that may differ from its own.
+Confusion compute_confusion(const LampClassifier& classifier,
+                            std::span<const LabeledLight> lights) {
+  return cross_validate(lights, [&](std::span<const LabeledLight>) { return classifier; });
 }
 
 const std::vector<LampSpec> kLamps{{4, 16.7, 0.5}, {7, 13.3, 0.5}, {9, 10.8, 0.5}};
@@ -140,6 +146,35 @@ TEST(CrossValidate, UsesGivenTrainingFunction) {
   };
   const Confusion confusion = cross_validate(make_lights(kLamps, 40, 1), mistaken);
   EXPECT_GE(confusion.wrong(), 78);
+}
+
+TEST(ComputeLampFeatures, ReturnsFeaturesOfStripes) {
+  Stripes stripes{};
+  stripes.period_lines = 12;
+  stripes.duty = 0.4;
+  stripes.count_per_line = 0.08;
+  stripes.lit_area = 0.45;
+  EXPECT_EQ(compute_lamp_features(stripes), LampFeatures(std::log(12), 0.4, 0.08, 0.45));
+  EXPECT_EQ(kLampFeatures[0], "log_period_lines");
+}
+
+TEST(ComputeLampFeatures, IsIndependentOfDistance) {
+  Random random(7);
+  for (const int lines : {60, 90, 120, 180}) {
+    for (const double duty : {0.35, 0.6}) {
+      LampFeatures mean = LampFeatures::Zero();
+      constexpr int draws = 100;
+      for (int draw = 0; draw < draws; ++draw) {
+        mean += compute_lamp_features(
+                    measure_stripes(noisy_square_wave(lines, 10.3, duty, 1, 0, random))) /
+                draws;
+      }
+      EXPECT_NEAR(mean[0], std::log(10.3), 0.005);
+      EXPECT_NEAR(mean[1], duty, 0.03);
+      EXPECT_NEAR(mean[2], 1 / 10.3, 0.05 / 10.3);
+      EXPECT_NEAR(mean[3], duty, 0.03);
+    }
+  }
 }
 
 }  // namespace

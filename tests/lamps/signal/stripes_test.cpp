@@ -151,5 +151,25 @@ TEST(MeasureStripes, ReturnsFiniteDutyForSignalWithOneOutlier) {
   }
 }
 
+TEST(MeasureStripes, CountsStripesInStepsOfHalf) {
+  // 60 lines, lit from 5 to 9, 15 to 19 and so on: six begins, five or six ends.
+  std::vector<double> signal(60, 0);
+  for (std::size_t i = 0; i < signal.size(); ++i) signal[i] = i % 10 >= 5 ? 100 : 0;
+  EXPECT_NEAR(measure_stripes(signal).count_per_line, 11.0 / 2 / 60, 1e-12);
+}
+
+TEST(MeasureStripes, ComputesLitAreaOfDisc) {
+  // The upper half is lit, then the half in the middle, where the chords are longer.
+  std::vector<double> half(80, 0), middle(80, 0);
+  for (std::size_t i = 0; i < 80; ++i) {
+    half[i] = i < 40 ? 100 : 0;
+    middle[i] = i >= 20 && i < 60 ? 100 : 0;
+  }
+  EXPECT_NEAR(measure_stripes(half).lit_area, 0.5, 1e-12);
+  // Area of the chords sqrt(1 - y^2) for |y| < 0.45, divided by that for |y| < 0.9.
+  const auto area = [](double y) { return y * std::sqrt(1 - y * y) + std::asin(y); };
+  EXPECT_NEAR(measure_stripes(middle).lit_area, area(0.45) / area(0.9), 1e-3);
+}
+
 }  // namespace
 }  // namespace vlp
