@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "lamps/shape/light_center.h"
 
-#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -11,19 +10,11 @@
 #include <numbers>
 
 #include "geometry/median.h"
-#include "lamps/shape/robust_circle.h"
 #include "lamps/shape/robust_ellipse.h"
 #include "rig/detection.h"
 
 namespace vlp {
 namespace {
-
-/// Returns the diagonal of the bounding box of the points.
-double compute_extent(const std::vector<Eigen::Vector2d>& points) {
-  Eigen::AlignedBox2d box;
-  for (const Eigen::Vector2d& point : points) box.extend(point);
-  return box.diagonal().norm();
-}
 
 double compute_median_rise_px(const std::vector<EdgePoint>& outline) {
   std::vector<double> rises;
@@ -89,12 +80,6 @@ double estimate_correlated_points(const std::vector<Eigen::Vector2d>& points,
   return std::max(1.0, 1 + products / squares + taken);
 }
 
-/// Converts a circle fit to an ellipse fit.
-RobustEllipse to_ellipse(RobustCircle fit) {
-  return {fit.circle.center, fit.circle.radius * Matrix2::Identity(), fit.center_covariance,
-          std::move(fit.inliers), fit.count};
-}
-
 }  // namespace
 
 Eigen::Vector2d LightShape::turned(const Eigen::Vector2d& at) const {
@@ -144,19 +129,11 @@ std::optional<Light> LightShape::fit_light(std::vector<EdgePoint> outline,
   const double tolerance_px =
       std::max({0.35, 8 * background.noise / brightest, 0.4 * compute_median_rise_px(outline)});
   const double tolerance = tolerance_px * per_px;
-  std::optional<RobustEllipse> fit;
-  std::optional<Circle> circle;
-  if (camera_.lens) {
-    if (auto found = fit_robust_circle(points, weights, tolerance)) {
-      circle = found->circle;
-      fit = to_ellipse(std::move(*found));
-    }
-  } else {
-    constexpr double nearly_round = 3;
-    fit = fit_robust_ellipse(points, weights, tolerance);
-    if (!fit && camera_.max_axis_ratio > nearly_round) {
-      fit = fit_slender_ellipse(points, weights, tolerance);
-    }
+  constexpr double nearly_round = 3;
+  auto fit = camera_.lens ? fit_robust_circle(points, weights, tolerance)
+                          : fit_robust_ellipse(points, weights, tolerance);
+  if (!fit && !camera_.lens && camera_.max_axis_ratio > nearly_round) {
+    fit = fit_slender_ellipse(points, weights, tolerance);
   }
   if (!fit || fit->count < static_cast<int>(kMinOutlinePoints)) return std::nullopt;
   if (!camera_.lens && compute_axis_ratio(fit->rim_from_circle) > camera_.max_axis_ratio)
@@ -187,8 +164,10 @@ std::optional<Light> LightShape::fit_light(std::vector<EdgePoint> outline,
   for (std::size_t i = 0; i < outline.size(); ++i) {
     if (selected[i]) light.outline.push_back(outline[i]);
   }
-  if (circle)
-    light.sums = {points, weights, selected, *circle, compute_line_slope(*circle), num_correlated};
+  if (camera_.lens) {
+    const Circle circle = fit->circle();
+    light.sums = {points, weights, selected, circle, compute_line_slope(circle), num_correlated};
+  }
   light.rise_px = compute_median_rise_px(light.outline);
   return light;
 }

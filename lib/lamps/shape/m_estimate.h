@@ -28,13 +28,20 @@ template <int N>
 struct MEstimateStep {
   /// Step to subtract from the parameters.
   Eigen::Matrix<double, N, 1> step;
-  /// Covariance of the parameters, from the scatter of the points on the curve.
-  Eigen::Matrix<double, N, N> covariance;
+  /// Inverse of the normal equations, and the variance of a point of weight 1 from the scatter of
+  /// the points on the curve.
+  Eigen::Matrix<double, N, N> inverse;
+  double variance;
   /// Inliers, by the index of the point, and their number.
   std::vector<bool> inliers;
   int count;
-  /// RMS distance of the inliers.
-  double rms;
+  /// Sum of the weights, including those of the biweight.
+  double sum_of_weights;
+
+  /// Returns the covariance of the parameters. The variance of a point is at least `min_variance`.
+  Eigen::Matrix<double, N, N> covariance(double min_variance = 0) const {
+    return std::max(variance, min_variance) * inverse;
+  }
 };
 
 /// Computes a Gauss-Newton step from `distance(i)`, the CurveDistance of point i, for
@@ -61,9 +68,9 @@ std::optional<MEstimateStep<N>> compute_m_estimate_step(std::span<const double> 
   const double cut =
       std::min(4 * tolerance, tukey * std::max(sigma_from_median * median, tolerance / 10));
 
-  MEstimateStep<N> result{{}, {}, std::vector<bool>(weights.size()), 0, 0};
+  MEstimateStep<N> result{{}, {}, 0, std::vector<bool>(weights.size()), 0, 0};
   Normal<std::size_t(N)> normal;
-  double sum = 0, squares = 0, all = 0, psi_squares = 0, slopes = 0;
+  double all = 0, psi_squares = 0, slopes = 0;
   for (std::size_t i = 0; i < weights.size(); ++i) {
     const auto& [error, slope] = distances[i];
     const double relative_error = error / cut;
@@ -74,9 +81,8 @@ std::optional<MEstimateStep<N>> compute_m_estimate_step(std::span<const double> 
     all += weights[i];
     psi_squares += weights[i] * std::pow(inside * inside * error, 2);
     slopes += weights[i] * inside * (1 - 5 * relative_error * relative_error);
-    squares += error * error;
     normal.add_row(slope, error, weight);
-    sum += weight;
+    result.sum_of_weights += weight;
     ++result.count;
   }
   if (result.count < min_points || !(slopes > 0)) return std::nullopt;
@@ -84,14 +90,13 @@ std::optional<MEstimateStep<N>> compute_m_estimate_step(std::span<const double> 
   if (!factor.has_full_rank(1e-12)) return std::nullopt;
   const auto step = factor.solve(normal.gradient);
   std::copy(step.begin(), step.end(), result.step.begin());
-  result.rms = std::sqrt(squares / result.count);
   // Variance of an M-estimate: the mean of psi^2 over the squared mean of its slope.
-  const double variance = psi_squares * all / (slopes * slopes) * result.count / (result.count - N);
+  result.variance =
+      psi_squares * all / (slopes * slopes) * result.sum_of_weights / (result.count - N);
   for (int i = 0; i < N; ++i) {
     const auto column = factor.inverse_column(std::size_t(i));
-    std::copy(column.begin(), column.end(), result.covariance.col(i).begin());
+    std::copy(column.begin(), column.end(), result.inverse.col(i).begin());
   }
-  result.covariance *= variance * sum / result.count;
   return result;
 }
 

@@ -109,53 +109,33 @@ double compute_aspect_sd(const std::array<StraightEdge, 4>& edges, double per_px
   return std::sqrt(variance);
 }
 
-/// Returns the convex hull, counter-clockwise with x to the right and y up (Andrew's monotone
-/// chain).
-std::vector<Eigen::Vector2d> convex_hull(std::vector<Eigen::Vector2d> points) {
-  std::sort(points.begin(), points.end(), [](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
-    return a.x() != b.x() ? a.x() < b.x() : a.y() < b.y();
-  });
-  std::vector<Eigen::Vector2d> hull;
-  const auto add_chain = [&](auto begin, auto end) {
-    const std::size_t first = hull.size();
-    for (auto point = begin; point != end; ++point) {
-      while (hull.size() >= first + 2 &&
-             !(cross_product(hull.back() - hull[hull.size() - 2], *point - hull.back()) > 0)) {
-        hull.pop_back();
-      }
-      hull.push_back(*point);
-    }
-    hull.pop_back();  // first point of the other chain
-  };
-  add_chain(points.begin(), points.end());
-  add_chain(points.rbegin(), points.rend());
-  return hull;
-}
-
-/// Computes the minimum-area rectangle around the points, with the light on the left of its sides.
-/// One of its sides lies on a side of their convex hull (Freeman and Shapira 1975).
+/// Computes the minimum-area rectangle around the points, with the light on the left of its sides:
+/// tries directions 3 degrees apart, and then halves this step.
 Corners rectangle_around(const std::vector<Eigen::Vector2d>& points) {
-  const auto hull = convex_hull(points);
-  Corners best{points.front(), points.front(), points.front(), points.front()};
-  double min_area = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < hull.size(); ++i) {
-    const Eigen::Vector2d& from = hull[i];
-    const Eigen::Vector2d direction = (hull[(i + 1) % hull.size()] - from).normalized();
+  constexpr double coarse_rad = rad_from_deg(3), fine_rad = 1e-4;
+  const auto box_at = [&](double angle_rad) {
+    const Eigen::Rotation2Dd turn(-angle_rad);
     Eigen::AlignedBox2d box;
-    for (const Eigen::Vector2d& point : hull) {
-      const Eigen::Vector2d away = point - from;
-      box.extend(Eigen::Vector2d(direction.dot(away), cross_product(direction, away)));
-    }
-    if (!(box.volume() < min_area)) continue;
-    min_area = box.volume();
-    const Eigen::Vector2d left(-direction.y(), direction.x());
-    const auto corner = [&](double along, double across) -> Eigen::Vector2d {
-      return from + along * direction + across * left;
-    };
-    best = {corner(box.min().x(), box.min().y()), corner(box.max().x(), box.min().y()),
-            corner(box.max().x(), box.max().y()), corner(box.min().x(), box.max().y())};
+    for (const Eigen::Vector2d& point : points) box.extend(turn * point);
+    return box;
+  };
+  double best_rad = 0, min_area = std::numeric_limits<double>::infinity();
+  const auto improve = [&](double angle_rad) {
+    const double area = box_at(angle_rad).volume();
+    if (area < min_area) min_area = area, best_rad = angle_rad;
+  };
+  for (double angle_rad = 0; angle_rad < std::numbers::pi / 2; angle_rad += coarse_rad) {
+    improve(angle_rad);
   }
-  return best;
+  for (double step_rad = coarse_rad / 2; step_rad > fine_rad; step_rad /= 2) {
+    const double middle_rad = best_rad;
+    improve(middle_rad - step_rad);
+    improve(middle_rad + step_rad);
+  }
+  const Eigen::AlignedBox2d box = box_at(best_rad);
+  const Eigen::Rotation2Dd turn(best_rad);
+  return {turn * box.corner(box.BottomLeft), turn * box.corner(box.BottomRight),
+          turn * box.corner(box.TopRight), turn * box.corner(box.TopLeft)};
 }
 
 double off(const Side& side, const Eigen::Vector2d& point) {
@@ -473,9 +453,7 @@ double find_surest_blur_px(const FoundEdges& edges) {
 /// Finds hidden edges from the visible ones, see fit_rectangle().
 class HiddenEdges {
  public:
-  HiddenEdges(const ImageView& lines, const LineLevels& levels, double dark, double per_px,
-              const LightShape& shape)
-      : lines_(lines), levels_(levels), dark_(dark), per_px_(per_px), shape_(shape) {}
+  explicit HiddenEdges(const EdgeImage& image) : image_(image) {}
 
   /// Adds the missing edges. Returns false if two neighboring edges are missing or a missing edge
   /// is not found.
@@ -491,17 +469,16 @@ class HiddenEdges {
     }
     search.blur_px = find_surest_blur_px(visible);
     // The window extends to the next stripe, but not to the opposite edge.
-    search.reach_px = std::max(
-        search.reach_px, std::min(levels_.period_lines() + ramp_lines, min_side / per_px_ / 2));
+    search.reach_px = std::max(search.reach_px, std::min(image_.levels.period_lines() + ramp_lines,
+                                                         min_side / image_.per_px / 2));
     for (std::size_t i = 0; i < 4; ++i) {
       if (visible[i]) continue;
-      const auto side = predict_side(sides[i], visible, i);
+      const auto [side, direction_sd] = predict_side(sides[i], visible, i);
       if (!side) return false;
+      // Twice the sd, because apply_right_angles() uses the angles again.
+      const double slant_sd_px = direction_sd * side_length_px(*side);
       const auto find = [&](double offset_px, double offset_sd_px) {
-        // Twice the sd, because apply_right_angles() uses the angles again.
-        const double slant_sd_px = compute_direction_sd(visible, i) * side_length_px(*side);
-        return estimate_hidden_edge(lines_, *side, levels_, dark_, per_px_, search, shape_,
-                                    {offset_px, offset_sd_px, slant_sd_px});
+        return estimate_hidden_edge(image_, *side, search, {offset_px, offset_sd_px, slant_sd_px});
       };
       edges[i] = find(0, std::numeric_limits<double>::infinity());
       if (!edges[i]) return false;
@@ -510,7 +487,7 @@ class HiddenEdges {
       if (!place) continue;
       const Eigen::Vector2d moved =
           (edges[i]->side.from + edges[i]->side.to) / 2 - (side->from + side->to) / 2;
-      edges[i] = find(place->offset_px + moved.dot(side->inwards()) / per_px_, place->sd_px);
+      edges[i] = find(place->offset_px + moved.dot(side->inwards()) / image_.per_px, place->sd_px);
       if (!edges[i]) return false;
     }
     return true;
@@ -522,7 +499,9 @@ class HiddenEdges {
     double offset_px, sd_px;
   };
 
-  double side_length_px(const Side& side) const { return (side.to - side.from).norm() / per_px_; }
+  double side_length_px(const Side& side) const {
+    return (side.to - side.from).norm() / image_.per_px;
+  }
 
   /// Returns the variance of the direction of an edge, in rad^2.
   double compute_direction_variance(const StraightEdge& edge) const {
@@ -530,43 +509,31 @@ class HiddenEdges {
     return difference.dot(edge.covariance_px * difference) / square(side_length_px(edge.side));
   }
 
-  double compute_direction_weight(const StraightEdge& edge) const {
-    return 1 / (compute_direction_variance(edge) + square(get_tilt_sd(shape_)));
-  }
-
-  /// Returns the standard deviation of the direction of edge i, predicted from the other edges.
-  double compute_direction_sd(const FoundEdges& visible, std::size_t i) const {
-    double sum = 0, variance = 0;
-    for (std::size_t k = 1; k < 4; ++k) {
-      const auto& other = visible[(i + k) % 4];
-      if (!other) continue;
-      sum += compute_direction_weight(*other);
-      variance += square(compute_direction_weight(*other)) * compute_direction_variance(*other);
-    }
-    return std::sqrt(variance / square(sum) + square(get_tilt_sd(shape_)));
-  }
-
   /// Rotates side i about its middle by the mean rotation of the other edges, and extends it to its
-  /// neighbors.
-  std::optional<Side> predict_side(const Side& side, const FoundEdges& visible,
-                                   std::size_t i) const {
-    double sum = 0, moment = 0;
+  /// neighbors. Also returns the standard deviation of its direction, in rad.
+  std::pair<std::optional<Side>, double> predict_side(const Side& side, const FoundEdges& visible,
+                                                      std::size_t i) const {
+    const double tilt_variance = square(get_tilt_sd(image_.shape));
+    double sum = 0, moment = 0, variance = 0;
     for (std::size_t k = 1; k < 4; ++k) {
       const auto& other = visible[(i + k) % 4];
       if (!other) continue;
+      const double other_variance = compute_direction_variance(*other);
+      const double weight = 1 / (other_variance + tilt_variance);
       const Eigen::Vector2d direction =
           Eigen::Rotation2Dd(-double(k) * std::numbers::pi / 2) * other->side.direction();
-      sum += compute_direction_weight(*other);
-      moment +=
-          compute_direction_weight(*other) *
-          std::atan2(cross_product(side.direction(), direction), side.direction().dot(direction));
+      sum += weight;
+      moment += weight * std::atan2(cross_product(side.direction(), direction),
+                                    side.direction().dot(direction));
+      variance += square(weight) * other_variance;
     }
     const Eigen::Vector2d middle = (side.from + side.to) / 2;
     const Eigen::Vector2d half = Eigen::Rotation2Dd(moment / sum) * (side.to - middle);
     const Side turned{middle - half, middle + half};
     const auto from = find_intersection(turned, visible[(i + 3) % 4]->side);
     const auto to = find_intersection(turned, visible[(i + 1) % 4]->side);
-    return from && to ? std::optional(Side{*from, *to}) : std::nullopt;
+    return {from && to ? std::optional(Side{*from, *to}) : std::nullopt,
+            std::sqrt(variance / square(sum) + tilt_variance)};
   }
 
   /// Predicts the position of edge i from the other three by the aspect ratio of the only size that
@@ -578,15 +545,15 @@ class HiddenEdges {
                      clear = 3;  // standard deviations: a uniform distribution ends at sqrt(3)
     const StraightEdge &edge = *edges[i], &opposite = *edges[(i + 2) % 4];
     const StraightEdge &left = *edges[(i + 1) % 4], &right = *edges[(i + 3) % 4];
-    const double length_px = compute_distance(left.side, right.side) / per_px_;
-    const double depth_px = compute_distance(opposite.side, edge.side) / per_px_;
+    const double length_px = compute_distance(left.side, right.side) / image_.per_px;
+    const double depth_px = compute_distance(opposite.side, edge.side) / image_.per_px;
     std::optional<Place> place;
     // The variance of the opposite edge counts three times. Edges are assumed to be independent,
     // but its error moves both edges.
     for (const Eigen::Vector2d& size_m : sizes_m) {
       for (const double ratio : {size_m[0] / size_m[1], size_m[1] / size_m[0]}) {
         const double relative_variance =
-            square(get_tilt_sd(shape_)) +
+            square(get_tilt_sd(image_.shape)) +
             square(size_sd_m) * size_m.cwiseAbs2().cwiseInverse().sum();
         const double variance =
             relative_variance * square(ratio * length_px) + 3 * compute_middle_variance(opposite) +
@@ -602,10 +569,7 @@ class HiddenEdges {
     return place;
   }
 
-  const ImageView& lines_;
-  const LineLevels& levels_;
-  double dark_, per_px_;
-  const LightShape& shape_;
+  const EdgeImage& image_;
 };
 
 }  // namespace
@@ -692,14 +656,13 @@ std::optional<Light> fit_rectangle(const ImageView& lines, const Blob& blob,
     const LineLevels levels(lines, chords, background);
     search.reach_px = std::min(search.reach_px + bow_px, min_side / per_px / 2);
     search.blur_px = blur_px;
+    const EdgeImage image{lines, levels, background.level, per_px, shape};
     FoundEdges found_edges;
     for (std::size_t i = 0; i < 4; ++i) {
-      found_edges[i] =
-          fit_straight_edge(lines, sides[i], levels, background.level, per_px, search, shape);
+      found_edges[i] = fit_straight_edge(image, sides[i], search);
     }
     if (!std::ranges::all_of(found_edges, [](const auto& edge) { return edge.has_value(); })) {
-      const HiddenEdges hidden(lines, levels, background.level, per_px, shape);
-      if (!shape.has_lens() || !hidden.add_to(found_edges, sides, search, sizes_m) ||
+      if (!shape.has_lens() || !HiddenEdges(image).add_to(found_edges, sides, search, sizes_m) ||
           is_rather_round(sides)) {
         return std::nullopt;
       }

@@ -379,19 +379,6 @@ double bright_level(const ImageView& image, const Blob& blob, double dark) {
   return *tenth - dark;
 }
 
-/// Returns the number of points with a common error: those of a stripe, on consecutive scanlines.
-double points_of_a_stripe(const std::vector<EdgePoint>& outline) {
-  constexpr double next = 2.5;
-  std::array<double, 2> last{-1e9, -1e9};
-  double stripes = 0;
-  for (const EdgePoint& point : outline) {
-    double& row = last[point.begins ? 0 : 1];
-    if (point.pixel.y() - row > next) ++stripes;
-    row = point.pixel.y();
-  }
-  return double(outline.size()) / std::max(1.0, stripes);
-}
-
 /// Fits a light and the sigma of its center to the steps next to its outline. These have no bias if
 /// the contrast of the sides differs. Returns std::nullopt unless most pieces of the outline show a
 /// step.
@@ -474,9 +461,8 @@ std::optional<Rim> fit_rim(const ImageView& image, const Blob& blob, const Backg
   if (fitted) {
     light = std::move(fitted);
   } else {
-    const double scatter_px = light->sigma_px * std::sqrt(points_of_a_stripe(light->outline));
     const auto jackknife_px = estimate_jackknife_sd_px(*light, background, shape);
-    light->sigma_px = std::max(scatter_px, jackknife_px.value_or(0));
+    light->sigma_px = std::max(light->sigma_px, jackknife_px.value_or(0));
     is_clear = jackknife_px.has_value();
   }
   light->is_uneven = true;

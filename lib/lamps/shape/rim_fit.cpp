@@ -9,8 +9,6 @@
 #include <numbers>
 #include <utility>
 
-#include "geometry/median.h"
-#include "geometry/normal_equations.h"
 #include "lamps/shape/m_estimate.h"
 
 namespace vlp {
@@ -258,8 +256,9 @@ std::optional<Step> fit_step(const Piece& piece, double dark, const StepImageMod
     model.x -= last->step.cwiseMin(limit).cwiseMax(-limit);
     if (!(std::abs(model.x[kAt]) < farthest_px)) return std::nullopt;
   }
-  return Step{model.x[kAt], std::sqrt(last->covariance(kAt, kAt)), model.x[kLogBlur],
-              std::sqrt(last->covariance(kLogBlur, kLogBlur))};
+  const auto covariance = last->covariance();
+  return Step{model.x[kAt], std::sqrt(covariance(kAt, kAt)), model.x[kLogBlur],
+              std::sqrt(covariance(kLogBlur, kLogBlur))};
 }
 
 }  // namespace
@@ -307,49 +306,26 @@ namespace {
 template <int N>
 std::optional<OutlineShift> estimate_shift(const std::vector<RimPiece>& pieces) {
   constexpr int num_iterations = 8;
-  constexpr double tukey = 4.685, sigma_from_median = 1.4826;
-  if (pieces.size() < N + 2) return std::nullopt;
-  using Vector = Eigen::Matrix<double, N, 1>;
-  const auto evaluate_slope = [](const RimPiece& piece) {
-    const double c = piece.inwards.x(), s = piece.inwards.y();
-    Vector slope;
-    slope[0] = c, slope[1] = s, slope[2] = -1;
-    if constexpr (N > 3) slope[3] = c * c - s * s, slope[4] = 2 * c * s;
-    return Vector(slope / piece.sd_px);
-  };
-  Vector x = Vector::Zero();
-  OutlineShift shift{};
+  constexpr double tolerance = 10;  // its tenth, the smallest scale, is one standard deviation
+  const std::vector<double> weights(pieces.size(), 1);
+  Eigen::Matrix<double, N, 1> x = Eigen::Matrix<double, N, 1>::Zero();
+  std::optional<MEstimateStep<N>> last;
   for (int round = 0; round < num_iterations; ++round) {
-    std::vector<double> errors, sizes;
-    for (const RimPiece& piece : pieces) {
-      errors.push_back(piece.behind_px / piece.sd_px - evaluate_slope(piece).dot(x));
-      sizes.push_back(std::abs(errors.back()));
-    }
-    const double scale = std::max(1.0, sigma_from_median * upper_median(std::move(sizes)));
-    Normal<std::size_t(N)> normal;
-    double squares = 0, all = 0;
-    for (std::size_t i = 0; i < pieces.size(); ++i) {
-      const double fraction = errors[i] / (tukey * scale);
-      if (std::abs(fraction) >= 1) continue;
-      const double weight = std::pow(1 - fraction * fraction, 2);
-      normal.add_row(evaluate_slope(pieces[i]), errors[i], weight);
-      squares += weight * errors[i] * errors[i];
-      all += weight;
-    }
-    const Cholesky<std::size_t(N)> factor(normal);
-    if (!factor.has_full_rank(1e-9) || !(all > N + 1)) return std::nullopt;
-    const auto step = factor.solve(normal.gradient);
-    for (int i = 0; i < N; ++i) x[i] += step[std::size_t(i)];
-    const double beyond = std::max(1.0, squares / (all - N));
-    for (int i = 0; i < 2; ++i) {
-      const auto column = factor.inverse_column(std::size_t(i));
-      shift.covariance(0, i) = beyond * column[0];
-      shift.covariance(1, i) = beyond * column[1];
-    }
-    shift.px = x.template head<2>();
-    shift.num_inliers = all;
+    last = compute_m_estimate_step<N>(weights, tolerance, [&](std::size_t i) {
+      const auto& [inwards, behind_px, sd_px] = pieces[i];
+      const double c = inwards.x(), s = inwards.y();
+      CurveDistance<N> result;
+      result.slope.template head<3>() << -c, -s, 1;
+      if constexpr (N > 3) result.slope.template tail<2>() << s * s - c * c, -2 * c * s;
+      result.slope /= sd_px;
+      result.error = behind_px / sd_px + result.slope.dot(x);
+      return result;
+    });
+    if (!last) return std::nullopt;
+    x -= last->step;
   }
-  return shift;
+  return OutlineShift{x.template head<2>(), last->covariance(1).template topLeftCorner<2, 2>(),
+                      last->sum_of_weights};
 }
 
 }  // namespace

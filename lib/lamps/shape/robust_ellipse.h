@@ -7,21 +7,36 @@
 #include <span>
 #include <vector>
 
+#include "geometry/circle_fit.h"
 #include "geometry/types.h"
 
 namespace vlp {
 
-/// Result of fit_robust_ellipse() and fit_slender_ellipse().
+/// Circle or ellipse that fits most of the points.
 struct RobustEllipse {
   Eigen::Vector2d center;
   /// Points of the ellipse: center + rim_from_circle * (cos a, sin a). Symmetric.
   Matrix2 rim_from_circle;
-  /// Covariance of the center, from the scatter of the points on the ellipse.
+  /// Covariance of the center, from the scatter of the inliers.
   Matrix2 center_covariance;
   /// Inliers, by the index of the point, and their number.
   std::vector<bool> inliers;
   int count;
+
+  /// Returns the circle. @pre The fit is that of fit_robust_circle().
+  Circle circle() const { return {center, rim_from_circle(0, 0)}; }
 };
+
+/// Returns the diagonal of the bounding box of the points; 0 if there are none.
+double compute_extent(std::span<const Eigen::Vector2d> points);
+
+/// Fits the circle that most of the points support. Selects the best of many circles through three
+/// points each (RANSAC, Fischler and Bolles 1981, with a fixed choice of triples). Then applies
+/// Gauss-Newton with Tukey's biweight to the distances from the circle. `tolerance` is the smallest
+/// distance of an outlier, in the unit of the points. Returns std::nullopt for fewer than five
+/// points, or if less than five agree.
+std::optional<RobustEllipse> fit_robust_circle(std::span<const Eigen::Vector2d> points,
+                                               std::span<const double> weights, double tolerance);
 
 /// Fits the nearly circular ellipse that most of the points support. Starts from the circle of
 /// fit_robust_circle() with a tolerance of an eighth of its size. Then applies Gauss-Newton with

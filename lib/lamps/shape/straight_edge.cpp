@@ -30,26 +30,27 @@ struct Sample {
   double depth_px, per_move;
 };
 
-/// Unknowns, in this order; the curvature kBow is used only without a lens.
+/// Unknowns, in this order.
 enum Unknown { kFrom, kTo, kBlur, kLevelFrom, kLevelTo, kLevelBend, kOutside, kBow };
+constexpr int kUnknowns = 8;
+using Unknowns = Eigen::Matrix<double, kUnknowns, 1>;
 
-template <int N>
 struct Model {
-  Eigen::Matrix<double, N, 1> x;
+  Unknowns x;
 
   /// Returns the residual and its derivative with respect to the unknowns. `d_residual_d_level`
   /// receives the derivative with respect to the scanline's level.
-  CurveDistance<N> residual(const Sample& sample, double* d_residual_d_level = nullptr) const {
+  CurveDistance<kUnknowns> residual(const Sample& sample,
+                                    double* d_residual_d_level = nullptr) const {
     const double t = sample.t, middle = 4 * t * (1 - t);
-    double move = (1 - t) * x[kFrom] + t * x[kTo];
-    if constexpr (N > kBow) move += middle * x[kBow];
+    const double move = (1 - t) * x[kFrom] + t * x[kTo] + middle * x[kBow];
     const double depth = (sample.depth_px - sample.per_move * move) / x[kBlur];
     const double inside = std::erfc(-depth / std::numbers::sqrt2) / 2;
     const double density = std::exp(-depth * depth / 2) / std::sqrt(2 * std::numbers::pi);
     const double level = (1 - t) * x[kLevelFrom] + t * x[kLevelTo] + middle * x[kLevelBend];
     const double s = sample.lit.level, step = s * (level - x[kOutside]);
     const double modeled = x[kOutside] + (level - x[kOutside]) * inside;
-    CurveDistance<N> result;
+    CurveDistance<kUnknowns> result;
     result.error = sample.value - s * modeled;
     const double d_residual_d_move = step * density / x[kBlur] * sample.per_move;
     result.slope[kFrom] = d_residual_d_move * (1 - t);
@@ -59,7 +60,7 @@ struct Model {
     result.slope[kLevelTo] = -s * inside * t;
     result.slope[kLevelBend] = -s * inside * middle;
     result.slope[kOutside] = -s * (1 - inside);
-    if constexpr (N > kBow) result.slope[kBow] = d_residual_d_move * middle;
+    result.slope[kBow] = d_residual_d_move * middle;
     if (d_residual_d_level != nullptr) *d_residual_d_level = -modeled;
     return result;
   }
@@ -68,16 +69,9 @@ struct Model {
 /// Collects the samples of a side.
 class Samples {
  public:
-  Samples(const ImageView& lines, const Side& side, const LineLevels& levels, double dark,
-          double per_px, const EdgeSearch& search, const LightShape& shape,
+  Samples(const EdgeImage& image, const Side& side, const EdgeSearch& search,
           bool can_leave_image = false)
-      : lines_(lines),
-        side_(side),
-        levels_(levels),
-        dark_(dark),
-        per_px_(per_px),
-        shape_(shape),
-        can_leave_image_(can_leave_image) {
+      : image_(image), side_(side), can_leave_image_(can_leave_image) {
     if (!trace()) return;
     // A corner is blurred by both sides.
     constexpr double corner_px = 4;
@@ -117,17 +111,18 @@ class Samples {
   /// Returns true if a scanline is not dark.
   bool is_lit(int line) const {
     constexpr double minimum = 0.1;
-    const auto lit = levels_.at(line);
+    const auto lit = image_.levels.at(line);
     return lit && lit->level > minimum;
   }
 
   bool trace() {
     for (int i = 0; i <= kPieces; ++i) {
       const double t = double(i) / kPieces;
-      const auto pixel = shape_.plane_to_pixel(side_.from + t * (side_.to - side_.from));
+      const auto pixel = image_.shape.plane_to_pixel(side_.from + t * (side_.to - side_.from));
       if (!pixel) return false;
-      const Eigen::Vector2d at = shape_.turned(*pixel);
-      if (!(at.minCoeff() > -1 && at.x() < lines_.width && at.y() < lines_.height)) return false;
+      const Eigen::Vector2d at = image_.shape.turned(*pixel);
+      if (!(at.minCoeff() > -1 && at.x() < image_.lines.width && at.y() < image_.lines.height))
+        return false;
       trace_[static_cast<std::size_t>(i)] = at;
     }
     return true;
@@ -142,10 +137,6 @@ class Samples {
     return trace_.front();
   }
 
-  double read_value(int column, int row) const {
-    return (lines_.level_at(column, row) - dark_) / levels_.brightest();
-  }
-
   /// Adds the pixels across the side at one column or row. Returns false if they are outside the
   /// image or the plane.
   bool add_position(int position, int along, double reach_px) {
@@ -154,7 +145,7 @@ class Samples {
     const Eigen::Vector2d edge = crossing(position, along);
     const Eigen::Vector2d middle = edge.array().round();
     const auto plane = [&](const Eigen::Vector2d& pixel) {
-      return shape_.pixel_to_plane(shape_.turned(pixel));
+      return image_.shape.pixel_to_plane(image_.shape.turned(pixel));
     };
     const auto here = plane(middle);
     const auto right = plane(middle + Eigen::Vector2d(apart_px, 0));
@@ -173,29 +164,27 @@ class Samples {
       Eigen::Vector2d pixel = middle;
       pixel[across] += i;
       const int column = static_cast<int>(pixel.x()), row = static_cast<int>(pixel.y());
-      if (column < 0 || row < 0 || column >= lines_.width || row >= lines_.height) {
+      if (column < 0 || row < 0 || column >= image_.lines.width || row >= image_.lines.height) {
         if (can_leave_image_) continue;
         return false;
       }
-      const auto lit = levels_.at(row);
+      const auto lit = image_.levels.at(row);
       if (!lit) continue;
       const Eigen::Vector2d away = *here + plane_from_pixel * (pixel - middle) - side_.from;
-      const double fraction = levels_.relative_level_at(column);
-      samples.push_back({row,
-                         {fraction * lit->level, fraction * lit->sd},
-                         read_value(column, row),
-                         away.dot(side_.direction()) / length,
-                         away.dot(inwards) / px,
-                         per_px_ / px});
+      const double fraction = image_.levels.relative_level_at(column);
+      samples.push_back(
+          {row,
+           {fraction * lit->level, fraction * lit->sd},
+           (image_.lines.level_at(column, row) - image_.dark) / image_.levels.brightest(),
+           away.dot(side_.direction()) / length,
+           away.dot(inwards) / px,
+           image_.per_px / px});
     }
     return true;
   }
 
-  ImageView lines_;
+  const EdgeImage& image_;
   const Side& side_;
-  const LineLevels& levels_;
-  double dark_, per_px_;
-  const LightShape& shape_;
   bool can_leave_image_;
   std::array<Eigen::Vector2d, kPieces + 1> trace_;
 };
@@ -208,20 +197,20 @@ struct Priors {
   double length_px;
   /// Standard deviation of the blur; 0 if unknown.
   double blur_px;
-  double focal_px;
+  /// Standard deviation of the curvature of the edge: that of a lens of 115 degrees from corner to
+  /// corner without a lens, nearly 0 with one.
+  double bow_sd_px;
 };
 
 /// Number of priors. The level changes by 10 % in 100 px and its curvature is half of that, one
 /// standard deviation each, because the pixels of short sides do not determine it. The third one is
-/// the blur. Without a lens the fourth one is the curvature of the edge, with the value of a lens
-/// of 115 degrees from corner to corner as standard deviation.
-template <int N>
-constexpr std::size_t kNumPriors = N > kBow ? 4 : 3;
+/// the blur, the fourth one the curvature of the edge.
+constexpr std::size_t kNumPriors = 4;
 
-template <int N>
-CurveDistance<N> evaluate_prior(const Model<N>& model, std::size_t which, const Priors& priors) {
+CurveDistance<kUnknowns> evaluate_prior(const Model& model, std::size_t which,
+                                        const Priors& priors) {
   constexpr double change = 0.1 / 100, curvature = 0.05 / 100, blur_sd = 0.15;
-  CurveDistance<N> result{0, Eigen::Matrix<double, N, 1>::Zero()};
+  CurveDistance<kUnknowns> result{0, Unknowns::Zero()};
   const auto expect = [&](int unknown, double value, double sd) {
     result.error = kNoise / sd * (model.x[unknown] - value);
     result.slope[unknown] = kNoise / sd;
@@ -233,8 +222,8 @@ CurveDistance<N> evaluate_prior(const Model<N>& model, std::size_t which, const 
     expect(kLevelBend, 0, curvature * priors.length_px);
   } else if (which == 2) {
     if (priors.blur_px > 0) expect(kBlur, priors.blur_px, blur_sd * priors.blur_px);
-  } else if constexpr (N > kBow) {
-    expect(kBow, 0, priors.length_px * priors.length_px / (12 * priors.focal_px));
+  } else {
+    expect(kBow, 0, priors.bow_sd_px);
   }
   return result;
 }
@@ -242,28 +231,27 @@ CurveDistance<N> evaluate_prior(const Model<N>& model, std::size_t which, const 
 /// Computes the covariance of the two ends from three sources. The squared residual of each pixel
 /// is used, because bright pixels are noisier than dark ones (White 1980). Errors of the levels of
 /// scanlines are common to their pixels. The priors contribute as well.
-template <int N>
-std::optional<Matrix2> compute_ends_covariance(const Model<N>& model,
+std::optional<Matrix2> compute_ends_covariance(const Model& model,
                                                const std::vector<Sample>& samples,
                                                const std::vector<double>& weights,
                                                const std::vector<bool>& inliers,
                                                const Priors& priors) {
-  Normal<std::size_t(N)> normal;
+  Normal<kUnknowns> normal;
   double count = 0;
   for (std::size_t i = 0; i < samples.size(); ++i) {
     if (!inliers[i]) continue;
     normal.add_row(model.residual(samples[i]).slope, 0, weights[i]);
     ++count;
   }
-  for (std::size_t which = 0; which < kNumPriors<N>; ++which) {
+  for (std::size_t which = 0; which < kNumPriors; ++which) {
     normal.add_row(evaluate_prior(model, which, priors).slope, 0);
   }
-  const Cholesky<std::size_t(N)> factor(normal);
-  if (!factor.has_full_rank(1e-12) || !(count > N)) return std::nullopt;
+  const Cholesky<kUnknowns> factor(normal);
+  if (!factor.has_full_rank(1e-12) || !(count > kUnknowns)) return std::nullopt;
   const auto from = factor.inverse_column(kFrom), to = factor.inverse_column(kTo);
-  const auto ends_moved_by = [&](const Eigen::Matrix<double, N, 1>& pull) {
+  const auto ends_moved_by = [&](const Unknowns& pull) {
     Eigen::Vector2d moved(0, 0);
-    for (std::size_t i = 0; i < N; ++i) {
+    for (std::size_t i = 0; i < kUnknowns; ++i) {
       moved += pull[Eigen::Index(i)] * Eigen::Vector2d(from[i], to[i]);
     }
     return moved;
@@ -281,8 +269,8 @@ std::optional<Matrix2> compute_ends_covariance(const Model<N>& model,
     d_ends_d_level += d_residual_d_level * moved;
     sd = samples[i].lit.sd;
   }
-  covariance *= count / (count - N);
-  for (std::size_t which = 0; which < kNumPriors<N>; ++which) {
+  covariance *= count / (count - kUnknowns);
+  for (std::size_t which = 0; which < kNumPriors; ++which) {
     const Eigen::Vector2d moved =
         kNoise * ends_moved_by(evaluate_prior(model, which, priors).slope);
     covariance += moved * moved.transpose();
@@ -294,7 +282,6 @@ std::optional<Matrix2> compute_ends_covariance(const Model<N>& model,
   return covariance;
 }
 
-template <int N>
 std::optional<StraightEdge> fit(const Samples& all, const Side& side, double per_px,
                                 const Priors& priors) {
   constexpr std::array tolerances = {5.0, 5.0, 5.0, 5.0, 2.0, 1.0, 0.5, 0.3, 0.3, 0.3};
@@ -302,16 +289,16 @@ std::optional<StraightEdge> fit(const Samples& all, const Side& side, double per
   constexpr double max_move_px = 1.5, farthest_px = 8, min_step = 0.4, max_sd_px = 0.5;
   constexpr double near = 3, min_lit = 0.3, explained = 0.15, min_fraction = 0.8;
   const std::vector<Sample>& samples = all.samples;
-  std::vector<double> weights(samples.size() + kNumPriors<N>, 1);
+  std::vector<double> weights(samples.size() + kNumPriors, 1);
   for (std::size_t i = 0; i < samples.size(); ++i) {
     weights[i] = 1 / (1 + std::pow(samples[i].lit.sd / kNoise, 2));
   }
-  Model<N> model{Eigen::Matrix<double, N, 1>::Zero()};
+  Model model{Unknowns::Zero()};
   model.x[kBlur] = priors.blur_px > 0 ? priors.blur_px : first_blur_px;
   model.x[kLevelFrom] = model.x[kLevelTo] = 1;
-  std::optional<MEstimateStep<N>> last;
+  std::optional<MEstimateStep<kUnknowns>> last;
   for (const double tolerance : tolerances) {
-    last = compute_m_estimate_step<N>(weights, tolerance, [&](std::size_t i) {
+    last = compute_m_estimate_step<kUnknowns>(weights, tolerance, [&](std::size_t i) {
       return i < samples.size() ? model.residual(samples[i])
                                 : evaluate_prior(model, i - samples.size(), priors);
     });
@@ -322,7 +309,7 @@ std::optional<StraightEdge> fit(const Samples& all, const Side& side, double per
     }
     model.x -= step;
     model.x[kBlur] = std::clamp(model.x[kBlur], sharpest_px, softest_px);
-    if (model.x.template head<2>().cwiseAbs().maxCoeff() > farthest_px) return std::nullopt;
+    if (model.x.head<2>().cwiseAbs().maxCoeff() > farthest_px) return std::nullopt;
   }
   const auto& x = model.x;
   const double min_level = std::min(x[kLevelFrom], x[kLevelTo]);
@@ -335,8 +322,7 @@ std::optional<StraightEdge> fit(const Samples& all, const Side& side, double per
   edge.side = {side.from + x[kFrom] * inwards, side.to + x[kTo] * inwards};
   edge.covariance_px = *covariance;
   edge.blur_px = x[kBlur];
-  edge.bow_px = 0;
-  if constexpr (N > kBow) edge.bow_px = x[kBow];
+  edge.bow_px = x[kBow];
   if (!(edge.covariance_px.diagonal().maxCoeff() < max_sd_px * max_sd_px)) return std::nullopt;
   int close = 0, like = 0;
   for (const Sample& sample : samples) {
@@ -453,17 +439,18 @@ Ends average_ends(const HiddenEdge& edge, const HiddenEdgePrior& prior, double r
 
 }  // namespace
 
-std::optional<StraightEdge> fit_straight_edge(const ImageView& lines, const Side& side,
-                                              const LineLevels& levels, double dark, double per_px,
-                                              const EdgeSearch& search, const LightShape& shape) {
+std::optional<StraightEdge> fit_straight_edge(const EdgeImage& image, const Side& side,
+                                              const EdgeSearch& search) {
   constexpr double min_lit = 0.35, rise_of_blur = 1.349;
   constexpr std::size_t minimum = 40;
-  const Samples all(lines, side, levels, dark, per_px, search, shape);
+  constexpr double straight_px = 1e-4;
+  const auto& [lines, levels, dark, per_px, shape] = image;
+  const Samples all(image, side, search);
   if (all.samples.size() < minimum) return std::nullopt;
   const double length_px = (all.at(1) - all.at(0)).norm();
-  const Priors priors{length_px, search.blur_px, std::hypot(lines.width, lines.height) / 2};
-  auto edge = shape.has_lens() ? fit<kBow>(all, side, per_px, priors)
-                               : fit<kBow + 1>(all, side, per_px, priors);
+  const double focal_px = std::hypot(lines.width, lines.height) / 2;
+  const double bow_sd_px = shape.has_lens() ? straight_px : length_px * length_px / (12 * focal_px);
+  auto edge = fit(all, side, per_px, {length_px, search.blur_px, bow_sd_px});
   if (!edge) return std::nullopt;
   const Side& found = edge->side;
   const auto points = static_cast<int>(length_px);
@@ -480,19 +467,17 @@ std::optional<StraightEdge> fit_straight_edge(const ImageView& lines, const Side
   return edge;
 }
 
-std::optional<StraightEdge> estimate_hidden_edge(const ImageView& lines, const Side& side,
-                                                 const LineLevels& levels, double dark,
-                                                 double per_px, const EdgeSearch& search,
-                                                 const LightShape& shape,
+std::optional<StraightEdge> estimate_hidden_edge(const EdgeImage& image, const Side& side,
+                                                 const EdgeSearch& search,
                                                  const HiddenEdgePrior& prior) {
   constexpr double min_fraction = 0.8;
-  const Samples all(lines, side, levels, dark, per_px, search, shape, true);
+  const Samples all(image, side, search, true);
   if (all.samples.empty()) return std::nullopt;
   const HiddenEdge hidden(all.samples, search.blur_px);
   const auto [ends_px, covariance_px] = average_ends(hidden, prior, search.reach_px);
   const double fraction = hidden.compute_explained_fraction(ends_px);
   if (fraction < min_fraction) return std::nullopt;
-  const Eigen::Vector2d inwards = side.inwards() * per_px;
+  const Eigen::Vector2d inwards = side.inwards() * image.per_px;
   const Side found{side.from + ends_px[0] * inwards, side.to + ends_px[1] * inwards};
   return StraightEdge{found, covariance_px, search.blur_px, 0, fraction, {}};
 }

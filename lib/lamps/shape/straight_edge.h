@@ -26,12 +26,21 @@ struct Side {
   }
 };
 
+/// Image of a light and the plane in which its edges are straight.
+struct EdgeImage {
+  const ImageView& lines;
+  const LineLevels& levels;
+  double dark;
+  /// Size of a pixel in the plane.
+  double per_px;
+  const LightShape& shape;
+};
+
 /// Edge of a light that was fitted along a side.
 struct StraightEdge {
   /// Side moved to the fitted edge.
   Side side;
-  /// Covariance of the distances of both ends from the edge, in square pixels; `per_px` converts
-  /// pixels to the plane.
+  /// Covariance of the distances of both ends from the edge, in square pixels.
   Matrix2 covariance_px;
   /// Standard deviation of the blur across the edge.
   double blur_px;
@@ -80,9 +89,8 @@ struct HiddenEdgePrior {
 /// The covariance includes the scatter of the pixels and the standard deviations of the scanline
 /// levels, see LineLevels. Returns std::nullopt if an end has a standard deviation above half a
 /// pixel, or if less than 80 % of the pixels match the edge model.
-std::optional<StraightEdge> fit_straight_edge(const ImageView& lines, const Side& side,
-                                              const LineLevels& levels, double dark, double per_px,
-                                              const EdgeSearch& search, const LightShape& shape);
+std::optional<StraightEdge> fit_straight_edge(const EdgeImage& image, const Side& side,
+                                              const EdgeSearch& search);
 
 /// Estimates an edge that a dark stripe hides partly or completely: the mean and the covariance of
 /// its ends, from the likelihood of all pixels near the side.
@@ -95,10 +103,8 @@ std::optional<StraightEdge> fit_straight_edge(const ImageView& lines, const Side
 /// on lit scanlines. The edge may lie outside the image; it has no `points`.
 ///
 /// @pre search.blur_px > 0
-std::optional<StraightEdge> estimate_hidden_edge(const ImageView& lines, const Side& side,
-                                                 const LineLevels& levels, double dark,
-                                                 double per_px, const EdgeSearch& search,
-                                                 const LightShape& shape,
+std::optional<StraightEdge> estimate_hidden_edge(const EdgeImage& image, const Side& side,
+                                                 const EdgeSearch& search,
                                                  const HiddenEdgePrior& prior);
 
 }  // namespace vlp

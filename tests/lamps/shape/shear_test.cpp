@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "geometry/arc.h"
-#include "lamps/shape/robust_circle.h"
+#include "lamps/shape/robust_ellipse.h"
 #include "support/matchers.h"
 #include "support/random.h"
 
@@ -40,8 +40,8 @@ class MovingCamera {
                                       motion_at(center));
     for (Vector2d& point : points) point += noise * Vector2d(random.normal(), random.normal());
     const std::vector<double> weights(points.size(), 1);
-    const RobustCircle circle = fit_robust_circle(points, weights, 1e-3).value();
-    return {points, weights, circle.inliers, circle.circle, kLineSlope};
+    const RobustEllipse circle = fit_robust_circle(points, weights, 1e-3).value();
+    return {points, weights, circle.inliers, circle.circle(), kLineSlope};
   }
 
   Vector2d v{2.0e-5, -1.5e-5};
