@@ -47,20 +47,18 @@ class Histogram {
   int count_ = 0, highest_ = 0;
 };
 
-template <typename Level>
 Histogram sample_histogram(const ImageView& image) {
   constexpr double sufficient_count = 8000;
   const double pixels = static_cast<double>(image.height) * image.width;
   // An odd step that shifts from row to row samples all rows and columns of a periodic pattern.
   const int step = static_cast<int>(std::sqrt(pixels / sufficient_count)) | 1;
-  Histogram sample(std::numeric_limits<Level>::max() + 1);
+  Histogram sample(image.max_level() + 1);
   for (int row = std::min(step / 2, image.height / 2); row < image.height; row += step) {
-    const auto* line = image.row<Level>(row);
     for (int column = row / step % step; column < image.width; column += step) {
-      sample.add(line[column]);
+      sample.add(image.level_at(column, row));
     }
   }
-  if (sample.count() == 0) sample.add(*image.row<Level>(0));
+  if (sample.count() == 0) sample.add(image.level_at(0, 0));
   return sample;
 }
 
@@ -101,7 +99,10 @@ double noise_above(const Histogram& sample, int median) {
   return std::min(above(80) / 0.8416, above(90) / 1.2816);
 }
 
-Background background(const Histogram& sample) {
+}  // namespace
+
+Background estimate_background(const ImageView& image) {
+  const Histogram sample = sample_histogram(image);
   const double step = find_level_step(sample);
   const int half = sample.count() / 2, median = sample.level_at(half);
   // Lit pixels are above the median; the pixels below contain only noise.
@@ -128,13 +129,6 @@ Background background(const Histogram& sample) {
   noise = std::max(noise, min_noise);
   constexpr double clear = 4.5, min_steps = 1.6;
   return {level, noise, level + std::max(clear * noise, min_steps * step)};
-}
-
-}  // namespace
-
-Background estimate_background(const ImageView& image) {
-  return background(
-      visit_levels(image, [&](auto level) { return sample_histogram<decltype(level)>(image); }));
 }
 
 }  // namespace vlp

@@ -3,7 +3,6 @@
 #include "lamps/image/pixel_runs.h"
 
 #include <algorithm>
-#include <cstdint>
 #include <numeric>
 
 namespace vlp {

@@ -297,19 +297,16 @@ std::vector<Eigen::Vector2d> make_polygon(const Sides& sides, double inset,
 /// edge 1, and so on.
 using EndsCovariance = Eigen::Matrix<double, 8, 8>;
 
-EndsCovariance make_ends_covariance(const std::array<StraightEdge, 4>& edges) {
-  EndsCovariance covariance = EndsCovariance::Zero();
-  for (int i = 0; i < 4; ++i) {
-    covariance.block<2, 2>(2 * i, 2 * i) = edges[std::size_t(i)].covariance_px;
-  }
-  return covariance;
+/// Returns the covariance of the two ends of an edge.
+auto get_block(EndsCovariance& ends, std::size_t edge) {
+  return ends.block<2, 2>(2 * Eigen::Index(edge), 2 * Eigen::Index(edge));
 }
 
 /// Moves the sides to the most probable rectangle, and updates the covariance (Kalman's update). A
 /// tilt error makes opposite sides converge by its product with their distance, in the plane at
-/// height 1, and changes right angles by get_tilt_sd(). Contradictory angles are not corrected,
-/// because an object may hide a part.
-void apply_right_angles(const LightShape& shape, double per_px, Sides& sides,
+/// height 1, and changes right angles by get_tilt_sd(). Returns false, without a correction, if the
+/// angles contradict, because an object may hide a part.
+bool apply_right_angles(const LightShape& shape, double per_px, Sides& sides,
                         EndsCovariance& covariance) {
   constexpr double clear = 16;      // chi-square of three angles: one in a thousand
   constexpr double per_lean = 1.5;  // tilt error in rad over get_tilt_sd()
@@ -332,7 +329,7 @@ void apply_right_angles(const LightShape& shape, double per_px, Sides& sides,
   Eigen::Matrix3d spread = slope * covariance * slope.transpose();
   spread.diagonal() += sds.cwiseAbs2();
   const Eigen::LDLT<Eigen::Matrix3d> factor(spread);
-  if (!(angles.dot(factor.solve(angles)) < clear)) return;
+  if (!(angles.dot(factor.solve(angles)) < clear)) return false;
   const Eigen::Matrix<double, 8, 3> gain = factor.solve(slope * covariance).transpose();
   const Eigen::Matrix<double, 8, 1> moved_px = -gain * angles;
   covariance -= gain * slope * covariance;
@@ -341,6 +338,7 @@ void apply_right_angles(const LightShape& shape, double per_px, Sides& sides,
     sides[i].from += moved_px[2 * Eigen::Index(i)] * inwards;
     sides[i].to += moved_px[2 * Eigen::Index(i) + 1] * inwards;
   }
+  return true;
 }
 
 /// Computes the covariance of the image of the center, in square pixels, from that of the ends.
@@ -385,8 +383,11 @@ std::optional<Light> fit_light(std::array<StraightEdge, 4>& edges, double per_px
                                const Eigen::Vector2d& middle, const LightShape& shape) {
   constexpr double outlier_px = 3;
   Sides sides;
-  for (std::size_t i = 0; i < 4; ++i) sides[i] = edges[i].side;
-  EndsCovariance ends = make_ends_covariance(edges);
+  EndsCovariance ends = EndsCovariance::Zero();
+  for (std::size_t i = 0; i < 4; ++i) {
+    sides[i] = edges[i].side;
+    get_block(ends, i) = edges[i].covariance_px;
+  }
   if (shape.has_lens()) apply_right_angles(shape, per_px, sides, ends);
   const auto corners = find_corners(sides);
   if (!corners || !is_rectangular(sides)) return std::nullopt;
@@ -450,127 +451,91 @@ double find_surest_blur_px(const FoundEdges& edges) {
   return surest->blur_px;
 }
 
-/// Finds hidden edges from the visible ones, see fit_rectangle().
-class HiddenEdges {
- public:
-  explicit HiddenEdges(const EdgeImage& image) : image_(image) {}
-
-  /// Adds the missing edges. Returns false if two neighboring edges are missing or a missing edge
-  /// is not found.
-  bool add_to(FoundEdges& edges, const Sides& sides, EdgeSearch search,
-              const std::vector<Eigen::Vector2d>& sizes_m) const {
-    constexpr double ramp_lines = 3;
-    const FoundEdges visible = edges;
-    search.positions = 24;
-    double min_side = std::numeric_limits<double>::infinity();
-    for (std::size_t i = 0; i < 4; ++i) {
-      if (!visible[i] && !visible[(i + 1) % 4]) return false;
-      min_side = std::min(min_side, (sides[i].to - sides[i].from).norm());
-    }
-    search.blur_px = find_surest_blur_px(visible);
-    // The window extends to the next stripe, but not to the opposite edge.
-    search.reach_px = std::max(search.reach_px, std::min(image_.levels.period_lines() + ramp_lines,
-                                                         min_side / image_.per_px / 2));
-    for (std::size_t i = 0; i < 4; ++i) {
-      if (visible[i]) continue;
-      const auto [side, direction_sd] = predict_side(sides[i], visible, i);
-      if (!side) return false;
-      // Twice the sd, because apply_right_angles() uses the angles again.
-      const double slant_sd_px = direction_sd * side_length_px(*side);
-      const auto find = [&](double offset_px, double offset_sd_px) {
-        return estimate_hidden_edge(image_, *side, search, {offset_px, offset_sd_px, slant_sd_px});
-      };
-      edges[i] = find(0, std::numeric_limits<double>::infinity());
-      if (!edges[i]) return false;
-      if (!visible[(i + 2) % 4]) continue;
-      const auto place = predict_place(edges, i, sizes_m);
-      if (!place) continue;
-      const Eigen::Vector2d moved =
-          (edges[i]->side.from + edges[i]->side.to) / 2 - (side->from + side->to) / 2;
-      edges[i] = find(place->offset_px + moved.dot(side->inwards()) / image_.per_px, place->sd_px);
-      if (!edges[i]) return false;
-    }
-    return true;
-  }
-
- private:
-  /// Offset of an edge's middle from its fitted position, inside positive.
-  struct Place {
-    double offset_px, sd_px;
-  };
-
-  double side_length_px(const Side& side) const {
-    return (side.to - side.from).norm() / image_.per_px;
-  }
-
-  /// Returns the variance of the direction of an edge, in rad^2.
-  double compute_direction_variance(const StraightEdge& edge) const {
-    const Eigen::Vector2d difference(-1, 1);
-    return difference.dot(edge.covariance_px * difference) / square(side_length_px(edge.side));
-  }
-
-  /// Rotates side i about its middle by the mean rotation of the other edges, and extends it to its
-  /// neighbors. Also returns the standard deviation of its direction, in rad.
-  std::pair<std::optional<Side>, double> predict_side(const Side& side, const FoundEdges& visible,
-                                                      std::size_t i) const {
-    const double tilt_variance = square(get_tilt_sd(image_.shape));
-    double sum = 0, moment = 0, variance = 0;
-    for (std::size_t k = 1; k < 4; ++k) {
-      const auto& other = visible[(i + k) % 4];
-      if (!other) continue;
-      const double other_variance = compute_direction_variance(*other);
-      const double weight = 1 / (other_variance + tilt_variance);
-      const Eigen::Vector2d direction =
-          Eigen::Rotation2Dd(-double(k) * std::numbers::pi / 2) * other->side.direction();
-      sum += weight;
-      moment += weight * std::atan2(cross_product(side.direction(), direction),
-                                    side.direction().dot(direction));
-      variance += square(weight) * other_variance;
-    }
-    const Eigen::Vector2d middle = (side.from + side.to) / 2;
-    const Eigen::Vector2d half = Eigen::Rotation2Dd(moment / sum) * (side.to - middle);
-    const Side turned{middle - half, middle + half};
-    const auto from = find_intersection(turned, visible[(i + 3) % 4]->side);
-    const auto to = find_intersection(turned, visible[(i + 1) % 4]->side);
-    return {from && to ? std::optional(Side{*from, *to}) : std::nullopt,
-            std::sqrt(variance / square(sum) + tilt_variance)};
-  }
-
-  /// Predicts the position of edge i from the other three by the aspect ratio of the only size that
-  /// agrees with its fitted position. Returns std::nullopt if several sizes or none agree.
-  std::optional<Place> predict_place(const FoundEdges& edges, std::size_t i,
-                                     const std::vector<Eigen::Vector2d>& sizes_m) const {
-    constexpr double size_sd_m = 0.001;  // sizes are given to the millimeter
-    constexpr double bounds = 2,
-                     clear = 3;  // standard deviations: a uniform distribution ends at sqrt(3)
-    const StraightEdge &edge = *edges[i], &opposite = *edges[(i + 2) % 4];
-    const StraightEdge &left = *edges[(i + 1) % 4], &right = *edges[(i + 3) % 4];
-    const double length_px = compute_distance(left.side, right.side) / image_.per_px;
-    const double depth_px = compute_distance(opposite.side, edge.side) / image_.per_px;
-    std::optional<Place> place;
-    // The variance of the opposite edge counts three times. Edges are assumed to be independent,
-    // but its error moves both edges.
-    for (const Eigen::Vector2d& size_m : sizes_m) {
-      for (const double ratio : {size_m[0] / size_m[1], size_m[1] / size_m[0]}) {
-        const double relative_variance =
-            square(get_tilt_sd(image_.shape)) +
-            square(size_sd_m) * size_m.cwiseAbs2().cwiseInverse().sum();
-        const double variance =
-            relative_variance * square(ratio * length_px) + 3 * compute_middle_variance(opposite) +
-            square(ratio) * (compute_middle_variance(left) + compute_middle_variance(right));
-        const Place here{depth_px - ratio * length_px, std::sqrt(variance)};
-        const double reach_px =
-            bounds * std::sqrt(compute_middle_variance(edge)) + clear * here.sd_px;
-        if (std::abs(here.offset_px) > reach_px) continue;
-        if (place && std::abs(place->offset_px - here.offset_px) > 0.1 * here.sd_px) return {};
-        place = here;
-      }
-    }
-    return place;
-  }
-
-  const EdgeImage& image_;
+/// Offset of an edge's middle from its fitted position, inside positive.
+struct Place {
+  double offset_px, sd_px;
 };
+
+/// Predicts the position of edge i from the other three by the aspect ratio of the only size that
+/// agrees with its fitted position. Returns std::nullopt if several sizes or none agree.
+std::optional<Place> predict_place(const EdgeImage& image, const FoundEdges& edges, std::size_t i,
+                                   const std::vector<Eigen::Vector2d>& sizes_m) {
+  constexpr double size_sd_m = 0.001;  // sizes are given to the millimeter
+  constexpr double bounds = 2,
+                   clear = 3;  // standard deviations: a uniform distribution ends at sqrt(3)
+  const StraightEdge &edge = *edges[i], &opposite = *edges[(i + 2) % 4];
+  const StraightEdge &left = *edges[(i + 1) % 4], &right = *edges[(i + 3) % 4];
+  const double length_px = compute_distance(left.side, right.side) / image.per_px;
+  const double depth_px = compute_distance(opposite.side, edge.side) / image.per_px;
+  std::optional<Place> place;
+  // The variance of the opposite edge counts three times. Edges are assumed to be independent,
+  // but its error moves both edges.
+  for (const Eigen::Vector2d& size_m : sizes_m) {
+    for (const double ratio : {size_m[0] / size_m[1], size_m[1] / size_m[0]}) {
+      const double relative_variance = square(get_tilt_sd(image.shape)) +
+                                       square(size_sd_m) * size_m.cwiseAbs2().cwiseInverse().sum();
+      const double variance =
+          relative_variance * square(ratio * length_px) + 3 * compute_middle_variance(opposite) +
+          square(ratio) * (compute_middle_variance(left) + compute_middle_variance(right));
+      const Place here{depth_px - ratio * length_px, std::sqrt(variance)};
+      const double reach_px =
+          bounds * std::sqrt(compute_middle_variance(edge)) + clear * here.sd_px;
+      if (std::abs(here.offset_px) > reach_px) continue;
+      if (place && std::abs(place->offset_px - here.offset_px) > 0.1 * here.sd_px) return {};
+      place = here;
+    }
+  }
+  return place;
+}
+
+/// Adds hidden edges from the visible ones, see fit_rectangle(). Returns false if two neighboring
+/// edges are missing or a missing edge is not found.
+bool add_hidden_edges(const EdgeImage& image, const Sides& sides, EdgeSearch search,
+                      const std::vector<Eigen::Vector2d>& sizes_m, FoundEdges& edges) {
+  constexpr double ramp_lines = 3, unknown_sd_px = 100;
+  const FoundEdges visible = edges;
+  search.positions = 24;
+  double min_side = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < 4; ++i) {
+    if (!visible[i] && !visible[(i + 1) % 4]) return false;
+    min_side = std::min(min_side, (sides[i].to - sides[i].from).norm());
+  }
+  search.blur_px = find_surest_blur_px(visible);
+  // The window extends to the next stripe, but not to the opposite edge.
+  search.reach_px = std::max(search.reach_px, std::min(image.levels.period_lines() + ramp_lines,
+                                                       min_side / image.per_px / 2));
+  Sides expected = sides;
+  EndsCovariance ends = square(unknown_sd_px) * EndsCovariance::Identity();
+  for (std::size_t i = 0; i < 4; ++i) {
+    if (!visible[i]) continue;
+    expected[i] = visible[i]->side;
+    get_block(ends, i) = visible[i]->covariance_px;
+  }
+  if (!apply_right_angles(image.shape, image.per_px, expected, ends)) return false;
+  const auto corners = find_corners(expected);
+  if (!corners) return false;
+  expected = make_sides(*corners);
+  for (std::size_t i = 0; i < 4; ++i) {
+    if (visible[i]) continue;
+    const Side& side = expected[i];
+    const Eigen::Vector2d difference(-1, 1);
+    // Twice the sd, because apply_right_angles() uses the angles again.
+    const double slant_sd_px = std::sqrt(difference.dot(get_block(ends, i) * difference));
+    const auto find = [&](double offset_px, double offset_sd_px) {
+      return estimate_hidden_edge(image, side, search, {offset_px, offset_sd_px, slant_sd_px});
+    };
+    edges[i] = find(0, std::numeric_limits<double>::infinity());
+    if (!edges[i]) return false;
+    if (!visible[(i + 2) % 4]) continue;
+    const auto place = predict_place(image, edges, i, sizes_m);
+    if (!place) continue;
+    const Eigen::Vector2d moved =
+        (edges[i]->side.from + edges[i]->side.to) / 2 - (side.from + side.to) / 2;
+    edges[i] = find(place->offset_px + moved.dot(side.inwards()) / image.per_px, place->sd_px);
+    if (!edges[i]) return false;
+  }
+  return true;
+}
 
 }  // namespace
 
@@ -662,7 +627,7 @@ std::optional<Light> fit_rectangle(const ImageView& lines, const Blob& blob,
       found_edges[i] = fit_straight_edge(image, sides[i], search);
     }
     if (!std::ranges::all_of(found_edges, [](const auto& edge) { return edge.has_value(); })) {
-      if (!shape.has_lens() || !HiddenEdges(image).add_to(found_edges, sides, search, sizes_m) ||
+      if (!shape.has_lens() || !add_hidden_edges(image, sides, search, sizes_m, found_edges) ||
           is_rather_round(sides)) {
         return std::nullopt;
       }

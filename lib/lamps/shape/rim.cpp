@@ -6,9 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
 #include <limits>
-#include <numbers>
 #include <utility>
 #include <vector>
 
@@ -67,7 +65,7 @@ Matrix2 compute_unit_plane_from_pixel(const LightShape& shape, const Eigen::Vect
   return determinant > 0 ? Matrix2(derivative / std::sqrt(determinant)) : Matrix2::Identity();
 }
 
-/// Ellipse in pixels of a box, and the sum of e over its crossings with lit scanlines.
+/// Ellipse in the image, and the sum of e over its crossings with lit scanlines.
 struct Ring {
   Ellipse ellipse;
   double sum;
@@ -94,19 +92,15 @@ class Face {
   }
 
   const PixelBox& box() const { return box_; }
-  /// Returns the scanlines of bright stripes, relative to the box.
+  /// Returns the scanlines of bright stripes.
   const std::vector<int>& lit_lines() const { return lit_; }
-  std::vector<int> lit_lines_of_image() const {
-    std::vector<int> lines = lit_;
-    for (int& line : lines) line += box_.y;
-    return lines;
+  bool has(int column) const {
+    return column >= box_.x + window_ && column + window_ <= box_.right();
   }
-  bool has(int column) const { return column >= window_ && column + window_ <= box_.width; }
 
   /// Returns the mean levels before and after the border between a column and the previous one.
   std::pair<double, double> around(int line, int column) const {
-    const float* line_means = means(line);
-    return {std::max(0.F, line_means[column - 1]), std::max(0.F, line_means[column + window_ - 1])};
+    return {mean(line, column - 1), mean(line, column + window_ - 1)};
   }
 
   /// Returns e without limits for a light that begins, or ends, at this border; 0 at the border of
@@ -115,8 +109,8 @@ class Face {
     if (!has(column)) return 0;
     const auto [before, after] = around(line, column);
     const double outside = begins ? before : after, inside = begins ? after : before;
-    const int further = std::clamp(column - 1 + (begins ? 2 : -1) * window_, 0, box_.width - 1);
-    const double beyond = std::max(0.F, means(line)[further]);
+    const int further = column - 1 + (begins ? 2 : -1) * window_;
+    const double beyond = mean(line, std::clamp(further, box_.x, box_.right() - 1));
     const double ratio = (inside + soft_) / (outside + soft_);
     const double slope = std::max(1.0, (beyond + soft_) / (inside + soft_));
     return std::log(ratio / slope);
@@ -128,11 +122,11 @@ class Face {
     const auto [before, after] = around(line, column);
     const auto [dark, bright] = std::minmax(before, after);
     const double middle = dark + fraction * (bright - dark), sign = after > before ? 1 : -1;
-    const float* levels = this->levels(line);
     const double border = column - 0.5;
     std::optional<double> nearest;
     for (int i = column - window_; i + 1 < column + window_; ++i) {
-      const double from = sign * (levels[i] - middle), to = sign * (levels[i + 1] - middle);
+      const double from = sign * (levels_[index(line, i)] - middle);
+      const double to = sign * (levels_[index(line, i + 1)] - middle);
       if (!(from < 0 && to >= 0)) continue;
       const double at = i - from / (to - from);
       if (!nearest || std::abs(at - border) < std::abs(*nearest - border)) nearest = at;
@@ -141,15 +135,18 @@ class Face {
   }
 
  private:
-  const float* levels(int line) const { return levels_.data() + std::ptrdiff_t(line) * box_.width; }
-  const float* means(int line) const { return means_.data() + std::ptrdiff_t(line) * box_.width; }
+  std::size_t index(int line, int column) const {
+    return std::size_t(line - box_.y) * std::size_t(box_.width) + std::size_t(column - box_.x);
+  }
+  /// Returns the mean level over the window that ends with a pixel; 0 if it is darker than dark.
+  double mean(int line, int column) const { return std::max(0.F, means_[index(line, column)]); }
 
   /// Computes the mean over a window that ends with each pixel. Before the first pixel the level of
   /// the first pixel is used.
   void find_means() {
     means_.reserve(levels_.size());
-    for (int row = 0; row < box_.height; ++row) {
-      const float* line = levels(row);
+    for (int row = box_.y; row < box_.bottom(); ++row) {
+      const float* line = levels_.data() + index(row, box_.x);
       double sum = double(line[0]) * window_;
       for (int column = 0; column < box_.width; ++column) {
         sum += double(line[column]) - line[std::max(0, column - window_)];
@@ -163,7 +160,8 @@ class Face {
     std::vector<double> brightest(static_cast<std::size_t>(box_.height));
     std::vector<float> line;
     for (int row = 0; row < box_.height; ++row) {
-      line.assign(levels(row), levels(row) + box_.width);
+      const auto begin = levels_.begin() + std::ptrdiff_t(index(box_.y + row, box_.x));
+      line.assign(begin, begin + box_.width);
       const auto tenth = line.end() - 1 - std::ptrdiff_t(line.size() / 10);
       std::nth_element(line.begin(), tenth, line.end());
       brightest[static_cast<std::size_t>(row)] = *tenth;
@@ -174,7 +172,7 @@ class Face {
       const auto end = brightest.begin() + std::min(box_.height, row + near + 1);
       const double level = brightest[static_cast<std::size_t>(row)];
       if (level > min_level && level > min_lit * *std::max_element(begin, end)) {
-        lit_.push_back(row);
+        lit_.push_back(box_.y + row);
       }
     }
   }
@@ -190,7 +188,7 @@ class Face {
 /// one that ends there.
 class Steps {
  public:
-  explicit Steps(const Face& face) : width_(face.box().width) {
+  explicit Steps(const Face& face) : left_(face.box().x), width_(face.box().width) {
     constexpr std::size_t max_lines = 48;
     const std::vector<int>& lit = face.lit_lines();
     every_ = (lit.size() + max_lines - 1) / max_lines;
@@ -198,7 +196,7 @@ class Steps {
       lines_.push_back(lit[i]);
       for (int border = 0; border < width_; ++border) {
         for (const bool begins : {true, false}) {
-          e_.push_back(std::clamp(face.step(lit[i], border, begins), -0.7, 1.0));
+          e_.push_back(std::clamp(face.step(lit[i], left_ + border, begins), -0.7, 1.0));
         }
       }
     }
@@ -219,13 +217,13 @@ class Steps {
 
  private:
   double at(std::size_t line, double u, std::size_t end) const {
-    const int border = static_cast<int>(std::floor(u + 1));  // border i is at i - 0.5
+    const int border = static_cast<int>(std::floor(u + 1)) - left_;  // border i is at i - 0.5
     if (border < 0 || border >= width_) return 0;
     return e_[2 * (line * static_cast<std::size_t>(width_) + static_cast<std::size_t>(border)) +
               end];
   }
 
-  int width_;
+  int left_, width_;
   std::size_t every_;
   std::vector<int> lines_;
   std::vector<double> e_;
@@ -237,8 +235,7 @@ Ring find_best_ring(const Face& face, const PixelBox& blob, const Matrix2& unit_
   constexpr double fine = 20, max_radius = 0.75, max_shift = 0.35;
   const Steps steps(face);
   const double size = std::max(blob.width, blob.height), step = std::max(1.0, size / 2 / fine);
-  const Eigen::Vector2d middle(blob.x - face.box().x + blob.width / 2.0,
-                               blob.y - face.box().y + blob.height / 2.0);
+  const Eigen::Vector2d middle(blob.x + blob.width / 2.0, blob.y + blob.height / 2.0);
   Ring best{{middle, unit_plane_from_pixel}, -std::numeric_limits<double>::infinity()};
   for (double radius = size / 6; radius <= max_radius * size; radius += step) {
     const Matrix2 unit_from_pixel = unit_plane_from_pixel / radius;
@@ -278,13 +275,13 @@ std::vector<EdgePoint> find_steps_near(const Face& face, const Ellipse& ellipse,
   std::vector<EdgePoint> points;
   std::vector<double> levels;
   for (const int line : face.lit_lines()) {
-    const auto crossing = ellipse.intersect(line + face.box().y);
+    const auto crossing = ellipse.intersect(line);
     if (!crossing) continue;
     for (const bool begins : {true, false}) {
       const double column = begins ? crossing->begin : crossing->end;
-      const double cosine = ellipse.cosine_at({column, double(line + face.box().y)});
+      const double cosine = ellipse.cosine_at({column, double(line)});
       if (cosine < min_cosine) continue;
-      const double at = column - face.box().x + 0.5;
+      const double at = column + 0.5;
       const double reach = reach_px / std::max(cosine, 0.5);
       double best = min_step;
       std::optional<int> border;
@@ -299,10 +296,7 @@ std::vector<EdgePoint> find_steps_near(const Face& face, const Ellipse& ellipse,
       if (!at_half || !low_end || !high_end) continue;
       const auto [before, after] = face.around(line, *border);
       levels.push_back(std::max(before, after));
-      points.push_back({{*at_half + face.box().x, line + face.box().y},
-                        0,
-                        std::abs(*high_end - *low_end),
-                        begins});
+      points.push_back({{*at_half, line}, 0, std::abs(*high_end - *low_end), begins});
     }
   }
   // All points have the same weight: a dim part of the rim is as accurate as a bright one.
@@ -317,7 +311,6 @@ std::vector<EdgePoint> find_steps_near(const Face& face, const Ellipse& ellipse,
 std::optional<Light> fit_near(const Ring& ring, const Face& face, const Background& background,
                               const LightShape& shape) {
   Ellipse ellipse = ring.ellipse;
-  ellipse.center += Eigen::Vector2d(face.box().x, face.box().y);
   std::optional<Light> light;
   for (const double reach : {0.16, 0.12, 0.08, 0.08}) {
     const double reach_px = reach * ring.ellipse.mean_radius_px();
@@ -377,6 +370,19 @@ double bright_level(const ImageView& image, const Blob& blob, double dark) {
   const auto tenth = levels.begin() + std::ptrdiff_t(levels.size() * 9 / 10);
   std::nth_element(levels.begin(), tenth, levels.end());
   return *tenth - dark;
+}
+
+/// Returns the number of points with a common error: those of a stripe, on consecutive scanlines.
+double points_of_a_stripe(const std::vector<EdgePoint>& outline) {
+  constexpr double next = 2.5;
+  std::array<double, 2> last{-1e9, -1e9};
+  double stripes = 0;
+  for (const EdgePoint& point : outline) {
+    double& row = last[point.begins ? 0 : 1];
+    if (point.pixel.y() - row > next) ++stripes;
+    row = point.pixel.y();
+  }
+  return double(outline.size()) / std::max(1.0, stripes);
 }
 
 /// Fits a light and the sigma of its center to the steps next to its outline. These have no bias if
@@ -456,13 +462,14 @@ std::optional<Rim> fit_rim(const ImageView& image, const Blob& blob, const Backg
   if (!light) return std::nullopt;
   // The fraction counts the clearest steps, before fit_to_steps() replaces them.
   const double rim_fraction = std::min(1.0, double(light->outline.size()) / double(crossings));
-  auto fitted = fit_to_steps(image, face.lit_lines_of_image(), background, shape, *light);
+  auto fitted = fit_to_steps(image, face.lit_lines(), background, shape, *light);
   bool is_clear = fitted.has_value();
   if (fitted) {
     light = std::move(fitted);
   } else {
+    const double scatter_px = light->sigma_px * std::sqrt(points_of_a_stripe(light->outline));
     const auto jackknife_px = estimate_jackknife_sd_px(*light, background, shape);
-    light->sigma_px = std::max(light->sigma_px, jackknife_px.value_or(0));
+    light->sigma_px = std::max(scatter_px, jackknife_px.value_or(0));
     is_clear = jackknife_px.has_value();
   }
   light->is_uneven = true;

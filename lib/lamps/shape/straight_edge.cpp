@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdint>
 #include <limits>
 #include <map>
 #include <numbers>
@@ -72,24 +71,25 @@ class Samples {
   Samples(const EdgeImage& image, const Side& side, const EdgeSearch& search,
           bool can_leave_image = false)
       : image_(image), side_(side), can_leave_image_(can_leave_image) {
-    if (!trace()) return;
     // A corner is blurred by both sides.
     constexpr double corner_px = 4;
-    const Eigen::Vector2d direction = trace_.back() - trace_.front();
-    const double length_px = direction.norm();
+    const auto from = find_pixel(0), to = find_pixel(1);
+    if (!from || !to) return;
+    const Eigen::Vector2d direction = *to - *from;
+    length_px = direction.norm();
     if (length_px < 3 * corner_px) return;
     const int along = std::abs(direction.y()) >= std::abs(direction.x()) ? 1 : 0;
-    const double margin = corner_px / length_px;
-    const double from = at(margin)[along], to = at(1 - margin)[along];
-    const int begin = static_cast<int>(std::ceil(std::min(from, to)));
-    const int end = static_cast<int>(std::floor(std::max(from, to)));
-    std::vector<int> positions;
-    for (int position = begin; position <= end; ++position) {
-      if (along == 0 || is_lit(position)) positions.push_back(position);
+    const double margin = corner_px / length_px, used = 1 - 2 * margin;
+    const int count = static_cast<int>(used * std::abs(direction[along]));
+    std::vector<Eigen::Vector2d> places;
+    for (int i = 0; i <= count; ++i) {
+      const auto place = find_pixel(margin + used * i / count);
+      if (!place) return;
+      if (along == 0 || is_lit(static_cast<int>(place->y()))) places.push_back(*place);
     }
-    const std::size_t every = (positions.size() + search.positions - 1) / search.positions;
-    for (std::size_t i = 0; i < positions.size(); i += every) {
-      if (add_position(positions[i], along, search.reach_px)) continue;
+    const std::size_t every = (places.size() + search.positions - 1) / search.positions;
+    for (std::size_t i = 0; i < places.size(); i += every) {
+      if (add_place(places[i], 1 - along, search.reach_px)) continue;
       samples.clear();
       return;
     }
@@ -97,17 +97,10 @@ class Samples {
 
   /// Samples; empty if the side is too short or not fully inside the image.
   std::vector<Sample> samples;
-
-  /// Returns the pixel, (column, row), on the side.
-  Eigen::Vector2d at(double t) const {
-    const double place = t * kPieces;
-    const auto i = static_cast<std::size_t>(std::clamp(std::floor(place), 0.0, kPieces - 1.0));
-    return trace_[i] + (place - double(i)) * (trace_[i + 1] - trace_[i]);
-  }
+  /// Length of the side in the image.
+  double length_px = 0;
 
  private:
-  static constexpr int kPieces = 16;
-
   /// Returns true if a scanline is not dark.
   bool is_lit(int line) const {
     constexpr double minimum = 0.1;
@@ -115,35 +108,20 @@ class Samples {
     return lit && lit->level > minimum;
   }
 
-  bool trace() {
-    for (int i = 0; i <= kPieces; ++i) {
-      const double t = double(i) / kPieces;
-      const auto pixel = image_.shape.plane_to_pixel(side_.from + t * (side_.to - side_.from));
-      if (!pixel) return false;
-      const Eigen::Vector2d at = image_.shape.turned(*pixel);
-      if (!(at.minCoeff() > -1 && at.x() < image_.lines.width && at.y() < image_.lines.height))
-        return false;
-      trace_[static_cast<std::size_t>(i)] = at;
-    }
-    return true;
+  /// Returns the pixel, (column, row), on the side; std::nullopt if it is outside the image.
+  std::optional<Eigen::Vector2d> find_pixel(double t) const {
+    const auto pixel = image_.shape.plane_to_pixel(side_.from + t * (side_.to - side_.from));
+    if (!pixel) return std::nullopt;
+    const Eigen::Vector2d at = image_.shape.turned(*pixel).array().round();
+    const ImageSize size = image_.lines.size();
+    const bool is_inside = at.minCoeff() >= 0 && at.x() < size.width && at.y() < size.height;
+    return is_inside ? std::optional(at) : std::nullopt;
   }
 
-  /// Returns the point where the side crosses a column (along 0) or row (1).
-  Eigen::Vector2d crossing(int position, int along) const {
-    for (std::size_t i = 0; i + 1 < trace_.size(); ++i) {
-      const double a = trace_[i][along] - position, b = trace_[i + 1][along] - position;
-      if (a * b <= 0 && a != b) return trace_[i] + a / (a - b) * (trace_[i + 1] - trace_[i]);
-    }
-    return trace_.front();
-  }
-
-  /// Adds the pixels across the side at one column or row. Returns false if they are outside the
+  /// Adds the pixels across the side at one of its pixels. Returns false if they are outside the
   /// image or the plane.
-  bool add_position(int position, int along, double reach_px) {
+  bool add_place(const Eigen::Vector2d& middle, int across, double reach_px) {
     constexpr double apart_px = 2;
-    const int across = 1 - along;
-    const Eigen::Vector2d edge = crossing(position, along);
-    const Eigen::Vector2d middle = edge.array().round();
     const auto plane = [&](const Eigen::Vector2d& pixel) {
       return image_.shape.pixel_to_plane(image_.shape.turned(pixel));
     };
@@ -186,7 +164,6 @@ class Samples {
   const EdgeImage& image_;
   const Side& side_;
   bool can_leave_image_;
-  std::array<Eigen::Vector2d, kPieces + 1> trace_;
 };
 
 /// Unit residual to which the weights of samples and priors refer.
@@ -447,7 +424,7 @@ std::optional<StraightEdge> fit_straight_edge(const EdgeImage& image, const Side
   const auto& [lines, levels, dark, per_px, shape] = image;
   const Samples all(image, side, search);
   if (all.samples.size() < minimum) return std::nullopt;
-  const double length_px = (all.at(1) - all.at(0)).norm();
+  const double length_px = all.length_px;
   const double focal_px = std::hypot(lines.width, lines.height) / 2;
   const double bow_sd_px = shape.has_lens() ? straight_px : length_px * length_px / (12 * focal_px);
   auto edge = fit(all, side, per_px, {length_px, search.blur_px, bow_sd_px});

@@ -4,11 +4,8 @@
 
 #include <Eigen/Core>
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdint>
 #include <numbers>
-#include <numeric>
 #include <optional>
 
 namespace vlp {
@@ -68,39 +65,33 @@ std::vector<double> find_crossings(const std::vector<double>& signal, double mid
 /// std::nullopt if there are too few or if they do not agree with `guess`.
 std::optional<double> fit_period_to_crossings(const std::vector<double>& signal, double middle,
                                               double guess) {
-  double moment = 0, square = 0, squared_residuals = 0;
-  int count = 0;
-  std::array<std::vector<double>, 2> places, numbers;
+  // Number and position of each crossing, relative to their means over the begins or the ends.
+  std::vector<Eigen::Vector2d> points;
   for (const bool rising : {true, false}) {
-    auto& at = places[rising];
-    at = find_crossings(signal, middle, rising);
-    double number = 0;
-    for (std::size_t i = 0; i < at.size(); ++i) {
-      if (i > 0) number += std::max(1.0, std::round((at[i] - at[i - 1]) / guess));
-      numbers[rising].push_back(number);
+    const std::vector<double> places = find_crossings(signal, middle, rising);
+    if (places.size() < 2) continue;
+    const std::size_t first = points.size();
+    Eigen::Vector2d point(0, places[0]), mean = Eigen::Vector2d::Zero();
+    for (const double place : places) {
+      if (place > places[0]) point[0] += std::max(1.0, std::round((place - point[1]) / guess));
+      point[1] = place;
+      points.push_back(point);
+      mean += point / double(places.size());
     }
-    if (at.size() < 2) continue;
-    const double mean_at = std::accumulate(at.begin(), at.end(), 0.0) / double(at.size());
-    const double mean_number =
-        std::accumulate(numbers[rising].begin(), numbers[rising].end(), 0.0) / double(at.size());
-    for (std::size_t i = 0; i < at.size(); ++i) {
-      at[i] -= mean_at;
-      numbers[rising][i] -= mean_number;
-      moment += numbers[rising][i] * at[i];
-      square += numbers[rising][i] * numbers[rising][i];
-    }
-    count += static_cast<int>(at.size());
+    for (std::size_t i = first; i < points.size(); ++i) points[i] -= mean;
+  }
+  double moment = 0, square = 0, squared_residuals = 0;
+  for (const Eigen::Vector2d& point : points) {
+    moment += point[0] * point[1];
+    square += point[0] * point[0];
   }
   if (!(square > 0)) return std::nullopt;
   const double period = moment / square;
-  for (const std::size_t type : {std::size_t(0), std::size_t(1)}) {
-    if (places[type].size() < 2) continue;
-    for (std::size_t i = 0; i < places[type].size(); ++i) {
-      squared_residuals += std::pow(places[type][i] - period * numbers[type][i], 2);
-    }
+  for (const Eigen::Vector2d& point : points) {
+    squared_residuals += std::pow(point[1] - period * point[0], 2);
   }
   constexpr double max_residual = 0.12, max_off = 0.35;
-  const bool in_time = std::sqrt(squared_residuals / count) < max_residual * period;
+  const bool in_time = std::sqrt(squared_residuals / double(points.size())) < max_residual * period;
   if (!in_time || std::abs(period / guess - 1) > max_off) return std::nullopt;
   return period;
 }
