@@ -6,6 +6,7 @@
 
 #include <cstdlib>
 #include <string>
+#include <vector>
 
 #include "station/records/records.h"
 #include "station/station_config.h"
@@ -37,6 +38,20 @@ inline RunRecord make_sample_record(const std::string& run, const std::string& c
 
 inline std::string numbered_run_id(int number) {
   return "20261121T13450" + std::to_string(number % 10) + "Z-" + std::to_string(1000 + number);
+}
+
+/// Returns the ids of the runs that match the filter, of Records, a Spool or KnownRuns.
+template <typename Runs>
+std::vector<std::string> list_ids(Runs& runs, const RunFilter& filter) {
+  std::vector<std::string> ids;
+  for (const RunSummary& run : runs.list(filter)) ids.push_back(run.run);
+  return ids;
+}
+
+/// Returns the runs of a station, or of all, with an open hook.
+template <typename Runs>
+std::vector<std::string> list_open_hooks(Runs& runs, const std::string& station = "") {
+  return list_ids(runs, {.station = station, .has_open_hook = true});
 }
 
 /// Returns the output of a database client that is independent of Records. `sql` has one statement

@@ -20,10 +20,10 @@
 #include "rig/input_error.h"
 #include "station/records/archive_runs.h"
 #include "station/records/certificate.h"
-#include "station/records/export_runs.h"
 #include "station/records/known_runs.h"
 #include "station/records/publish_run.h"
 #include "station/records/retention.h"
+#include "station/records/run_formats.h"
 #include "station/statistics/control_chart.h"
 #include "station/statistics/run_metrics.h"
 #include "station/unit/station_screen.h"
@@ -217,7 +217,8 @@ bool has_all_runs(const RunFilter& filter) {
 
 void print_runs(const StationRecordsOptions& options) {
   const auto known = open_runs(options);
-  const auto runs = known->list(requested_runs(options, *known));
+  RunFilter filter = requested_runs(options, *known);
+  const auto runs = known->list(filter);
   constexpr const char* line = "{:<34} {:<20} {:<8} {:<7} {:<12} {:<16} {}";
   print_line(
       fmt::format(line, "run", "ended (UTC)", "verdict", "kind", "station", "camera", "cause"));
@@ -241,9 +242,10 @@ void print_runs(const StationRecordsOptions& options) {
     fmt::print("{} cameras, {} with more than one judged run: first-pass yield {:.1f} %\n",
                counts.cameras, counts.cameras_reworked, percent * *yield);
   }
-  const auto open = known->find_open_hooks();
-  const auto without = std::count_if(runs.begin(), runs.end(), [&](const RunSummary& run) {
-    return std::binary_search(open.begin(), open.end(), run.run);
+  filter.has_open_hook = true;
+  const auto open = known->list(filter);
+  const auto without = std::ranges::count_if(runs, [&](const RunSummary& run) {
+    return std::ranges::find(open, run.run, &RunSummary::run) != open.end();
   });
   if (without > 0) {
     fmt::print("{} of them with a hook that has not ended well: 'vlp-station hook' runs it again\n",

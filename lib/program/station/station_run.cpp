@@ -19,7 +19,6 @@
 #include "station/records/golden_unit_schedule.h"
 #include "station/records/hook.h"
 #include "station/records/publish_run.h"
-#include "station/records/run_hooks.h"
 #include "station/records/spool.h"
 #include "station/unit/unit_record.h"
 #include "station/unit/verify_station.h"

@@ -31,7 +31,7 @@
 #include "captures/printable.h"
 #include "captures/shared_folder.h"
 #include "rig/input_error.h"
-#include "station/records/export_runs.h"
+#include "station/records/run_formats.h"
 
 namespace vlp {
 namespace {
@@ -217,14 +217,6 @@ std::string find_last_line(std::string text) {
 
 RunEvent failed(const std::string& why) { return make_event(kHookFailed, why); }
 
-/// Returns the number of events after the last one of a kind; std::nullopt if there is none.
-std::optional<std::ptrdiff_t> count_events_since(const RunRecord& record, const char* what) {
-  const auto last = std::find_if(record.events.rbegin(), record.events.rend(),
-                                 [&](const RunEvent& event) { return event.what == what; });
-  if (last == record.events.rend()) return std::nullopt;
-  return last - record.events.rbegin();
-}
-
 /// Returns true if the open file is still the one of this name.
 bool is_same_file(int descriptor, const std::filesystem::path& file) {
   struct stat open {
@@ -279,17 +271,49 @@ RunEvent run_hook(const Hook& hook, const RunRecord& record, const HookLock& loc
 }
 
 bool is_hook_open(const RunRecord& record) {
-  const auto wanted = count_events_since(record, kHookRequested),
-             done = count_events_since(record, kHookDone);
-  return wanted && (!done || *wanted < *done);
+  return find_last_event(record, kHookRequested) > find_last_event(record, kHookDone);
 }
 
 std::string hook_problem(const RunRecord& record) {
   if (!is_hook_open(record)) return "";
-  const auto wanted = count_events_since(record, kHookRequested),
-             failed = count_events_since(record, kHookFailed);
-  if (!failed || *wanted < *failed) return "was not run to its end";
-  return "failed: " + record.events[record.events.size() - 1 - std::size_t(*failed)].text;
+  const std::ptrdiff_t failed = find_last_event(record, kHookFailed);
+  if (failed < find_last_event(record, kHookRequested)) return "was not run to its end";
+  return "failed: " + record.events[static_cast<std::size_t>(failed)].text;
+}
+
+std::string call_hook(const Hook& hook, RunRecord& record, const HookLock& lock, Spool& spool) {
+  std::string problem;
+  record.events.push_back(run_hook(hook, record, lock));
+  try {
+    spool.keep(record);
+  } catch (const InputError& error) {
+    problem = std::string("what became of the hook is not recorded: ") + error.what();
+  }
+  spool.deliver();
+  return problem;
+}
+
+HookCounts run_open_hooks(
+    const StationConfig& config, Spool& spool,
+    const std::function<void(const RunRecord& run, const std::string& outcome)>& report) {
+  const auto runs = spool.list({.station = config.station, .has_open_hook = true});
+  HookCounts result{runs.size()};
+  for (const RunSummary& run : runs) {
+    const HookLock lock(spool.folder(), run.run);
+    auto record = spool.find(run.run);
+    // Another program can have called it.
+    if (!record || !is_hook_open(*record)) continue;
+    if (!lock.held()) {
+      report(*record, "is being run");
+      continue;
+    }
+    const std::string unrecorded = call_hook(*config.hook, *record, lock, spool);
+    const std::string problem = hook_problem(*record);
+    if (!problem.empty()) ++result.failed;
+    report(*record, problem.empty() ? "done" : problem);
+    if (!unrecorded.empty()) report(*record, unrecorded);
+  }
+  return result;
 }
 
 HookLock::HookLock(const std::filesystem::path& spool, const std::string& run)

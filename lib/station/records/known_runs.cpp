@@ -8,7 +8,6 @@
 #include <filesystem>
 #include <map>
 #include <stdexcept>
-#include <tuple>
 #include <utility>
 
 #include "captures/printable.h"
@@ -17,20 +16,9 @@
 #include "station/records/golden_unit_schedule.h"
 #include "station/records/hook.h"
 #include "station/records/publish_run.h"
-#include "station/records/run_hooks.h"
 
 namespace vlp {
 namespace {
-
-bool matches_filter(const RunRecord& run, const RunFilter& filter) {
-  const auto is = [](const std::string& text, const std::string& wanted) {
-    return wanted.empty() || text == wanted;
-  };
-  return is(run.camera, filter.camera) && is(run.station, filter.station) &&
-         is(run.verdict, filter.verdict) && is(run.kind, filter.kind) &&
-         is(run.operator_name, filter.operator_name) && is(run.shift, filter.shift) &&
-         run.ended_utc >= filter.since && (filter.until.empty() || run.ended_utc < filter.until);
-}
 
 void check_void_permission(const StationConfig& station, const std::string& operator_name) {
   const auto& operators = station.void_operators;
@@ -88,23 +76,9 @@ Records& KnownRuns::records() {
 }
 
 std::vector<RunSummary> KnownRuns::list(const RunFilter& filter) {
-  std::vector<RunSummary> runs;
   // First, so that a run that another program delivers at this time is in one of the two.
   const std::vector<RunRecord> waiting = this->waiting();
-  if (records_) runs = records_->list(filter);
-  for (const RunRecord& run : waiting) {
-    const RunEvent* event = voided(run);
-    const auto existing = std::find_if(
-        runs.begin(), runs.end(), [&](const RunSummary& other) { return other.run == run.run; });
-    if (existing != runs.end() && event != nullptr) existing->voided = event->text;
-    if (existing != runs.end() || !matches_filter(run, filter)) continue;
-    runs.push_back({run.run, run.kind, run.station, run.camera, run.ended_utc, run.verdict,
-                    "(waits here) " + run.causes, event == nullptr ? "" : event->text});
-  }
-  std::stable_sort(runs.begin(), runs.end(), [](const RunSummary& a, const RunSummary& b) {
-    return std::tie(a.ended_utc, a.run) < std::tie(b.ended_utc, b.run);
-  });
-  return keep_last(std::move(runs), filter.last);
+  return merge_runs(records_ ? records_->list(filter) : std::vector<RunSummary>(), waiting, filter);
 }
 
 RunRecord KnownRuns::find(const std::string& run) {
@@ -128,11 +102,6 @@ std::vector<RunRecord> KnownRuns::load_all(const RunFilter& filter) {
     if (auto record = records().find(run.run)) runs.push_back(std::move(*record));
   }
   return runs;
-}
-
-std::vector<std::string> KnownRuns::find_open_hooks() {
-  if (spool_) return spool_->find_open_hooks(station_->station);
-  return records().find_open_hooks("");
 }
 
 std::optional<double> RunCounts::yield() const {
@@ -174,51 +143,22 @@ RunCounts count_runs(std::span<const RunSummary> runs) {
 
 namespace {
 
-/// Renames the files of a voided run. Returns the reason why they were not renamed; empty if they
-/// were.
-std::string rename_files(const StationConfig* own_station, const RunRecord& record) {
+/// Renames the files of a voided run at its station. Returns true if it renamed or tried to;
+/// `problem` is the reason why the files keep their names.
+bool rename_files(const StationConfig* own_station, const RunRecord& record, std::string& problem) {
   if (own_station == nullptr) {
-    return fmt::format(
+    problem = fmt::format(
         "the files of run {} keep their names: the same command with --station of {}"
         " renames them",
         record.run, record.station);
+    return false;
   }
   try {
-    mark_files_voided(record, own_station->results);
-    return "";
+    return mark_files_voided(record, own_station->results);
   } catch (const InputError& error) {
-    return fmt::format("the run is voided, but its files keep their names: {}", error.what());
+    problem = fmt::format("the run is voided, but its files keep their names: {}", error.what());
+    return true;
   }
-}
-
-/// Returns true if a hook was called since a run was voided.
-bool is_hook_informed(const RunRecord& record) {
-  const auto begin = std::find_if(record.events.begin(), record.events.end(),
-                                  [](const RunEvent& event) { return event.what == kVoided; });
-  return std::any_of(begin, record.events.end(),
-                     [](const RunEvent& event) { return event.what == kHookRequested; });
-}
-
-/// Completes at the station of a run a voiding by the records alone (--records): golden unit, files
-/// and hook. Returns false if no step was missing.
-bool complete_voiding(KnownRuns& known, RunRecord& record, const std::string& who,
-                      const std::optional<HookLock>& lock, VoidedRun& result) {
-  const StationConfig& station = *known.station();
-  bool is_any_done = record.kind == "golden" && invalidate_golden_note(station, record.run);
-  try {
-    is_any_done = mark_files_voided(record, station.results) || is_any_done;
-  } catch (const InputError& error) {
-    result.files_problem =
-        fmt::format("the run is voided, but its files keep their names: {}", error.what());
-    is_any_done = true;
-  }
-  if (!lock || is_hook_informed(record)) return is_any_done;
-  Spool& spool = *known.spool();
-  record.events.push_back(make_hook_requested_event(*station.hook, who));
-  spool.keep(record);
-  spool.deliver();
-  result.problem = call_hook(*station.hook, record, *lock, spool);
-  return true;
 }
 
 }  // namespace
@@ -228,10 +168,10 @@ VoidedRun void_run(KnownRuns& known, const std::string& run, const std::string& 
   VoidedRun result{known.find(run)};
   RunRecord& record = result.run;
   const std::string who = printable_line(operator_name);
-  const auto& station = known.station();
-  const bool is_own_station = station && record.station == station->station;
+  const bool is_own_station = known.station() && record.station == known.station()->station;
+  const StationConfig* station = is_own_station ? &*known.station() : nullptr;
   std::optional<HookLock> lock;
-  if (is_own_station && station->hook) {
+  if (station != nullptr && station->hook) {
     lock.emplace(known.spool()->folder(), record.run);
     // The result of that hook would be mistaken for that of the hook about the voiding.
     if (!lock->held()) {
@@ -239,26 +179,29 @@ VoidedRun void_run(KnownRuns& known, const std::string& run, const std::string& 
     }
     record = known.find(run);  // it can have been voided before the lock was acquired
   }
-  const StationConfig* own_station = is_own_station ? &*station : nullptr;
-  if (is_own_station) check_void_permission(*station, operator_name);
+  if (station != nullptr) check_void_permission(*station, operator_name);
+  // Each step is done unless it was done before: a voiding by the records alone (--records) lacks
+  // those of the station.
+  std::string repeated;
   if (const RunEvent* event = voided(record)) {
-    if (is_own_station && complete_voiding(known, record, who, lock, result)) return result;
-    throw std::invalid_argument(
-        fmt::format("run {} was voided before, by {}: {}", record.run, event->who, event->text));
+    repeated =
+        fmt::format("run {} was voided before, by {}: {}", record.run, event->who, event->text);
+  } else {
+    record.events.push_back(make_event(kVoided, printable_line(reason), who));
   }
-  record.events.push_back(make_event(kVoided, printable_line(reason), who));
-  if (!station) {
-    known.records().keep(record);
-    result.files_problem = rename_files(own_station, record);
-    return result;
+  const bool calls_hook =
+      lock && find_last_event(record, kHookRequested) < find_last_event(record, kVoided);
+  if (calls_hook) record.events.push_back(make_hook_requested_event(*station->hook, who));
+  bool is_any_done = repeated.empty() || calls_hook;
+  Spool* spool = known.spool();
+  if (is_any_done) spool != nullptr ? spool->keep(record) : known.records().keep(record);
+  if (station != nullptr && record.kind == "golden") {
+    is_any_done = invalidate_golden_note(*station, record.run) || is_any_done;
   }
-  Spool& spool = *known.spool();
-  if (lock) record.events.push_back(make_hook_requested_event(*station->hook, who));
-  spool.keep(record);
-  if (is_own_station && record.kind == "golden") invalidate_golden_note(*station, record.run);
-  result.files_problem = rename_files(own_station, record);
-  spool.deliver();
-  if (lock) result.problem = call_hook(*station->hook, record, *lock, spool);
+  is_any_done = rename_files(station, record, result.files_problem) || is_any_done;
+  if (!is_any_done) throw std::invalid_argument(repeated);
+  if (spool != nullptr) spool->deliver();
+  if (calls_hook) result.problem = call_hook(*station->hook, record, *lock, *spool);
   return result;
 }
 

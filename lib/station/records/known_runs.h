@@ -44,8 +44,7 @@ class KnownRuns {
   /// Returns true if the records are offline. Only the waiting runs are known then.
   bool are_offline() const { return !records_; }
 
-  /// Returns the runs of the records, if online, and the waiting runs, in chronological order. The
-  /// causes of waiting runs contain a note that they wait.
+  /// Returns the runs of the records, if online, and the waiting runs (merge_runs()).
   std::vector<RunSummary> list(const RunFilter& filter);
   /// Returns a run that waits or that the records contain. Throws std::invalid_argument if no run
   /// has this id, otherwise as records().
@@ -54,9 +53,6 @@ class KnownRuns {
   RunRecord last(const RunFilter& filter);
   /// Returns the complete runs that the records contain.
   std::vector<RunRecord> load_all(const RunFilter& filter);
-  /// Returns the ids of the station's runs with an open hook (is_hook_open()), which 'vlp-station
-  /// hook' runs.
-  std::vector<std::string> find_open_hooks();
 
  private:
   void open(const std::string& where);

@@ -3,18 +3,20 @@
 #include "station/records/records.h"
 
 #include <fcntl.h>
+#include <fmt/core.h>
 #include <soci/postgresql/soci-postgresql.h>
 #include <soci/sqlite3/soci-sqlite3.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <initializer_list>
 #include <memory>
 #include <mutex>
+#include <stop_token>
 #include <string>
 #include <thread>
 #include <utility>
@@ -93,54 +95,43 @@ class ConnectionWatchdog {
     // Own descriptor: libpq closes its socket when the connection is lost, and its number can be
     // reused.
     socket_ = ::fcntl(PQsocket(server->conn_), F_DUPFD_CLOEXEC, 0);
-    if (socket_ >= 0) thread_ = std::thread([this] { wait(); });
+    if (socket_ >= 0) thread_ = std::jthread([this](const std::stop_token& stop) { wait(stop); });
   }
   ~ConnectionWatchdog() {
     if (socket_ < 0) return;
-    {
-      const std::lock_guard lock(mutex_);
-      is_finished_ = true;
-    }
-    changed_.notify_one();
-    thread_.join();
+    thread_ = {};  // stops and joins
     ::close(socket_);
   }
   ConnectionWatchdog(const ConnectionWatchdog&) = delete;
   ConnectionWatchdog& operator=(const ConnectionWatchdog&) = delete;
 
   /// Restarts the time limit.
-  void on_progress() {
-    const std::lock_guard lock(mutex_);
-    last_ = Clock::now();
-  }
-  bool has_timed_out() {
-    const std::lock_guard lock(mutex_);
-    return has_timed_out_;
-  }
+  void on_progress() { last_ = Clock::now(); }
+  bool has_timed_out() const { return has_timed_out_; }
 
  private:
   using Clock = std::chrono::steady_clock;
 
-  void wait() {
-    std::unique_lock lock(mutex_);
-    while (!is_finished_) {
-      const auto until = last_ + timeout_;
+  void wait(const std::stop_token& stop) {
+    std::mutex mutex;
+    std::unique_lock lock(mutex);
+    std::condition_variable_any stopped;
+    while (!stop.stop_requested()) {
+      const auto until = last_.load() + timeout_;
       if (Clock::now() >= until) {
         has_timed_out_ = true;
         ::shutdown(socket_, SHUT_RDWR);
         return;
       }
-      changed_.wait_until(lock, until);
+      stopped.wait_until(lock, stop, until, [] { return false; });
     }
   }
 
   std::chrono::seconds timeout_;
-  Clock::time_point last_ = Clock::now();
-  bool is_finished_ = false, has_timed_out_ = false;
+  std::atomic<Clock::time_point> last_ = Clock::now();
+  std::atomic<bool> has_timed_out_ = false;
   int socket_ = -1;
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  std::thread thread_;
+  std::jthread thread_;
 };
 
 }  // namespace
@@ -291,36 +282,45 @@ std::vector<TrailContent> insert_events(soci::session& sql, const RunRecord& rec
   return added;
 }
 
-/// Condition for a run in a query.
+/// Conditions for a run in a query.
 const std::string kNotVoided =
     "NOT EXISTS (SELECT 1 FROM events WHERE events.run = runs.run AND events.what = 'voided')";
+/// As is_hook_open().
+const std::string kHookOpen = fmt::format(
+    "EXISTS (SELECT 1 FROM events WHERE events.run = runs.run AND events.what = '{}' AND NOT "
+    "EXISTS "
+    "(SELECT 1 FROM events ended WHERE ended.run = events.run AND ended.what = '{}' AND "
+    "ended.event > events.event))",
+    kHookRequested, kHookDone);
 
-std::string make_condition(const RunFilter& filter) {
+/// Returns the conditions of a filter, and binds their values in this order.
+std::string bind_filter(soci::statement& statement, const RunFilter& filter) {
   std::string text = "WHERE 1 = 1";
-  if (!filter.camera.empty()) text += " AND runs.camera = :camera";
-  if (!filter.station.empty()) text += " AND runs.station = :station";
-  if (!filter.verdict.empty()) text += " AND runs.verdict = :verdict";
-  if (!filter.kind.empty()) text += " AND runs.kind = :kind";
-  if (!filter.operator_name.empty()) text += " AND runs.operator_name = :operator_name";
-  if (!filter.shift.empty()) text += " AND runs.shift = :shift";
-  if (!filter.since.empty()) text += " AND runs.ended_utc >= :since";
-  if (!filter.until.empty()) text += " AND runs.ended_utc < :until";
-  return text;
+  const auto add = [&](const std::string& value, const char* condition) {
+    if (value.empty()) return;
+    text.append(" AND ").append(condition);
+    statement.exchange(soci::use(value));
+  };
+  add(filter.camera, "runs.camera = :camera");
+  add(filter.station, "runs.station = :station");
+  add(filter.verdict, "runs.verdict = :verdict");
+  add(filter.kind, "runs.kind = :kind");
+  add(filter.operator_name, "runs.operator_name = :operator_name");
+  add(filter.shift, "runs.shift = :shift");
+  add(filter.since, "runs.ended_utc >= :since");
+  add(filter.until, "runs.ended_utc < :until");
+  add(filter.image_sha256,
+      "runs.run IN (SELECT images.run FROM images WHERE images.sha256 = :sha256 AND "
+      "images.refused = '')");
+  return filter.has_open_hook ? text + " AND " + kHookOpen : text;
 }
 
-void bind_filter(soci::statement& statement, const RunFilter& filter) {
-  for (const std::string* value :
-       {&filter.camera, &filter.station, &filter.verdict, &filter.kind, &filter.operator_name,
-        &filter.shift, &filter.since, &filter.until}) {
-    if (!value->empty()) statement.exchange(soci::use(*value));
-  }
-}
-
-/// Returns the rows of a query, with its columns in the members of `Row`; a non-empty `figure` and
-/// its former name are bound after the filter.
+/// Returns the rows of a query, with its columns in the members of `Row`. The query is `select`,
+/// the conditions of the filter, and `end`. A non-empty `metric` and its former name are bound to
+/// `end`.
 template <typename Row>
-std::vector<Row> query_rows(soci::session& sql, const std::string& query, const RunFilter& filter,
-                            const std::string& metric,
+std::vector<Row> query_rows(soci::session& sql, const std::string& select, const RunFilter& filter,
+                            const std::string& end, const std::string& metric,
                             std::initializer_list<std::string Row::*> texts,
                             double Row::*value = nullptr) {
   Row row;
@@ -328,14 +328,14 @@ std::vector<Row> query_rows(soci::session& sql, const std::string& query, const 
   soci::statement statement(sql);
   for (std::string Row::*text : texts) statement.exchange(soci::into(row.*text));
   if (value != nullptr) statement.exchange(soci::into(row.*value));
-  bind_filter(statement, filter);
+  const std::string conditions = bind_filter(statement, filter);
   const std::string former(find_former_name(NameKind::metric, metric));
   if (!metric.empty()) {
     statement.exchange(soci::use(metric));
     statement.exchange(soci::use(former));
   }
   statement.alloc();
-  statement.prepare(query);
+  statement.prepare(select + conditions + end);
   statement.define_and_bind();
   statement.execute();
   while (statement.fetch()) rows.push_back(row);
@@ -343,28 +343,6 @@ std::vector<Row> query_rows(soci::session& sql, const std::string& query, const 
 }
 
 }  // namespace
-
-std::string utc_problem(const std::string& text) {
-  const std::string form = "0000-00-00T00:00:00Z";
-  constexpr std::array<std::size_t, 4> lengths{10, 16, 19, 20};
-  bool is_valid = std::find(lengths.begin(), lengths.end(), text.size()) != lengths.end();
-  for (std::size_t i = 0; is_valid && i < text.size(); ++i) {
-    is_valid = form[i] == '0' ? text[i] >= '0' && text[i] <= '9' : text[i] == form[i];
-  }
-  if (is_valid) {
-    const auto at = [&](std::size_t begin) {
-      return static_cast<unsigned>(std::stoul(text.substr(begin, 2)));
-    };
-    constexpr std::size_t month = 5, day = 8, hour = 11, minute = 14, second = 17;
-    const std::chrono::year year(std::stoi(text.substr(0, 4)));
-    const auto below = [&](std::size_t begin, unsigned end) {
-      return text.size() < begin + 2 || at(begin) < end;
-    };
-    is_valid = (year / std::chrono::month(at(month)) / std::chrono::day(at(day))).ok() &&
-               below(hour, 24) && below(minute, 60) && below(second, 60);
-  }
-  return is_valid ? "" : "should be a UTC as 2026-11-21 or 2026-11-21T13:45, not " + text;
-}
 
 std::vector<double> extract_values(std::span<const TrendPoint> points) {
   std::vector<double> values;
@@ -433,99 +411,33 @@ void Records::check_writable() {
   });
 }
 
-ImageOwner Records::find_owner(const std::string& sha256, const std::string& other_than_camera) {
-  return database_->run([&](ConnectionWatchdog&) {
-    std::string camera, run;
-    database_->sql << "SELECT runs.camera, runs.run FROM images JOIN runs ON runs.run = images.run "
-                      "WHERE images.sha256 = :sha256 AND images.refused = '' AND runs.camera <> "
-                      ":camera AND " +
-                          kNotVoided + " ORDER BY runs.run LIMIT 1",
-        soci::into(camera), soci::into(run), soci::use(sha256), soci::use(other_than_camera);
-    return ImageOwner{camera, run};
-  });
-}
-
-std::vector<std::string> Records::find_judged_runs(const std::string& sha256,
-                                                   const std::string& camera) {
-  return database_->run(
-      [&](ConnectionWatchdog&) {
-        std::string run;
-        std::vector<std::string> runs;
-        const std::string invalid = to_string(Verdict::invalid);
-        soci::statement judged =
-            (database_->sql.prepare
-                 << "SELECT DISTINCT runs.run FROM images JOIN runs ON runs.run = images.run WHERE "
-                    "images.sha256 = :sha256 AND images.refused = '' AND runs.kind = 'unit' AND "
-                    "runs.camera = :camera AND runs.verdict <> :invalid AND " +
-                        kNotVoided + " ORDER BY runs.run",
-             soci::into(run), soci::use(sha256), soci::use(camera), soci::use(invalid));
-        judged.execute();
-        while (judged.fetch()) runs.push_back(run);
-        return runs;
-      });
-}
-
-std::string Records::find_golden_run(const std::string& sha256) {
-  return database_->run([&](ConnectionWatchdog&) {
-    std::string run;
-    const std::string invalid = to_string(Verdict::invalid);
-    database_->sql << "SELECT runs.run FROM images JOIN runs ON runs.run = images.run WHERE "
-                      "images.sha256 = :sha256 AND images.refused = '' AND runs.kind = 'golden' "
-                      "AND runs.verdict <> :invalid ORDER BY runs.run LIMIT 1",
-        soci::into(run), soci::use(sha256), soci::use(invalid);
-    return run;
-  });
-}
-
-std::vector<std::string> Records::find_open_hooks(const std::string& station) {
-  return database_->run(
-      [&](ConnectionWatchdog&) {
-        std::string run;
-        std::vector<std::string> runs;
-        const std::string wanted = kHookRequested, done = kHookDone;
-        soci::statement open =
-            (database_->sql.prepare
-                 << "SELECT DISTINCT events.run FROM events JOIN runs ON runs.run = events.run "
-                    "WHERE events.what = :wanted AND (:station = '' OR runs.station = :of) AND NOT "
-                    "EXISTS (SELECT 1 FROM events ended WHERE ended.run = events.run AND "
-                    "ended.what = :done AND ended.event > events.event) ORDER BY events.run",
-             soci::into(run), soci::use(wanted), soci::use(station), soci::use(station),
-             soci::use(done));
-        open.execute();
-        while (open.fetch()) runs.push_back(run);
-        return runs;
-      },
-      kManyRowsTimeoutFactor);
-}
-
 std::vector<RunSummary> Records::list(const RunFilter& filter) {
   using Line = RunSummary;
-  const std::string query =
+  constexpr const char* select =
       "SELECT run, kind, station, camera, ended_utc, verdict, causes, COALESCE((SELECT "
       "MIN(events.text) FROM events WHERE events.run = runs.run AND events.what = 'voided'), '') "
-      "FROM runs " +
-      make_condition(filter) + " ORDER BY ended_utc, run";
+      "FROM runs ";
   return database_->run(
       [&](ConnectionWatchdog&) {
-        return query_rows<Line>(database_->sql, query, filter, "",
+        return query_rows<Line>(database_->sql, select, filter, " ORDER BY ended_utc, run", "",
                                 {&Line::run, &Line::kind, &Line::station, &Line::camera,
                                  &Line::ended_utc, &Line::verdict, &Line::causes, &Line::voided});
       },
-      kManyRowsTimeoutFactor);
+      filter.image_sha256.empty() ? kManyRowsTimeoutFactor : 1);
 }
 
 std::vector<TrendPoint> Records::trend(const std::string& metric, const RunFilter& filter) {
   using Point = TrendPoint;
-  const std::string query =
+  constexpr const char* select =
       "SELECT runs.run, runs.station, runs.camera, runs.verdict, runs.ended_utc, figures.value "
-      "FROM runs JOIN figures ON figures.run = runs.run " +
-      make_condition(filter) + " AND " + kNotVoided +
-      " AND figures.name IN (:figure, :former) AND figures.value IS NOT NULL "
-      "ORDER BY runs.ended_utc, runs.run";
+      "FROM runs JOIN figures ON figures.run = runs.run ";
+  const std::string end = " AND " + kNotVoided +
+                          " AND figures.name IN (:figure, :former) AND figures.value IS NOT NULL "
+                          "ORDER BY runs.ended_utc, runs.run";
   return database_->run(
       [&](ConnectionWatchdog&) {
         return query_rows<Point>(
-            database_->sql, query, filter, metric,
+            database_->sql, select, filter, end, metric,
             {&Point::run, &Point::station, &Point::camera, &Point::verdict, &Point::ended_utc},
             &Point::value);
       },

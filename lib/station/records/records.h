@@ -17,19 +17,19 @@ namespace vlp {
 
 /// Selection of runs. Empty members do not restrict it.
 struct RunFilter {
-  std::string camera, station, verdict, kind;
+  std::string camera = {}, station = {}, verdict = {}, kind = {};
   /// Operator and shift of the run.
   std::string operator_name = {}, shift = {};
   /// End of the run: at or after `since`, and before `until`, UTC, as 2026-11-21 or
   /// 2026-11-21T13:45.
   std::string since = {}, until = {};
+  /// Digest of an image that the run uses.
+  std::string image_sha256 = {};
+  /// True for runs with an open hook only (is_hook_open()).
+  bool has_open_hook = false;
   /// Maximum number of runs, the latest ones; 0 for all.
   int last = 0;
 };
-
-/// Returns the problem of a UTC of a filter: 2026-11-21T13:45:01Z, or a prefix that includes the
-/// day. Empty if it is valid.
-std::string utc_problem(const std::string& text);
 
 /// Run in a list.
 struct RunSummary {
@@ -84,8 +84,8 @@ class RecordsRefused : public RecordsOffline {
 ///   message states,
 /// - the file cannot be opened,
 /// - another program holds a lock, or
-/// - the time limit expired: timeout_s(), 10 times that for queries of many runs, 360 times that
-///   for creating or migrating tables.
+/// - the time limit expired: timeout_s(), 10 times that for queries of many runs (without
+///   RunFilter::image_sha256), 360 times that for creating or migrating tables.
 class Records {
  public:
   explicit Records(const std::string& where);
@@ -100,18 +100,6 @@ class Records {
   std::optional<RunRecord> find(const std::string& run);
   /// Throws InputError if runs cannot be stored now.
   void check_writable();
-  /// Returns the first run of another camera, not voided, that uses an image of this digest; empty
-  /// if none does.
-  ImageOwner find_owner(const std::string& sha256, const std::string& other_than_camera);
-  /// Returns the judged runs of a unit, not voided, that use an image of this digest, the earliest
-  /// first.
-  std::vector<std::string> find_judged_runs(const std::string& sha256, const std::string& camera);
-  /// Returns the first judged run of a golden unit that uses an image of this digest; empty if none
-  /// does.
-  std::string find_golden_run(const std::string& sha256);
-  /// Returns the runs of this station with an open hook (is_hook_open()), in chronological order;
-  /// those of all stations if `station` is empty.
-  std::vector<std::string> find_open_hooks(const std::string& station);
   /// Returns the runs that match the filter, in chronological order.
   std::vector<RunSummary> list(const RunFilter& filter);
   /// Returns the values of a metric in the runs that match the filter, without voided runs.

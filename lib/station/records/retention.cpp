@@ -206,11 +206,7 @@ void delete_expired(const ExpiredFolder& expired, const StationConfig& config, S
   const SharedFolder parent = open_parent(expired, config);
   const Id name(expired.folder.filename().string(), expired.folder, "run");
   open_existing(parent, name).remove_content();
-  const auto& events = expired.run.events;
-  const bool has_event = std::any_of(events.begin(), events.end(), [&](const RunEvent& event) {
-    return event.what == expired.what;
-  });
-  if (!has_event) {
+  if (find_last_event(expired.run, expired.what) < 0) {
     constexpr double megabyte = 1e6;
     RunRecord run = expired.run;
     run.events.push_back(make_event(

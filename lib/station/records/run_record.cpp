@@ -14,6 +14,7 @@
 #include <ctime>
 #include <limits>
 #include <opencv2/core/utility.hpp>
+#include <optional>
 #include <random>
 #include <set>
 #include <string_view>
@@ -37,6 +38,15 @@ std::time_t current_time_s() {
   return std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
 }
 
+constexpr const char* kUtcFormat = "%Y-%m-%dT%H:%M:%SZ";
+
+/// Parses a UTC as 2026-11-21T13:45:01Z; std::nullopt for another text.
+std::optional<std::time_t> parse_utc(const std::string& text) {
+  std::tm parts{};
+  const char* end = ::strptime(text.c_str(), kUtcFormat, &parts);
+  return end != nullptr && *end == '\0' ? std::optional(::timegm(&parts)) : std::nullopt;
+}
+
 std::string utc(const char* format) { return format_utc(current_time_s(), format); }
 
 /// Returns the account that runs this program, and its machine.
@@ -54,10 +64,20 @@ void RunRecord::set_verdict(const std::vector<Cause>& why) {
   for (const Cause& cause : why) causes.append(cause.text).append("\n");
 }
 
+std::ptrdiff_t RunRecord::count_used_images() const {
+  return std::ranges::count_if(images, &Image::is_used);
+}
+
 const RunEvent* voided(const RunRecord& record) {
   const auto event = std::find_if(record.events.begin(), record.events.end(),
                                   [](const RunEvent& each) { return each.what == kVoided; });
   return event == record.events.end() ? nullptr : &*event;
+}
+
+std::ptrdiff_t find_last_event(const RunRecord& record, const char* what) {
+  const auto last = std::find_if(record.events.rbegin(), record.events.rend(),
+                                 [&](const RunEvent& event) { return event.what == what; });
+  return record.events.rend() - last - 1;
 }
 
 std::string format_void_command(const std::string& run, const std::filesystem::path& station_file) {
@@ -74,14 +94,12 @@ bool repeats_images(const RunRecord& run, const RunRecord& earlier) {
   if (run.camera != earlier.camera || run.run == earlier.run) return false;
   std::set<std::string> earlier_digests;
   for (const RunRecord::Image& image : earlier.images) {
-    if (image.refused.empty()) earlier_digests.insert(image.sha256);
+    if (image.is_used()) earlier_digests.insert(image.sha256);
   }
-  const auto is_new = [&](const RunRecord::Image& image) {
-    return image.refused.empty() && !earlier_digests.contains(image.sha256);
-  };
-  const auto is_used = [](const RunRecord::Image& image) { return image.refused.empty(); };
-  return std::any_of(run.images.begin(), run.images.end(), is_used) &&
-         std::none_of(run.images.begin(), run.images.end(), is_new);
+  return run.count_used_images() > 0 &&
+         std::ranges::none_of(run.images, [&](const RunRecord::Image& image) {
+           return image.is_used() && !earlier_digests.contains(image.sha256);
+         });
 }
 
 std::string find_verdict_problem(const RunRecord& record) {
@@ -135,13 +153,22 @@ RunEvent make_event(const std::string& what, const std::string& text,
 }
 
 double seconds_since(const std::string& utc) {
-  std::tm parts{};
-  const char* end = ::strptime(utc.c_str(), "%Y-%m-%dT%H:%M:%SZ", &parts);
-  if (end == nullptr || *end != '\0') return std::numeric_limits<double>::quiet_NaN();
-  return std::difftime(current_time_s(), ::timegm(&parts));
+  const auto time = parse_utc(utc);
+  return time ? std::difftime(current_time_s(), *time) : std::numeric_limits<double>::quiet_NaN();
 }
 
-std::string now_utc() { return utc("%Y-%m-%dT%H:%M:%SZ"); }
+std::string now_utc() { return utc(kUtcFormat); }
+
+std::string utc_problem(const std::string& text) {
+  constexpr std::array<std::size_t, 4> lengths{10, 16, 19, 20};
+  if (std::ranges::find(lengths, text.size()) != lengths.end()) {
+    const std::string whole = text + std::string("2026-11-21T00:00:00Z").substr(text.size());
+    // Formatting changes an invalid date, such as 30 February, and an incomplete number.
+    const auto time = parse_utc(whole);
+    if (time && format_utc(*time, kUtcFormat) == whole) return "";
+  }
+  return "should be a UTC as 2026-11-21 or 2026-11-21T13:45, not " + text;
+}
 
 std::string library_versions() {
   return fmt::format("OpenCV {}, AprilTag {}, mrcal {}, Ceres {}, Eigen {}.{}.{}",

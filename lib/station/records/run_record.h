@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <span>
 #include <string>
@@ -61,11 +62,15 @@ struct RunRecord {
     std::string step, name, sha256;
     /// Reason why the image was not used; empty if it was.
     std::string refused;
+
+    bool is_used() const { return refused.empty(); }
   };
   std::vector<Image> images;
   /// Events, in chronological order.
   std::vector<RunEvent> events;
 
+  /// Returns the number of images that were used.
+  std::ptrdiff_t count_used_images() const;
   bool passed() const { return verdict == to_string(Verdict::pass); }
   bool invalid() const { return verdict == to_string(Verdict::invalid); }
   /// Returns the first cause, in one line; empty if the run passed.
@@ -93,6 +98,9 @@ bool repeats_images(const RunRecord& run, const RunRecord& earlier);
 
 /// Returns the event that voided a run; null if it is not voided.
 const RunEvent* voided(const RunRecord& record);
+
+/// Returns the index of the last event of a kind; -1 if there is none.
+std::ptrdiff_t find_last_event(const RunRecord& record, const char* what);
 
 /// Returns the reason why the verdict of a record is not valid; empty if it is valid. The verdict
 /// is not valid if the run was voided, or if it is PASS despite a failed gate or a cause. The
@@ -122,6 +130,9 @@ bool is_run_id(const std::string& text);
 /// Returns the UTC of the start of a run, as 2026-11-21T13:45:01Z; empty if `run` is no run id.
 std::string begun_utc(const std::string& run);
 std::string now_utc();
+/// Returns the problem of a UTC of a filter: 2026-11-21T13:45:01Z, or a prefix that includes the
+/// day. Empty if it is valid.
+std::string utc_problem(const std::string& text);
 /// Returns the time since a UTC as 2026-11-21T13:45:01Z, s: negative for a future time, NaN for an
 /// invalid text.
 double seconds_since(const std::string& utc);

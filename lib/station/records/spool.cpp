@@ -5,78 +5,27 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 #include <set>
-#include <stdexcept>
 #include <system_error>
+#include <tuple>
 #include <utility>
 
-#include "captures/id.h"
-#include "captures/json_bounds.h"
 #include "captures/printable.h"
 #include "captures/shared_folder.h"
 #include "rig/input_error.h"
 #include "station/database_name.h"
 #include "station/records/hook.h"
-#include "station/records/json_number.h"
 #include "station/station_folders.h"
 
 namespace vlp {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::ordered_json;
 using Clock = std::chrono::steady_clock;
 
-constexpr const char* kRunFormat = "vlp-run/1";
 constexpr const char* kRunEnding = ".json";
-constexpr std::size_t kMaxRunFileBytes = 64 << 20;
 /// Several times the size of a run of hundreds of images.
 constexpr std::uintmax_t kRequiredSpace_bytes = 1'000'000;
-
-std::optional<double> read_optional_number(const Json& json) {
-  return json.is_null() ? std::nullopt : std::optional(json.get<double>());
-}
-
-std::optional<GuardBand> read_guard_band(const Json& metric) {
-  if (!metric.contains("guard_k")) return std::nullopt;
-  return GuardBand{metric.at("uncertainty").get<double>(), metric.at("guard_k").get<double>()};
-}
-
-SpooledRun parse_run(const Json& json) {
-  if (json.at("format").get<std::string>() != kRunFormat)
-    throw std::runtime_error("another format");
-  SpooledRun spooled;
-  json.at("records").get_to(spooled.records);
-  RunRecord& run = spooled.run;
-  for (const RunField& field : run_fields()) {
-    run.*field.text = json.value(field.name, std::string());
-  }
-  if (run.run.empty() || run.verdict.empty()) throw std::runtime_error("no run, or no verdict");
-  // Both name folders and files.
-  for (const std::string& id : {run.run, run.camera}) {
-    if (!Id::accepts(id)) throw std::runtime_error("its run or camera is no id");
-  }
-  for (const Json& metric : json.at("figures")) {
-    run.metrics.push_back(
-        {present_metric_name(metric.at("name").get<std::string>()),
-         metric.at("unit").get<std::string>(), read_optional_number(metric.at("value")),
-         read_optional_number(metric.at("gate")),
-         metric.at("at_least").get<bool>() ? Direction::at_least : Direction::at_most,
-         read_guard_band(metric)});
-  }
-  for (const Json& image : json.at("images")) {
-    run.images.push_back({image.at("step").get<std::string>(), image.at("image").get<std::string>(),
-                          image.at("sha256").get<std::string>(),
-                          image.at("refused").get<std::string>()});
-  }
-  for (const Json& event : json.value("events", Json::array())) {
-    run.events.push_back({event.at("event").get<std::string>(), event.at("what").get<std::string>(),
-                          event.at("text").get<std::string>(), event.value("who", std::string())});
-    if (!Id::accepts(run.events.back().event)) throw std::runtime_error("an event is no id");
-  }
-  return spooled;
-}
 
 /// Returns the file name of a run. It changes with each event: a program that delivers an earlier
 /// version does not remove a later one.
@@ -93,9 +42,7 @@ void merge_run(std::vector<RunRecord>& runs, const RunRecord& run) {
   }
   std::vector<RunEvent>& events = runs.back().events;
   for (const RunEvent& event : run.events) {
-    const auto at =
-        std::lower_bound(events.begin(), events.end(), event,
-                         [](const RunEvent& a, const RunEvent& b) { return a.event < b.event; });
+    const auto at = std::ranges::lower_bound(events, event.event, {}, &RunEvent::event);
     if (at == events.end() || at->event != event.event) events.insert(at, event);
   }
 }
@@ -121,10 +68,19 @@ void remove_stale_files(const fs::path& folder) {
   }
 }
 
-bool uses_image(const RunRecord& run, const std::string& sha256) {
-  return std::any_of(run.images.begin(), run.images.end(), [&](const RunRecord::Image& image) {
-    return image.sha256 == sha256 && image.refused.empty();
-  });
+bool matches_filter(const RunRecord& run, const RunFilter& filter) {
+  const auto is = [](const std::string& text, const std::string& wanted) {
+    return wanted.empty() || text == wanted;
+  };
+  const auto has_image = [&](const RunRecord::Image& image) {
+    return image.sha256 == filter.image_sha256 && image.is_used();
+  };
+  return is(run.camera, filter.camera) && is(run.station, filter.station) &&
+         is(run.verdict, filter.verdict) && is(run.kind, filter.kind) &&
+         is(run.operator_name, filter.operator_name) && is(run.shift, filter.shift) &&
+         run.ended_utc >= filter.since && (filter.until.empty() || run.ended_utc < filter.until) &&
+         (filter.image_sha256.empty() || std::ranges::any_of(run.images, has_image)) &&
+         (!filter.has_open_hook || is_hook_open(run));
 }
 
 /// Returns the operator's message about offline records; empty if only the error contains the
@@ -137,49 +93,6 @@ std::string make_notice(const InputError& error) {
 }
 
 }  // namespace
-
-std::string serialize_run(const SpooledRun& spooled) {
-  const RunRecord run = printable_run(spooled.run);
-  Json json;
-  json["format"] = kRunFormat;
-  json["records"] = printable_line(spooled.records);
-  for (const RunField& field : run_fields()) json[field.name] = run.*field.text;
-  json["figures"] = Json::array();
-  for (const CheckedMetric& metric : run.metrics) {
-    json["figures"].push_back({{"name", metric.name},
-                               {"unit", metric.unit},
-                               {"value", number_or_null(metric.value)},
-                               {"gate", number_or_null(metric.limit)},
-                               {"at_least", metric.direction == Direction::at_least}});
-    if (!metric.guard) continue;
-    json["figures"].back()["uncertainty"] = metric.guard->standard_uncertainty;
-    json["figures"].back()["guard_k"] = metric.guard->k;
-  }
-  json["images"] = Json::array();
-  for (const auto& [step, name, sha256, refused] : run.images) {
-    json["images"].push_back(
-        {{"step", step}, {"image", name}, {"sha256", sha256}, {"refused", refused}});
-  }
-  json["events"] = Json::array();
-  for (const RunEvent& event : run.events) {
-    json["events"].push_back(
-        {{"event", event.event}, {"what", event.what}, {"text", event.text}, {"who", event.who}});
-  }
-  constexpr int indent = 1;
-  return json.dump(indent) + "\n";
-}
-
-SpooledRun read_run(const fs::path& file) {
-  const auto text =
-      SharedFolder(file.parent_path()).read(file.filename().string(), kMaxRunFileBytes);
-  if (!text) throw InputError(file, "cannot be opened: it was taken away");
-  try {
-    check_json_bounds(*text);
-    return parse_run(Json::parse(*text));
-  } catch (const std::exception& error) {
-    throw InputError(file, std::string("is no run of a station: ") + error.what());
-  }
-}
 
 Spool::Spool(fs::path folder, std::string records)
     : folder_(std::move(folder)),
@@ -198,8 +111,7 @@ void Spool::open() {
 }
 
 /// Runs an action on the records. Returns the reason if it failed; empty on success.
-template <typename Action>
-std::string Spool::try_on_records(const Action& action) {
+std::string Spool::try_on_records(const std::function<void(Records&)>& action) {
   try {
     open();
     action(*records_);
@@ -216,6 +128,11 @@ std::string Spool::try_on_records(const Action& action) {
     }
     return error.what();
   }
+}
+
+/// Returns false if the records did not answer, now or within the last minute.
+bool Spool::query_records(const std::function<void(Records&)>& query) {
+  return may_access_records() && try_on_records(query).empty();
 }
 
 bool Spool::may_access_records() const { return Clock::now() >= next_access_; }
@@ -285,14 +202,6 @@ void Spool::deliver() {
   }
 }
 
-std::size_t Spool::count_waiting() const {
-  std::set<std::string> runs;
-  for (const auto& [file, spooled] : known_) {
-    if (spooled.records == name_) runs.insert(spooled.run.run);
-  }
-  return runs.size();
-}
-
 std::string Spool::with_remarks(const std::string& first) const {
   std::set<std::string> other_runs;
   std::string other_records;
@@ -315,9 +224,8 @@ std::string Spool::with_remarks(const std::string& first) const {
 }
 
 std::string Spool::state() {
-  read();
+  const std::size_t waiting = this->waiting().size();
   const std::string& why = offline_reason_.empty() ? problem_ : offline_reason_;
-  const std::size_t waiting = count_waiting();
   if (waiting > 0) {
     return with_remarks(
         fmt::format("kept here, {} waiting{}{}", waiting, why.empty() ? "" : ": ", why));
@@ -327,8 +235,7 @@ std::string Spool::state() {
 
 std::string Spool::notice() {
   if (offline_reason_.empty() || offline_notice_.empty()) return state();
-  read();
-  const std::size_t waiting = count_waiting();
+  const std::size_t waiting = this->waiting().size();
   const std::string runs = waiting == 0   ? "runs are"
                            : waiting == 1 ? "1 run"
                                           : fmt::format("{} runs", waiting);
@@ -349,7 +256,8 @@ std::vector<fs::path> Spool::files() {
   return files;
 }
 
-void Spool::read() {
+/// Reads the new files of the spool, and returns the selected runs in chronological order.
+std::vector<RunRecord> Spool::collect(const std::function<bool(const SpooledRun&)>& is_selected) {
   const auto files = this->files();
   std::erase_if(known_, [&](const auto& known) {
     return !std::binary_search(files.begin(), files.end(), known.first);
@@ -365,97 +273,95 @@ void Spool::read() {
       if (fs::exists(file, gone)) unread_ = error.what();
     }
   }
-}
-
-std::vector<RunRecord> Spool::waiting() {
-  read();
   std::vector<RunRecord> runs;
   for (const auto& [file, spooled] : known_) {
-    if (spooled.records == name_) merge_run(runs, spooled.run);
+    if (is_selected(spooled)) merge_run(runs, spooled.run);
   }
   return runs;
 }
 
+std::vector<RunRecord> Spool::waiting() {
+  return collect([&](const SpooledRun& spooled) { return spooled.records == name_; });
+}
+
 std::optional<RunRecord> Spool::find(const std::string& run) {
-  read();
-  std::vector<RunRecord> here;
-  for (const auto& [file, spooled] : known_) {
-    if (spooled.run.run == run) merge_run(here, spooled.run);
-  }
+  const auto here = collect([&](const SpooledRun& spooled) { return spooled.run.run == run; });
   if (!here.empty()) return here.front();
   std::optional<RunRecord> found;
-  if (may_access_records()) try_on_records([&](Records& records) { found = records.find(run); });
+  query_records([&](Records& records) { found = records.find(run); });
   return found;
 }
 
-std::vector<std::string> Spool::find_open_hooks(const std::string& station) {
-  std::vector<std::string> kept;
-  if (may_access_records())
-    try_on_records([&](Records& records) { kept = records.find_open_hooks(station); });
-  std::set<std::string> runs(kept.begin(), kept.end());
-  for (const RunRecord& run : waiting()) {
-    if (!station.empty() && run.station != station) continue;
-    // Waiting runs are newer.
-    if (is_hook_open(run)) {
-      runs.insert(run.run);
-    } else {
-      runs.erase(run.run);
-    }
+std::vector<RunSummary> Spool::list(const RunFilter& filter) {
+  std::vector<RunSummary> stored;
+  query_records([&](Records& records) { stored = records.list(filter); });
+  return merge_runs(std::move(stored), waiting(), filter);
+}
+
+/// Returns the first run that uses an image of this digest, of all runs of the spool and the
+/// records. Counts images that were not compared with the records.
+std::optional<RunSummary> Spool::find_user_of_image(
+    const std::string& sha256, const std::function<bool(const RunSummary&)>& is_searched) {
+  const RunFilter filter{.image_sha256 = sha256};
+  std::vector<RunSummary> stored;
+  const bool has_answer = query_records([&](Records& records) { stored = records.list(filter); });
+  const auto spooled = collect([](const SpooledRun&) { return true; });
+  for (RunSummary& run : merge_runs(std::move(stored), spooled, filter)) {
+    if (is_searched(run)) return std::move(run);
   }
-  return {runs.begin(), runs.end()};
+  if (!has_answer) ++num_unchecked_;
+  return std::nullopt;
 }
 
 ImageOwner Spool::find_owner(const std::string& sha256, const std::string& other_than_camera) {
-  read();
-  for (const auto& [file, spooled] : known_) {
-    const RunRecord& run = spooled.run;
-    if (run.camera != other_than_camera && uses_image(run, sha256) && voided(run) == nullptr) {
-      return {run.camera, run.run};
-    }
-  }
-  ImageOwner owner;
-  const auto query_records = [&](Records& records) {
-    owner = records.find_owner(sha256, other_than_camera);
-  };
-  if (!may_access_records() || !try_on_records(query_records).empty()) ++num_unchecked_;
-  return owner;
-}
-
-std::optional<std::string> Spool::find_repeated_run(const RunRecord& run) {
-  const auto first = std::find_if(run.images.begin(), run.images.end(),
-                                  [](const auto& image) { return image.refused.empty(); });
-  if (first == run.images.end()) return "";
-  std::set<std::string> voided_runs;  // possibly not yet voided in the records
-  for (const RunRecord& earlier : waiting()) {
-    if (voided(earlier) != nullptr) {
-      voided_runs.insert(earlier.run);
-    } else if (earlier.kind == "unit" && !earlier.invalid() && repeats_images(run, earlier)) {
-      return earlier.run;
-    }
-  }
-  std::string repeated;
-  const auto query_records = [&](Records& records) {
-    for (const std::string& name : records.find_judged_runs(first->sha256, run.camera)) {
-      const auto earlier = records.find(name);
-      if (!earlier || voided_runs.contains(name) || !repeats_images(run, *earlier)) continue;
-      repeated = name;
-      return;
-    }
-  };
-  if (!may_access_records() || !try_on_records(query_records).empty()) return std::nullopt;
-  return repeated;
+  const auto run = find_user_of_image(sha256, [&](const RunSummary& user) {
+    return user.camera != other_than_camera && user.voided.empty();
+  });
+  return run ? ImageOwner{run->camera, run->run} : ImageOwner{};
 }
 
 std::string Spool::find_golden_run(const std::string& sha256) {
-  read();
-  for (const auto& [file, spooled] : known_) {
-    const RunRecord& run = spooled.run;
-    if (run.kind == "golden" && !run.invalid() && uses_image(run, sha256)) return run.run;
+  const auto run = find_user_of_image(sha256, [](const RunSummary& user) {
+    return user.kind == "golden" && user.verdict != to_string(Verdict::invalid);
+  });
+  return run ? run->run : "";
+}
+
+std::optional<std::string> Spool::find_repeated_run(const RunRecord& run) {
+  const auto first = std::ranges::find_if(run.images, &RunRecord::Image::is_used);
+  if (first == run.images.end()) return "";
+  const RunFilter filter{.camera = run.camera, .kind = "unit", .image_sha256 = first->sha256};
+  std::vector<RunSummary> stored;
+  bool has_answer = query_records([&](Records& records) { stored = records.list(filter); });
+  for (const RunSummary& earlier : merge_runs(std::move(stored), waiting(), filter)) {
+    if (earlier.verdict == to_string(Verdict::invalid) || !earlier.voided.empty()) continue;
+    const auto record = find(earlier.run);
+    if (record && repeats_images(run, *record)) return earlier.run;
+    has_answer = has_answer && record;
   }
-  std::string run;
-  const auto query_records = [&](Records& records) { run = records.find_golden_run(sha256); };
-  if (!may_access_records() || !try_on_records(query_records).empty()) ++num_unchecked_;
-  return run;
+  return has_answer ? std::optional<std::string>("") : std::nullopt;
+}
+
+std::vector<RunSummary> merge_runs(std::vector<RunSummary> stored,
+                                   const std::vector<RunRecord>& waiting, const RunFilter& filter) {
+  std::vector<RunSummary> runs = std::move(stored);
+  for (const RunRecord& run : waiting) {
+    const RunEvent* event = voided(run);
+    const bool matches = matches_filter(run, filter);
+    const auto known = std::ranges::find(runs, run.run, &RunSummary::run);
+    if (known == runs.end()) {
+      if (!matches) continue;
+      runs.push_back({run.run, run.kind, run.station, run.camera, run.ended_utc, run.verdict,
+                      "(waits here) " + run.causes, event == nullptr ? "" : event->text});
+    } else if (!matches) {
+      runs.erase(known);
+    } else if (event != nullptr) {
+      known->voided = event->text;
+    }
+  }
+  std::ranges::stable_sort(runs, {},
+                           [](const RunSummary& run) { return std::tie(run.ended_utc, run.run); });
+  return keep_last(std::move(runs), filter.last);
 }
 
 }  // namespace vlp

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -12,14 +13,9 @@
 #include <vector>
 
 #include "station/records/records.h"
+#include "station/records/run_formats.h"
 
 namespace vlp {
-
-/// Run and make_records_database_id() of the records that it belongs to.
-struct SpooledRun {
-  RunRecord run;
-  std::string records;
-};
 
 /// Queue of a station's runs that are to be delivered to its records, which may be offline.
 ///
@@ -75,26 +71,29 @@ class Spool {
   /// Returns a run that waits for any records, or that the records contain; otherwise std::nullopt,
   /// also if the records do not answer.
   std::optional<RunRecord> find(const std::string& run);
-  /// Returns Records::find_open_hooks() of the waiting runs and, if online, of the records.
-  std::vector<std::string> find_open_hooks(const std::string& station);
-  /// Returns Records::find_owner() of the waiting runs and, if online, of the records.
+  /// Returns the waiting runs and, if online, the runs of the records that match the filter, as
+  /// merge_runs().
+  std::vector<RunSummary> list(const RunFilter& filter);
+  /// Returns the first run of another camera, not voided, that uses an image of this digest; empty
+  /// if none does. Searches all runs of the spool and the records.
   ImageOwner find_owner(const std::string& sha256, const std::string& other_than_camera);
   /// Returns the first judged run of the same unit, not voided, that used all images of `run`
   /// (repeats_images()). Searches the waiting runs and the records. Returns an empty string if
   /// there is none, and std::nullopt if the records do not answer and no waiting run matches.
   std::optional<std::string> find_repeated_run(const RunRecord& run);
-  /// Returns Records::find_golden_run() of the waiting runs and, if online, of the records.
+  /// Returns the first judged run of a golden unit that uses an image of this digest; empty if none
+  /// does. Searches all runs of the spool and the records.
   std::string find_golden_run(const std::string& sha256);
 
  private:
   std::vector<std::filesystem::path> files();
-  void read();
   void open();
-  template <typename Action>
-  std::string try_on_records(const Action& action);
+  std::string try_on_records(const std::function<void(Records&)>& action);
+  bool query_records(const std::function<void(Records&)>& query);
   bool may_access_records() const;
-  /// Counts the runs that wait for these records.
-  std::size_t count_waiting() const;
+  std::vector<RunRecord> collect(const std::function<bool(const SpooledRun&)>& is_selected);
+  std::optional<RunSummary> find_user_of_image(
+      const std::string& sha256, const std::function<bool(const RunSummary&)>& is_searched);
   /// Returns `first`, unless it is empty, and further remarks: runs for other records, unreadable
   /// files, images that were not compared with the records.
   std::string with_remarks(const std::string& first) const;
@@ -103,23 +102,21 @@ class Spool {
   /// Connection string, and its make_records_database_id(), which the files of runs contain.
   std::string where_, name_;
   std::unique_ptr<Records> records_;
-  /// Reason why the records are offline; why they did not accept a run; a file that read() could
-  /// not read, or that contains no run.
+  /// Reason why the records are offline; why they did not accept a run; a file that collect()
+  /// could not read, or that contains no run.
   std::string offline_reason_, problem_, unread_;
   /// `offline_reason_` for the operator; empty if only `offline_reason_` contains the remedy.
   std::string offline_notice_;
   std::chrono::steady_clock::time_point next_access_;
-  /// Runs that read() has found, for these and for other records.
+  /// Runs that collect() has found, for these and for other records.
   std::map<std::filesystem::path, SpooledRun> known_;
   std::size_t num_unchecked_ = 0;
 };
 
-/// Serializes a run as `vlp-run/1`: a JSON object with "records", the texts of run_fields(),
-/// "figures", "images" and "events". Figures with a guard band have "uncertainty" and "guard_k".
-/// Invalid text is written as by printable().
-std::string serialize_run(const SpooledRun& spooled);
-/// Reads a run in the format of serialize_run(). A missing text of run_fields() is empty, as in
-/// files of older programs. Throws InputError with the file, also if it contains no run.
-SpooledRun read_run(const std::filesystem::path& file);
+/// Adds the waiting runs that match the filter to runs of the records (Records::list()), and sorts
+/// all by their end. The causes of added runs contain a note that they wait. A run of the records
+/// that also waits is updated: the waiting one has newer events.
+std::vector<RunSummary> merge_runs(std::vector<RunSummary> stored,
+                                   const std::vector<RunRecord>& waiting, const RunFilter& filter);
 
 }  // namespace vlp

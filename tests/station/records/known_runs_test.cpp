@@ -213,7 +213,7 @@ TEST_F(KnownRunsTest, VoidRunCallsHook) {
     EXPECT_EQ(problem, "");
     EXPECT_EQ(files_problem, "");
     EXPECT_EQ(record.events.back().what, kHookDone);
-    EXPECT_THAT(known.find_open_hooks(), IsEmpty());
+    EXPECT_THAT(list_open_hooks(known, config.station), IsEmpty());
   }
   EXPECT_THAT(TemporaryFolder::read_content(folder / "told.json"),
               AllOf(HasSubstr(run), HasSubstr("\"voided\""), HasSubstr("wrong serial")));
@@ -226,9 +226,9 @@ TEST_F(KnownRunsTest, VoidRunCallsHook) {
   second.events = {make_event(kHookRequested, "label"), make_event(kHookDone, "")};
   Records(config.records).keep(second);
   KnownRuns known(config);
-  EXPECT_THAT(known.find_open_hooks(), IsEmpty());
+  EXPECT_THAT(list_open_hooks(known, config.station), IsEmpty());
   EXPECT_EQ(hook_problem(void_run(known, second.run, "Ann", "again").run), "failed: exit code 1");
-  EXPECT_THAT(known.find_open_hooks(), ElementsAre(second.run));
+  EXPECT_THAT(list_open_hooks(known, config.station), ElementsAre(second.run));
 }
 
 TEST_F(KnownRunsTest, VoidRunCallsNoHookOfAnotherStation) {

@@ -12,8 +12,8 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "station/records/export_runs.h"
 #include "station/records/record_tables.h"
+#include "station/records/run_formats.h"
 #include "station/sample_records.h"
 #include "station/station_config.h"
 #include "support/child_process.h"
@@ -59,16 +59,16 @@ void check_events(Records& records) {
   run.events = {make_event(kHookRequested, "label 'x'")};
   other.events = {make_event(kHookRequested, "label"), make_event(kHookDone, "")};
   for (const RunRecord& each : {run, other, run}) records.keep(each);
-  EXPECT_THAT(records.find_open_hooks("station-1"), ElementsAre(run.run));
-  EXPECT_THAT(records.find_open_hooks(""), ElementsAre(run.run));
-  EXPECT_THAT(records.find_open_hooks("another"), IsEmpty());
+  EXPECT_THAT(list_open_hooks(records, "station-1"), ElementsAre(run.run));
+  EXPECT_THAT(list_open_hooks(records), ElementsAre(run.run));
+  EXPECT_THAT(list_open_hooks(records, "another"), IsEmpty());
   const RunEvent wanted = run.events.front();
   run.events.push_back(make_event(kHookFailed, "exit code 3"));
   records.keep(run);
-  EXPECT_THAT(records.find_open_hooks("station-1"), ElementsAre(run.run));
+  EXPECT_THAT(list_open_hooks(records, "station-1"), ElementsAre(run.run));
   run.events = {make_event(kHookDone, "")};  // by a program without the other events
   records.keep(run);
-  EXPECT_THAT(records.find_open_hooks("station-1"), IsEmpty());
+  EXPECT_THAT(list_open_hooks(records, "station-1"), IsEmpty());
   const auto found = records.find(run.run);
   ASSERT_TRUE(found);
   ASSERT_THAT(found->events, SizeIs(3));
@@ -94,7 +94,7 @@ void check_voided(Records& records) {
   EXPECT_EQ(records.list({})[0].run, run.run);
   EXPECT_EQ(records.list({})[0].voided, "wrong serial");
   EXPECT_EQ(records.list({})[1].voided, "");
-  EXPECT_EQ(records.find_owner(std::string(64, 'b'), "b"), (ImageOwner{"a", numbered_run_id(1)}));
+  EXPECT_EQ(records.list({.image_sha256 = std::string(64, 'b')})[0].voided, "wrong serial");
 }
 
 /// Checks the properties of records in every database.
@@ -115,10 +115,13 @@ void check_records(const std::string& where) {
   EXPECT_EQ(all[3].verdict, "FAIL");
   EXPECT_EQ(all[3].station, "station-1");
   EXPECT_THAT(all[3].causes, StartsWith("it's \"blurred\""));
-  // The owner of an image is the first run that uses it, and no run of the camera itself.
-  EXPECT_EQ(records.find_owner(std::string(64, 'b'), "b"), (ImageOwner{"a", numbered_run_id(0)}));
-  EXPECT_EQ(records.find_owner(std::string(64, 'b'), "a"), (ImageOwner{"b", numbered_run_id(2)}));
-  EXPECT_EQ(records.find_owner(std::string(64, 'c'), "b"), ImageOwner{}) << "it was refused there";
+  EXPECT_THAT(
+      list_ids(records, {.image_sha256 = std::string(64, 'b')}),
+      ElementsAre(numbered_run_id(0), numbered_run_id(1), numbered_run_id(2), numbered_run_id(3)));
+  EXPECT_THAT(list_ids(records, {.camera = "b", .image_sha256 = std::string(64, 'b')}),
+              ElementsAre(numbered_run_id(2)));
+  EXPECT_THAT(list_ids(records, {.image_sha256 = std::string(64, 'c')}), IsEmpty())
+      << "it was refused there";
   EXPECT_EQ(rejection_message([&] { records.check_writable(); }), "");
   RunFilter filter;
   filter.camera = "a";

@@ -270,7 +270,7 @@ TEST(Spool, KeepsRunsOfEightStationsOnOneServer) {
     spool.deliver();
     EXPECT_EQ(spool.state(), "");
   }
-  EXPECT_THAT(Records(server.uri()).find_open_hooks(""), IsEmpty());
+  EXPECT_THAT(Records(server.uri()).list({.has_open_hook = true}), IsEmpty());
   const auto count = static_cast<std::size_t>(stations * each);
   EXPECT_THAT(whole_runs(server.uri()), SizeIs(count));
   const TrailCheck trail = Records(server.uri()).check("");

@@ -19,6 +19,7 @@
 
 #include "numbered_runs.h"
 #include "station/database_name.h"
+#include "station/sample_records.h"
 #include "station/station_config.h"
 #include "support/child_process.h"
 #include "support/postgres_server.h"
@@ -151,6 +152,13 @@ TEST(Spool, KeepsRunsUntilRecordsAreOnline) {
   EXPECT_EQ(Records(where).find(numbered_run(1).run)->metrics[0].value, 0.1 + 0.2);
   EXPECT_EQ(later.find_owner("digest-2-7", "camera-1"),
             (ImageOwner{"camera-2", numbered_run(2).run}));
+  // A voided run owns no image, also while its event waits.
+  RunRecord voided_run = numbered_run(2);
+  voided_run.events = {make_event(kVoided, "wrong serial", "Ann")};
+  later.keep(voided_run);
+  EXPECT_EQ(later.find_owner("digest-2-7", "camera-1"), ImageOwner{});
+  later.deliver();
+  EXPECT_EQ(later.find_owner("digest-2-7", "camera-1"), ImageOwner{});
 }
 
 TEST(Spool, FindsGoldenRunOfImage) {
@@ -221,14 +229,14 @@ TEST(Spool, KeepsEventsOfRun) {
   RunRecord run = numbered_run(1);
   run.events = {make_event(kHookRequested, "label")};
   spool.keep(run);
-  EXPECT_THAT(spool.find_open_hooks("station-1"), testing::ElementsAre(run.run));
-  EXPECT_THAT(spool.find_open_hooks("another"), IsEmpty());
+  EXPECT_THAT(list_open_hooks(spool, "station-1"), testing::ElementsAre(run.run));
+  EXPECT_THAT(list_open_hooks(spool, "another"), IsEmpty());
   const RunRecord before = run;
   run.events.push_back(make_event(kHookFailed, "\"exit\" code 3"));
   spool.keep(run);
   run.events = {before.events[0], make_event(kHookDone, "")};
   spool.keep(run);
-  EXPECT_THAT(spool.find_open_hooks("station-1"), IsEmpty());
+  EXPECT_THAT(list_open_hooks(spool, "station-1"), IsEmpty());
   spool.deliver();
   EXPECT_THAT(spool.state(), StartsWith("kept here, 1 waiting"));
   ASSERT_THAT(spool.waiting(), SizeIs(1));
@@ -244,7 +252,7 @@ TEST(Spool, KeepsEventsOfRun) {
   const auto kept = later.find(run.run);
   ASSERT_THAT(kept->events, SizeIs(3));
   EXPECT_EQ(kept->events[1].text, "\"exit\" code 3");
-  EXPECT_THAT(later.find_open_hooks("station-1"), IsEmpty());
+  EXPECT_THAT(list_open_hooks(later, "station-1"), IsEmpty());
 }
 
 TEST(Spool, DeliversDespiteInvalidFiles) {

@@ -10,6 +10,20 @@
 
 namespace vlp {
 
+/// Run and make_records_database_id() of the records that it belongs to.
+struct SpooledRun {
+  RunRecord run;
+  std::string records;
+};
+
+/// Serializes a run as `vlp-run/1`: a JSON object with "records", the texts of run_fields(),
+/// "figures", "images" and "events". Figures with a guard band have "uncertainty" and "guard_k".
+/// Invalid text is written as by printable().
+std::string serialize_run(const SpooledRun& spooled);
+/// Reads a run in the format of serialize_run(). A missing text of run_fields() is empty, as in
+/// files of older programs. Throws InputError with the file, also if it contains no run.
+SpooledRun read_run(const std::filesystem::path& file);
+
 /// Returns a run as a JSON object for the hook: "event" ("verdict", or "voided" for a voided run),
 /// then the members written by write_runs().
 std::string format_hook_json(const RunRecord& run);
