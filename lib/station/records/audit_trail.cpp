@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "captures/digest.h"
-#include "station/records/run_storage.h"
+#include "station/records/record_tables.h"
 
 namespace vlp {
 namespace {
@@ -100,13 +100,9 @@ std::vector<Entry> load_entries(soci::session& sql) {
 }
 
 std::vector<std::string> load_run_ids(soci::session& sql) {
-  std::string run;
-  std::vector<std::string> runs;
-  soci::statement all =
-      (sql.prepare << "SELECT run FROM runs ORDER BY ended_utc, run", soci::into(run));
-  all.execute();
-  while (all.fetch()) runs.push_back(run);
-  return runs;
+  const soci::rowset<std::string> runs =
+      (sql.prepare << "SELECT run FROM runs ORDER BY ended_utc, run");
+  return {runs.begin(), runs.end()};
 }
 
 std::string describe_item(const std::string& run, const std::string& event) {
@@ -137,60 +133,25 @@ void check_chain(const std::vector<Entry>& entries, std::vector<std::string>& pr
   }
 }
 
-/// Contents of the entries by run and event. Checked ones are removed.
-class Contents {
- public:
-  Contents(const std::vector<Entry>& entries, std::vector<std::string>& problems)
-      : problems_(problems) {
-    for (const Entry& entry : entries) {
-      if (entries_.emplace(std::pair(entry.run, entry.event), entry.content).second) continue;
-      problems_.push_back(fmt::format("entry {} of the trail was added: {} has one already",
-                                      entry.number, describe_item(entry.run, entry.event)));
-    }
-  }
-  void check(const std::string& run, const std::string& event, const std::string& content) {
-    const auto entry = entries_.find({run, event});
-    if (entry == entries_.end()) {
-      problems_.push_back(describe_item(run, event) +
-                          " has no entry in the trail: it was added by hand");
-      return;
-    }
-    if (entry->second != content) problems_.push_back(describe_item(run, event) + " was changed");
-    entries_.erase(entry);
-  }
-  /// Reports the remaining contents, which were not found.
-  void end() {
-    for (const auto& [name, content] : entries_) {
-      problems_.push_back(describe_item(name.first, name.second) + " was removed");
-    }
-  }
-
- private:
-  std::map<std::pair<std::string, std::string>, std::string> entries_;
-  std::vector<std::string>& problems_;
-};
-
 }  // namespace
 
 void lock_trail(soci::session& sql) { sql << "UPDATE vlp_schema SET version = version"; }
 
-TrailContent make_run_digest_entry(soci::session& sql, const std::string& run) {
+void append_to_trail(soci::session& sql, const std::string& run, bool is_new_run,
+                     const std::vector<RunEvent>& new_events) {
+  std::vector<Entry> added;
   // As read from the database, which can store a number differently than given.
-  return {run, "", compute_digest(load_run(sql, run).value())};
-}
-
-TrailContent make_event_content(const std::string& run, const RunEvent& event) {
-  return {run, event.event, compute_digest(run, event)};
-}
-
-void append_to_trail(soci::session& sql, const std::vector<TrailContent>& contents) {
-  if (contents.empty()) return;
+  if (is_new_run) added.push_back({0, run, "", compute_digest(load_run(sql, run).value()), ""});
+  for (const RunEvent& event : new_events) {
+    added.push_back({0, run, event.event, compute_digest(run, event), ""});
+  }
+  if (added.empty()) return;
   lock_trail(sql);
   Entry last;
   sql << "SELECT number, digest FROM trail ORDER BY number DESC LIMIT 1", soci::into(last.number),
       soci::into(last.digest);
-  for (const auto& [run, event, content] : contents) {
-    Entry entry{last.number + 1, run, event, content, ""};
+  for (Entry& entry : added) {
+    entry.number = last.number + 1;
     entry.digest = compute_digest(entry, last.digest);
     sql << "INSERT INTO trail (number, run, event, content, digest) VALUES (:number, :run, :event, "
            ":content, :digest)",
@@ -201,13 +162,9 @@ void append_to_trail(soci::session& sql, const std::vector<TrailContent>& conten
 }
 
 void append_all_runs(soci::session& sql) {
-  std::vector<TrailContent> contents;
   for (const std::string& run : load_run_ids(sql)) {
-    contents.push_back(make_run_digest_entry(sql, run));
-    const RunRecord kept = load_run(sql, run).value();
-    for (const RunEvent& event : kept.events) contents.push_back(make_event_content(run, event));
+    append_to_trail(sql, run, true, load_run(sql, run).value().events);
   }
-  append_to_trail(sql, contents);
 }
 
 TrailCheck check_trail(soci::session& sql, const std::string& expected_digest,
@@ -218,21 +175,37 @@ TrailCheck check_trail(soci::session& sql, const std::string& expected_digest,
   if (!entries.empty()) check.last_digest = entries.back().digest;
   check_chain(entries, check.problems);
   on_progress();
-  Contents contents(entries, check.problems);
+  // Contents of the entries by run and event; without those that are found in the records.
+  std::map<std::pair<std::string, std::string>, std::string> contents;
+  for (const Entry& entry : entries) {
+    if (contents.emplace(std::pair(entry.run, entry.event), entry.content).second) continue;
+    check.problems.push_back(fmt::format("entry {} of the trail was added: {} has one already",
+                                         entry.number, describe_item(entry.run, entry.event)));
+  }
+  const auto check_item = [&](const std::string& run, const std::string& event,
+                              const std::string& content) {
+    const auto entry = contents.extract({run, event});
+    if (entry.empty()) {
+      check.problems.push_back(describe_item(run, event) +
+                               " has no entry in the trail: it was added by hand");
+    } else if (entry.mapped() != content) {
+      check.problems.push_back(describe_item(run, event) + " was changed");
+    }
+  };
   for (const std::string& name : load_run_ids(sql)) {
     const RunRecord run = load_run(sql, name).value();
     ++check.runs;
-    contents.check(name, "", compute_digest(run));
+    check_item(name, "", compute_digest(run));
     for (const RunEvent& event : run.events) {
-      contents.check(name, event.event, compute_digest(name, event));
+      check_item(name, event.event, compute_digest(name, event));
     }
     on_progress();
   }
-  contents.end();
-  const bool is_in_trail = std::any_of(entries.begin(), entries.end(), [&](const Entry& entry) {
-    return entry.digest == expected_digest;
-  });
-  if (!expected_digest.empty() && !is_in_trail) {
+  for (const auto& [item, content] : contents) {
+    check.problems.push_back(describe_item(item.first, item.second) + " was removed");
+  }
+  if (!expected_digest.empty() &&
+      std::ranges::find(entries, expected_digest, &Entry::digest) == entries.end()) {
     check.problems.push_back("the entry that was noted, " + expected_digest +
                              ", is not in the trail: its end was removed, or all of it is another");
   }

@@ -26,18 +26,13 @@ namespace vlp {
 /// existing digest: removing the last entries with their runs, and rewriting all entries. They are
 /// detected by a last digest that was stored elsewhere.
 
-/// Content of a new entry: a run or one of its events, and the digest of it.
-struct TrailContent {
-  std::string run, event, content;
-};
-TrailContent make_run_digest_entry(soci::session& sql, const std::string& run);
-TrailContent make_event_content(const std::string& run, const RunEvent& event);
-
 /// Locks the trail for this program until the end of its transaction. Slow work should be done
 /// before.
 void lock_trail(soci::session& sql);
-/// Locks the trail and appends entries.
-void append_to_trail(soci::session& sql, const std::vector<TrailContent>& contents);
+/// Locks the trail and appends the entries of new events of a run, after that of the run itself if
+/// `is_new_run`.
+void append_to_trail(soci::session& sql, const std::string& run, bool is_new_run,
+                     const std::vector<RunEvent>& new_events);
 /// Appends entries of all runs, for records of an earlier version without a trail.
 void append_all_runs(soci::session& sql);
 

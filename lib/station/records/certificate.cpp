@@ -50,8 +50,6 @@ std::string verdict_part(const RunRecord& record) {
 }
 
 std::string subject_part(const RunRecord& record, const Calibration& calibration) {
-  const auto used = std::count_if(record.images.begin(), record.images.end(),
-                                  [](const auto& image) { return image.refused.empty(); });
   const auto& [width_px, height_px] = calibration.camera.imager_px;
   return html_table({"",
                      {},
@@ -67,7 +65,8 @@ std::string subject_part(const RunRecord& record, const Calibration& calibration
                        "dispersion at one place; check at known points"},
                       {"program", record.program},
                       {"libraries", record.libraries},
-                      {"images", fmt::format("{} taken, {} used", record.images.size(), used)}}});
+                      {"images", fmt::format("{} taken, {} used", record.images.size(),
+                                             record.count_used_images())}}});
 }
 
 /// Describes the inputs that the uncertainty includes, and those that are assumed exact.

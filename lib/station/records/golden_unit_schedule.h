@@ -9,6 +9,15 @@
 
 namespace vlp {
 
+/// Computes the SHA-256 of the parsed configuration that affects measurements and verdicts.
+///
+///   included  camera type, board, lamp map, position, completion and rejection limits, gates with
+///             guard bands, golden unit
+///   excluded  name of the station, `verify_due`, serials, folders, records, spool, hook, retention
+///
+/// Format, comments, order and names of files do not change it.
+std::string measuring_digest(const StationConfig& config);
+
 /// Time at which golden_problem() is called.
 enum class GoldenCheckTime { first_image, verdict };
 

@@ -25,6 +25,12 @@ const char* calibration_name(const RunRecord& record);
 /// Skips missing files. Returns true if it renamed any. Throws InputError.
 bool mark_files_voided(const RunRecord& record, const std::filesystem::path& results);
 
+/// Returns the report of a run (report.html): verdict and causes, gates, other metrics, the
+/// calibration with its history, the plots of its steps, and the rejected images. `calibration` is
+/// the file with the record's calibration; empty if there is none. Throws InputError.
+std::string make_unit_report(const RunRecord& record, const std::filesystem::path& calibration,
+                             const std::vector<ReportPlot>& pictures);
+
 /// Treatment of an existing report. A run that is published again keeps its report with its plots.
 /// `replace` writes the record's report instead and keeps the old one as replaced-report.html.
 enum class ExistingReport { keep, replace };

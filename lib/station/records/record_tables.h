@@ -4,6 +4,11 @@
 
 #include <soci/soci.h>
 
+#include <optional>
+#include <string>
+
+#include "station/records/run_record.h"
+
 namespace vlp {
 
 /// Current version of the tables, the number of migrations plus one, stored in vlp_schema.
@@ -22,5 +27,12 @@ inline constexpr int kTableLockId = 0x766c70;
 /// earlier version. Runs in one transaction and in one program at a time. Throws soci::soci_error,
 /// and std::runtime_error for tables of a later version.
 void make_record_tables(soci::session& sql);
+
+/// Loads the texts of a run (run_fields()) from tables of the current version; std::nullopt if no
+/// run has this id. Throws soci::soci_error.
+std::optional<RunRecord> load_run_header(soci::session& sql, const std::string& run);
+/// Loads a run with its metrics, images and events, with the names of metrics as they were stored;
+/// std::nullopt if no run has this id.
+std::optional<RunRecord> load_run(soci::session& sql, const std::string& run);
 
 }  // namespace vlp

@@ -25,7 +25,6 @@
 #include "rig/renamed.h"
 #include "station/database_name.h"
 #include "station/records/record_tables.h"
-#include "station/records/run_storage.h"
 
 namespace vlp {
 namespace {
@@ -265,10 +264,10 @@ void insert_images(soci::session& sql, const RunRecord& record, ConnectionWatchd
   }
 }
 
-/// Stores the new events. Returns their contents for the trail.
-std::vector<TrailContent> insert_events(soci::session& sql, const RunRecord& record,
-                                        ConnectionWatchdog& watch) {
-  std::vector<TrailContent> added;
+/// Stores the new events, and returns them.
+std::vector<RunEvent> insert_events(soci::session& sql, const RunRecord& record,
+                                    ConnectionWatchdog& watch) {
+  std::vector<RunEvent> added;
   for (const RunEvent& event : record.events) {
     soci::statement insert =
         (sql.prepare << "INSERT INTO events (event, run, what, text, who) VALUES (:event, :run, "
@@ -276,7 +275,7 @@ std::vector<TrailContent> insert_events(soci::session& sql, const RunRecord& rec
          soci::use(event.event), soci::use(record.run), soci::use(event.what),
          soci::use(event.text), soci::use(event.who));
     insert.execute(true);
-    if (insert.get_affected_rows() > 0) added.push_back(make_event_content(record.run, event));
+    if (insert.get_affected_rows() > 0) added.push_back(event);
     watch.on_progress();
   }
   return added;
@@ -387,18 +386,17 @@ void Records::keep(const RunRecord& record) {
     insert.define_and_bind();
     insert.execute(true);
     watch.on_progress();
-    std::vector<TrailContent> added;
-    if (insert.get_affected_rows() > 0) {
+    const bool is_new = insert.get_affected_rows() > 0;
+    if (is_new) {
       insert_metrics(sql, record, watch);
       insert_images(sql, record, watch);
-      added.push_back(make_run_digest_entry(sql, record.run));
     } else if (const auto kept = load_run_header(sql, record.run);
                !kept || !same_texts(*kept, record)) {
       throw InputError(database_->name, "has another run " + record.run);
     }
-    for (TrailContent& event : insert_events(sql, record, watch)) added.push_back(std::move(event));
+    const auto new_events = insert_events(sql, record, watch);
     // Last, because all stations that share the records wait for it.
-    append_to_trail(sql, added);
+    append_to_trail(sql, record.run, is_new, new_events);
     transaction.commit();
   });
 }

@@ -16,7 +16,6 @@
 #include "session/row_time_check.h"
 #include "session/step_history.h"
 #include "station/records/run_record.h"
-#include "station/unit/station_step.h"
 #include "station/unit/unit_step.h"
 
 namespace vlp {

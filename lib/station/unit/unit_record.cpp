@@ -4,14 +4,231 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
+#include <array>
+#include <iterator>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "captures/digest.h"
 #include "rig/calibration_text.h"
-#include "station/unit/unit_causes.h"
+#include "session/row_time_check.h"
+#include "session/session_folder.h"
+#include "station/unit/guidance.h"
+#include "station/unit/lamp_faults.h"
+#include "station/unit/lens_fault.h"
 
 namespace vlp {
+namespace {
+
+/// Steps whose images show lamps, in their order.
+constexpr std::array kLampSteps{StationStep::rotation, StationStep::dispersion, StationStep::check};
+
+void append(std::vector<Cause>& causes, std::vector<Cause> more) {
+  std::move(more.begin(), more.end(), std::back_inserter(causes));
+}
+
+bool is_solved(const UnitStep& state) { return state.result && state.result->ok(); }
+
+/// Rejected images of an unfinished step.
+struct RejectionSummary {
+  /// "12 of 36 images refused: 10 blurred, 2 too dark"; empty if most are used.
+  std::string text = {};
+  /// True if most are blurred, and too many for a shaky hand to be the reason.
+  bool are_blurred = false;
+};
+
+/// Returns the minimum number of images for a fault of the camera; fewer can be accidental.
+int min_images_to_blame(const StationConfig& config) {
+  return std::min(config.max_consecutive_rejections, (config.sufficient.board_views + 1) / 2);
+}
+
+RejectionSummary summarize_refusals(const UnitStep& state, const StationConfig& config) {
+  std::vector<Observation> rejected;
+  for (const auto& [name, image] : state.images) {
+    if (image.is_used() || image.seen.rejection->reason == RejectionReason::not_needed) continue;
+    rejected.push_back({image.seen.file});
+    rejected.back().rejection = image.seen.rejection;
+  }
+  if (rejected.empty() || std::cmp_less(rejected.size(), state.used())) return {};
+  const auto blurred = std::count_if(
+      rejected.begin(), rejected.end(),
+      [](const Observation& image) { return image.rejection->reason == RejectionReason::blurred; });
+  return {fmt::format("{} of {} images refused: {}", rejected.size(), state.images.size(),
+                      summarize_rejections(rejected)),
+          2 * blurred > std::ssize(rejected) && blurred >= min_images_to_blame(config)};
+}
+
+/// Returns the reasons why a step did not finish.
+std::vector<Cause> find_problems(const Unit& unit, StationStep step) {
+  const UnitStep& state = unit.step(step);
+  if (state.done()) return {};
+  std::vector<Cause> causes;
+  const std::string count = format_count(unit, step);
+  const RejectionSummary refused = summarize_refusals(state, unit.config());
+  if (!refused.text.empty()) {
+    causes.push_back(
+        {fmt::format("{} ({}): {}", to_string(step), count, refused.text), refused.are_blurred});
+  }
+  const bool failed = state.result && !state.result->ok() && state.used() > 0;
+  if (failed) causes.push_back({fmt::format("{}: {}", to_string(step), state.result->why)});
+  const bool is_explained = failed || !refused.text.empty();
+  if (state.sufficient || (is_explained && unit.ended().empty())) return causes;
+  causes.push_back(
+      {unit.ended().empty()
+           ? fmt::format("{}: not enough images, or too much alike ({})", to_string(step), count)
+           : fmt::format("{}: {} before there was enough ({})", to_string(step), unit.ended(),
+                         count)});
+  return causes;
+}
+
+/// Returns the failed gates of a step, those of the station before those of the camera.
+std::vector<Cause> find_missed_gates(const UnitStep& state,
+                                     const std::vector<CheckedMetric>& metrics) {
+  std::vector<Cause> causes;
+  if (!is_solved(state)) return causes;
+  for (const bool of_camera : {false, true}) {
+    for (const CheckedMetric& metric : metrics) {
+      const bool missed = find_metric_value(state.result->metrics, metric.name) && !metric.passed();
+      if (missed && metric_kind(metric.name)->of_camera == of_camera) {
+        causes.push_back({describe_failure(metric), of_camera});
+      }
+    }
+  }
+  return causes;
+}
+
+std::vector<Cause> find_step_causes(const Unit& unit, StationStep step,
+                                    const std::vector<CheckedMetric>& metrics) {
+  std::vector<Cause> causes = find_problems(unit, step);
+  append(causes, find_missed_gates(unit.step(step), metrics));
+  return causes;
+}
+
+/// Returns true if most of the board images show another board.
+bool is_other_board(const UnitStep& boards) {
+  const auto other = std::count_if(boards.images.begin(), boards.images.end(), [](const auto& i) {
+    return i.second.seen.board && !i.second.seen.board->seen.foreign.empty();
+  });
+  return 2 * other > static_cast<std::ptrdiff_t>(boards.images.size());
+}
+
+/// Returns true if there are enough views to distinguish blur from a shaky hand.
+bool is_blur_known(const UnitStep& boards, const StationConfig& config) {
+  return boards.sufficient ||
+         std::count_if(boards.images.begin(), boards.images.end(), [](const auto& image) {
+           return image.second.seen.blur_px.has_value();
+         }) >= min_images_to_blame(config);
+}
+
+/// Returns the causes visible in the board images: another board, blur, and faults of the lens.
+std::vector<Cause> find_board_causes(const Unit& unit, const std::vector<CheckedMetric>& metrics) {
+  std::vector<Cause> causes;
+  const UnitStep& boards = unit.step(StationStep::boards);
+  if (is_other_board(boards)) causes.push_back({"wrong board: the tags have other ids"});
+  for (const CheckedMetric& metric : metrics) {
+    const bool blur = metric.name == "blur_px" && metric.value && !metric.passed();
+    if (blur && is_blur_known(boards, unit.config()))
+      causes.push_back({describe_failure(metric), true});
+  }
+  append(causes, find_step_causes(unit, StationStep::boards, metrics));
+  return causes;
+}
+
+/// Returns the causes of the steps with lamps whose previous step is solved.
+std::vector<Cause> find_lamp_step_causes(const Unit& unit,
+                                         const std::vector<CheckedMetric>& metrics) {
+  std::vector<Cause> causes;
+  StationStep before = StationStep::boards;
+  for (const StationStep step : kLampSteps) {
+    if (!is_solved(unit.step(std::exchange(before, step)))) break;
+    append(causes, find_step_causes(unit, step, metrics));
+  }
+  return causes;
+}
+
+/// Returns the failed gates of row_time_metrics(), which refer to all steps together.
+std::vector<Cause> find_missed_row_time_gates(const std::vector<CheckedMetric>& metrics) {
+  std::vector<Cause> causes;
+  for (const CheckedMetric& metric : metrics) {
+    const bool is_row_time = metric.name.starts_with("row_time_");
+    if (is_row_time && metric.value && !metric.passed())
+      causes.push_back({describe_failure(metric)});
+  }
+  return causes;
+}
+
+/// Returns the gates without a value of a unit whose steps are all completed.
+std::vector<Cause> find_missing_metrics(const Unit& unit,
+                                        const std::vector<CheckedMetric>& metrics) {
+  std::vector<Cause> causes;
+  if (unit.current()) return causes;
+  for (const CheckedMetric& metric : metrics) {
+    if (!metric.value) causes.push_back({describe_failure(metric)});
+  }
+  return causes;
+}
+
+/// Returns faults of the known points, of the images of the check, or of the camera in the check.
+std::vector<Cause> find_check_faults(const Unit& unit, const Calibration& calibration) {
+  const UnitStep& check = unit.step(StationStep::check);
+  if (!is_solved(check)) return {};
+  const LampMap& lamps = unit.config().lamps;
+  const PlacedCaptures captures{collect_frames(check), read_captures_with_truth(check.folder)};
+  // A common offset is no fault of single captures; one that rotates is a fault of the camera.
+  const auto offset = find_common_offset(captures.frames, lamps, calibration, captures.places);
+  if (offset && !offset->in_camera) return {{describe(*offset)}};
+  if (!offset) {
+    std::string fault = describe_place_fault(captures.frames, lamps, calibration, captures.places);
+    if (!fault.empty()) return {{std::move(fault)}};
+  }
+  const UnitStep& dispersion = unit.step(StationStep::dispersion);
+  const PlacedCaptures reference{collect_frames(dispersion),
+                                 read_captures_with_truth(dispersion.folder)};
+  std::string other = find_other_focal_length(captures, reference, lamps, calibration);
+  // Without an offset, residuals can be caused by a lens that is inaccurate near the corners.
+  if (other.empty() && offset) {
+    other = find_other_lens(captures.frames, reference.frames, lamps, calibration);
+  }
+  if (!other.empty()) {
+    return {{"the images of check are of another camera: " + other + "; take them with this unit"}};
+  }
+  if (offset) return {{describe(*offset), true}};
+  return {};
+}
+
+/// Returns faults of the lamps and of the lens, from the captures of all steps. Without these,
+/// returns faults of the known points or of the camera in the check.
+std::vector<Cause> find_station_faults(const Unit& unit) {
+  const auto known = unit.calibration();
+  if (!known) return {};
+  // Tested first, because a wrong row time confuses or removes lamps.
+  const Lens lens(known->camera.lens_model, known->camera.intrinsics);
+  std::string row_time = find_row_time_error(lamp_observations(unit), unit.config().lamps, lens,
+                                             stated_row_time(unit.config()));
+  if (!row_time.empty()) return {{std::move(row_time)}};
+  std::vector<Frame> frames;
+  for (const StationStep step : kLampSteps) {
+    for (Frame& frame : collect_frames(unit.step(step))) frames.push_back(std::move(frame));
+  }
+  auto faults = describe_lamp_faults(frames, unit.config().lamps, *known);
+  auto unseen = describe_missing_lamps(frames, unit.config().lamps);
+  std::move(unseen.begin(), unseen.end(), std::back_inserter(faults));
+  if (!faults.empty()) {
+    std::vector<Cause> causes;
+    causes.reserve(faults.size());
+    for (std::string& fault : faults) causes.push_back({std::move(fault)});
+    return causes;
+  }
+  if (std::string fault = describe_lens_fault(frames, unit.config().lamps, *known);
+      !fault.empty()) {
+    return {{std::move(fault)}};
+  }
+  return find_check_faults(unit, *known);
+}
+
+}  // namespace
 
 RunRecord make_unit_record(const Unit& unit, const std::string& run,
                            const ProgramVersion& program) {
@@ -51,6 +268,25 @@ void reject_reused_images(RunRecord& record, const std::string& earlier,
       "all images are those of run {}, which is no repetition: take new ones, or '{}' if that run "
       "should not count\n{}",
       earlier, format_void_command(earlier, station_file), record.causes);
+}
+
+std::vector<Cause> find_causes(const Unit& unit) {
+  const std::vector<CheckedMetric> metrics = unit.metrics();
+  const std::vector<Cause> board_causes = find_board_causes(unit, metrics);
+  std::vector<Cause> lamp_causes = find_lamp_step_causes(unit, metrics);
+  append(lamp_causes, find_missing_metrics(unit, metrics));
+
+  std::vector<Cause> causes;
+  if (!unit.invalid_reason().empty()) causes.push_back({unit.invalid_reason()});
+  append(causes, board_causes);  // before faults of the lamps: the lens was measured without them
+  if (std::string error = unit.row_time().error; !error.empty()) {
+    causes.push_back({std::move(error)});
+  } else if (!board_causes.empty() || !lamp_causes.empty()) {
+    append(causes, find_station_faults(unit));
+  }
+  append(causes, std::move(lamp_causes));
+  append(causes, find_missed_row_time_gates(metrics));
+  return causes;
 }
 
 }  // namespace vlp

@@ -4,9 +4,11 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "station/records/run_record.h"
 #include "station/unit/unit.h"
+#include "station/verdict.h"
 
 namespace vlp {
 
@@ -17,5 +19,10 @@ RunRecord make_unit_record(const Unit& unit, const std::string& run, const Progr
 /// of its images: it would count twice. The caller has compared the images.
 void reject_reused_images(RunRecord& record, const std::string& earlier,
                           const std::filesystem::path& station_file);
+
+/// Returns the reasons why a unit does not pass, the most important one first; empty if it passes.
+/// Faults of the station and of the operator precede results that depend on them. The camera
+/// therefore fails by decide_verdict() only for its own errors.
+std::vector<Cause> find_causes(const Unit& unit);
 
 }  // namespace vlp

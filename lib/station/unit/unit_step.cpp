@@ -5,9 +5,24 @@
 #include <algorithm>
 #include <utility>
 
+#include "captures/digest.h"
 #include "geometry/median.h"
+#include "rig/input_error.h"
 
 namespace vlp {
+UnitImage observe_unit_image(const std::filesystem::path& file,
+                             const std::function<Observation(const SourceImage&)>& observe) {
+  UnitImage image;
+  try {
+    image.sha256 = sha256_of_file(file);
+    image.seen = observe(SourceImage(file));
+  } catch (const InputError&) {
+    image.seen = {file};
+    image.seen.reject(RejectionReason::unreadable, "cannot be read as an image");
+  }
+  return image;
+}
+
 int UnitStep::used() const {
   return static_cast<int>(std::count_if(images.begin(), images.end(),
                                         [](const auto& image) { return image.second.is_used(); }));
@@ -53,6 +68,17 @@ std::optional<double> typical_blur_px(const UnitStep& boards) {
   }
   if (blurs_px.empty()) return std::nullopt;
   return upper_median(std::move(blurs_px));
+}
+
+StepPlot render_async(std::function<Drawing()> drawing) {
+  const auto draw = [drawing = std::move(drawing)]() -> std::optional<ReportPlot> {
+    try {
+      return make_report_plot(drawing());
+    } catch (const InputError&) {  // no gnuplot: a report without it is better than none
+      return std::nullopt;
+    }
+  };
+  return std::async(std::launch::async, draw).share();
 }
 
 }  // namespace vlp

@@ -2,8 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
+#include <cstddef>
 #include <filesystem>
+#include <functional>
+#include <future>
 #include <map>
 #include <optional>
 #include <string>
@@ -11,11 +15,50 @@
 
 #include "calibration/intrinsics/image_coverage.h"
 #include "captures/detections_table.h"
+#include "frontend/observation.h"
+#include "report/report_picture.h"
 #include "session/step_result.h"
-#include "station/unit/step_picture.h"
-#include "station/unit/unit_image.h"
 
 namespace vlp {
+
+/// Steps of a station, in this order. Each has a folder of its name.
+enum class StationStep { boards, rotation, dispersion, check };
+
+inline constexpr std::array kStationSteps{StationStep::boards, StationStep::rotation,
+                                          StationStep::dispersion, StationStep::check};
+
+constexpr const char* to_string(StationStep step) {
+  constexpr std::array names{"boards", "rotation", "dispersion", "check"};
+  return names[static_cast<std::size_t>(step)];
+}
+
+/// Plot for the unit's report, rendered asynchronously; std::nullopt if it could not be rendered.
+using StepPlot = std::shared_future<std::optional<ReportPlot>>;
+
+/// Makes and renders a drawing on its own thread, while the unit continues, because gnuplot would
+/// delay the verdict. Destroying the last copy of the result waits for the thread.
+StepPlot render_async(std::function<Drawing()> drawing);
+
+/// Image of a unit, with its observation.
+struct UnitImage {
+  Observation seen;
+  std::string sha256;
+  /// The file no longer exists: a frame of a camera or a video that was rejected.
+  bool discarded = false;
+  /// Rotation level_from_camera with which the lamps were detected; zero for the calibrated one.
+  Eigen::Matrix3d level = Eigen::Matrix3d::Zero();
+
+  bool is_used() const { return seen.is_kept(); }
+  /// Returns true for an image without a fault that is redundant because of others.
+  bool is_redundant() const { return !is_used() && vlp::is_redundant(seen.rejection->reason); }
+  /// Reason for the rejection, in one line; empty if the image is used.
+  std::string refusal() const { return is_used() ? "" : seen.rejection->message; }
+};
+
+/// Observes an image file by `observe`, the intake of a step. A file that cannot be read is
+/// rejected.
+UnitImage observe_unit_image(const std::filesystem::path& file,
+                             const std::function<Observation(const SourceImage&)>& observe);
 
 /// State of one step of a unit.
 struct UnitStep {

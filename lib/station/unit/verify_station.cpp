@@ -17,9 +17,7 @@
 #include "session/row_time_check.h"
 #include "session/session_folder.h"
 #include "station/unit/lamp_faults.h"
-#include "station/unit/station_step.h"
 #include "station/unit/station_steps.h"
-#include "station/unit/step_picture.h"
 #include "station/unit/unit_step.h"
 
 namespace vlp {

@@ -4,9 +4,8 @@
 
 #include <gmock/gmock.h>
 
-#include "station/records/unit_report.h"
+#include "station/records/publish_run.h"
 #include "station/unit/station_screen.h"
-#include "station/unit/unit_causes.h"
 #include "station/unit/unit_record.h"
 #include "support/temporary_folder.h"
 
