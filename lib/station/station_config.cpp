@@ -3,7 +3,6 @@
 #include "station/station_config.h"
 
 #include <algorithm>
-#include <cctype>
 #include <iterator>
 #include <regex>
 #include <stdexcept>
@@ -253,11 +252,7 @@ std::string read_records(const YamlValue& value, const fs::path& file) {
 }  // namespace
 
 std::string camera_id_problem(const std::string& camera_id) {
-  const bool plain = std::all_of(camera_id.begin(), camera_id.end(), [](unsigned char c) {
-    return std::isalnum(c) != 0 || c == '-' || c == '_' || c == '.';
-  });
-  constexpr std::size_t longest = 64;
-  if (plain && !camera_id.empty() && camera_id.size() <= longest && camera_id[0] != '.') return "";
+  if (std::regex_match(camera_id, std::regex("[A-Za-z0-9_-][A-Za-z0-9_.-]{0,63}"))) return "";
   return "a camera's id has letters, digits, '-', '_' and '.', up to 64, no '.' first";
 }
 

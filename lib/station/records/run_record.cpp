@@ -16,8 +16,9 @@
 #include <opencv2/core/utility.hpp>
 #include <optional>
 #include <random>
+#include <regex>
 #include <set>
-#include <string_view>
+#include <utility>
 
 #include "calibration/intrinsics/mrcal_files.h"
 #include "captures/printable.h"
@@ -58,10 +59,18 @@ std::string describe_account() {
 
 }  // namespace
 
-void RunRecord::set_verdict(const std::vector<Cause>& why) {
+void RunRecord::set_verdict(std::vector<Cause> why) {
+  if (std::string problem = clock_problem(*this); !problem.empty()) {
+    why.insert(why.begin(), {std::move(problem), false});
+  }
   verdict = to_string(decide_verdict(why));
   causes.clear();
   for (const Cause& cause : why) causes.append(cause.text).append("\n");
+}
+
+void RunRecord::invalidate(const std::string& why) {
+  verdict = to_string(Verdict::invalid);
+  causes = why + "\n" + causes;
 }
 
 std::ptrdiff_t RunRecord::count_used_images() const {
@@ -121,12 +130,7 @@ std::string make_run_id() {
 }
 
 bool is_run_id(const std::string& text) {
-  constexpr std::string_view form = "00000000T000000Z-xxxxxxxxxxxxxxxx";
-  return std::ranges::equal(text, form, [](char c, char kind) {
-    const bool is_digit = c >= '0' && c <= '9';
-    if (kind == '0') return is_digit;
-    return kind == 'x' ? is_digit || (c >= 'a' && c <= 'f') : c == kind;
-  });
+  return std::regex_match(text, std::regex("[0-9]{8}T[0-9]{6}Z-[0-9a-f]{16}"));
 }
 
 std::string begun_utc(const std::string& run) {

@@ -75,8 +75,11 @@ struct RunRecord {
   bool invalid() const { return verdict == to_string(Verdict::invalid); }
   /// Returns the first cause, in one line; empty if the run passed.
   std::string first_cause() const { return causes.substr(0, causes.find('\n')); }
-  /// Sets verdict and causes from `why`, the most important cause first.
-  void set_verdict(const std::vector<Cause>& why);
+  /// Sets verdict and causes from `why`, the most important cause first. A wrong clock
+  /// (clock_problem()) precedes all.
+  void set_verdict(std::vector<Cause> why);
+  /// Makes the run INVALID for another reason, which precedes the others.
+  void invalidate(const std::string& why);
 };
 
 /// Run that used an image; empty if none did.

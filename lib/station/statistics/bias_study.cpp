@@ -120,14 +120,15 @@ void draw_bias(const std::filesystem::path& picture, const std::string& title,
   for (const auto& [unit, reference, value] : values) {
     data += format_data_row({reference, value - reference});
   }
-  for (const UnitBias& unit : study.units)
+  for (const UnitBias& unit : study.units) {
     means += format_data_row({unit.reference, unit.bias.value});
-  std::string commands = data_block("data", data) + data_block("means", means) + plot_settings() +
-                         "set xlabel 'reference'\nset ylabel " +
-                         gnuplot_quoted(title + ", measured - reference") +
-                         " noenhanced\nset offsets graph 0.05, graph 0.05, graph 0.1, graph 0.1\n";
-  const auto colored = [](const char* color) { return std::string(" linecolor rgb '") + color; };
-  std::string plotted;
+  }
+  using namespace plot_colors;
+  std::string commands = fmt::format(
+      "{}{}{}set xlabel 'reference'\nset ylabel {} noenhanced\n"
+      "set offsets graph 0.05, graph 0.05, graph 0.1, graph 0.1\n",
+      data_block("data", data), data_block("means", means), plot_settings(),
+      gnuplot_quoted(title + ", measured - reference"));
   if (study.linearity) {
     const double first = study.units.front().reference, last = study.units.back().reference;
     constexpr int parts = 50;
@@ -137,17 +138,19 @@ void draw_bias(const std::filesystem::path& picture, const std::string& title,
       line += format_data_row({at, bias, bias - band, bias + band});
     }
     commands += data_block("line", line);
-    plotted = ", $line using 1:2 with lines" + colored(plot_colors::green) +
-              "' title 'line', $line using 1:3 with lines dashtype 2" +
-              colored(plot_colors::vermilion) +
-              "' title '95 % band', $line using 1:4 with lines dashtype 2" +
-              colored(plot_colors::vermilion) + "' notitle";
   }
-  commands += "plot 0 with lines dashtype 3" + colored(plot_colors::purple) +
-              "' title 'no bias', $data using 1:2 with points pointtype 6" +
-              colored(plot_colors::blue) +
-              "' title 'runs', $means using 1:2 with points pointtype 7 pointsize 1.5" +
-              colored(plot_colors::blue) + "' title 'means'" + plotted;
+  commands += fmt::format(
+      "plot 0 with lines dashtype 3 linecolor rgb '{}' title 'no bias', "
+      "$data using 1:2 with points pointtype 6 linecolor rgb '{}' title 'runs', "
+      "$means using 1:2 with points pointtype 7 pointsize 1.5 linecolor rgb '{}' title 'means'",
+      purple, blue, blue);
+  if (study.linearity) {
+    commands += fmt::format(
+        ", $line using 1:2 with lines linecolor rgb '{}' title 'line', "
+        "$line using 1:3 with lines dashtype 2 linecolor rgb '{}' title '95 % band', "
+        "$line using 1:4 with lines dashtype 2 linecolor rgb '{}' notitle",
+        green, vermilion, vermilion);
+  }
   draw(picture, {"bias", 1000, 480, commands + "\n"});
 }
 

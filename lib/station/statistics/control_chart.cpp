@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "station/statistics/control_chart.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -175,31 +177,29 @@ void draw_trend(const std::filesystem::path& picture, const std::string& title,
     data += row;
     if (alarm[i]) alarm_points += row;
   }
-  const auto horizontal_line = [](double value, const std::string& line_style) {
-    return significant(value, 9) + " with lines " + line_style;
-  };
-  const std::string limits = std::string("dashtype 2 linecolor rgb '") + plot_colors::vermilion;
+  using namespace plot_colors;
+  const auto number = [](double value) { return significant(value, 9); };
   std::string commands = data_block("data", data) + plot_settings();
   if (!alarm_points.empty()) commands += data_block("marked", alarm_points);
-  commands += "set xlabel 'runs, in the order of their end'\nset ylabel " + gnuplot_quoted(title) +
-              " noenhanced\nset xrange " + plot_range(0.5, double(points.size()) + 0.5) +
-              "\nset offsets 0, 0, graph 0.1, graph 0.1\nplot " +
-              horizontal_line(chart.upper, limits + "' title 'limits'") + ", " +
-              horizontal_line(chart.lower, limits + "' notitle") + ", " +
-              horizontal_line(chart.mean, std::string("linecolor rgb '") + plot_colors::green +
-                                              "' title 'mean'") +
-              ", $data using 1:2 with linespoints pointtype 7 linecolor rgb '" + plot_colors::blue +
-              "' title 'runs'";
+  commands += fmt::format(
+      "set xlabel 'runs, in the order of their end'\nset ylabel {} noenhanced\nset xrange {}\n"
+      "set offsets 0, 0, graph 0.1, graph 0.1\n"
+      "plot {} with lines dashtype 2 linecolor rgb '{}' title 'limits', "
+      "{} with lines dashtype 2 linecolor rgb '{}' notitle, "
+      "{} with lines linecolor rgb '{}' title 'mean', "
+      "$data using 1:2 with linespoints pointtype 7 linecolor rgb '{}' title 'runs'",
+      gnuplot_quoted(title), plot_range(0.5, double(points.size()) + 0.5), number(chart.upper),
+      vermilion, number(chart.lower), vermilion, number(chart.mean), green, blue);
   if (gate) {
     commands +=
-        ", " + horizontal_line(*gate, std::string("dashtype 3 linewidth 2 linecolor rgb '") +
-                                          plot_colors::purple + "' title 'gate'");
+        fmt::format(", {} with lines dashtype 3 linewidth 2 linecolor rgb '{}' title 'gate'",
+                    number(*gate), purple);
   }
   if (!alarm_points.empty()) {
-    commands += std::string(
-                    ", $marked using 1:2 with points pointtype 4 pointsize 2 linewidth 2 "
-                    "linecolor rgb '") +
-                plot_colors::vermilion + "' title 'alarms'";
+    commands += fmt::format(
+        ", $marked using 1:2 with points pointtype 4 pointsize 2 linewidth 2 linecolor rgb '{}' "
+        "title 'alarms'",
+        vermilion);
   }
   draw(picture, {"trend", 1000, 480, commands + "\n"});
 }

@@ -17,7 +17,7 @@
 #include "session/lens_step.h"
 #include "session/locate_step.h"
 #include "session/rotation_step.h"
-#include "station/unit/lamp_faults.h"
+#include "station/unit/station_faults.h"
 
 namespace vlp {
 namespace {

@@ -12,7 +12,7 @@
 #include "frontend/images_in_parallel.h"
 #include "rig/input_error.h"
 #include "session/session_folder.h"
-#include "station/unit/lamp_faults.h"
+#include "station/unit/station_faults.h"
 #include "station/unit/station_steps.h"
 #include "station/unit/turn_map.h"
 

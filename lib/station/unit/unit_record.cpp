@@ -16,8 +16,7 @@
 #include "session/row_time_check.h"
 #include "session/session_folder.h"
 #include "station/unit/guidance.h"
-#include "station/unit/lamp_faults.h"
-#include "station/unit/lens_fault.h"
+#include "station/unit/station_faults.h"
 
 namespace vlp {
 namespace {
@@ -237,11 +236,7 @@ RunRecord make_unit_record(const Unit& unit, const std::string& run,
     record.calibration = calibration_text(*calibration);
   }
   record.metrics = unit.metrics();
-  std::vector<Cause> causes = find_causes(unit);
-  if (std::string problem = clock_problem(record); !problem.empty()) {
-    causes.insert(causes.begin(), {std::move(problem), false});
-  }
-  record.set_verdict(causes);
+  record.set_verdict(find_causes(unit));
   for (const StationStep step : kStationSteps) {
     for (const auto& [name, image] : unit.step(step).images) {
       std::string refused = image.refusal();
@@ -263,11 +258,10 @@ RunRecord make_unit_record(const Unit& unit, const std::string& run,
 
 void reject_reused_images(RunRecord& record, const std::string& earlier,
                           const std::filesystem::path& station_file) {
-  record.verdict = to_string(Verdict::invalid);
-  record.causes = fmt::format(
+  record.invalidate(fmt::format(
       "all images are those of run {}, which is no repetition: take new ones, or '{}' if that run "
-      "should not count\n{}",
-      earlier, format_void_command(earlier, station_file), record.causes);
+      "should not count",
+      earlier, format_void_command(earlier, station_file)));
 }
 
 std::vector<Cause> find_causes(const Unit& unit) {

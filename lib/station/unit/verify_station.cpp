@@ -16,7 +16,7 @@
 #include "rig/input_error.h"
 #include "session/row_time_check.h"
 #include "session/session_folder.h"
-#include "station/unit/lamp_faults.h"
+#include "station/unit/station_faults.h"
 #include "station/unit/station_steps.h"
 #include "station/unit/unit_step.h"
 
@@ -88,40 +88,16 @@ class Verification {
     const GivenRowTime stated{*config_.type.row_time_s, "the calibration of the golden unit"};
     const RowTimeCheck row_time = check_row_time(lamp_images_, config_.lamps, stated);
     for (const Metric& metric : row_time_metrics(row_time)) values_.push_back(metric);
-    const auto metrics = check_all(golden_.gates, values_, unit_metrics());
-    for (const CheckedMetric& metric : metrics) {
+    RunRecord record = make_record("golden", config_, golden_.camera_id, run, program);
+    record.metrics = check_all(golden_.gates, values_, unit_metrics());
+    record.images = images_;
+    for (const CheckedMetric& metric : record.metrics) {
       // The station is under test, and fails by its metrics.
       if (!metric.passed()) causes_.push_back({describe_failure(metric), metric.value.has_value()});
     }
-    // Independent of the gates: this camera is known.
-    constexpr double min_offset_px = 0.6;
-    auto faults = describe_lamp_faults(frames_, config_.lamps, golden_.calibration, min_offset_px);
-    if (!causes_.empty()) {
-      // If all gates pass, they decide whether all lamps must be detected.
-      auto unseen = describe_missing_lamps(frames_, config_.lamps);
-      std::move(unseen.begin(), unseen.end(), std::back_inserter(faults));
-    }
-    std::vector<Cause> first;
-    first.reserve(faults.size() + 2);
-    for (const std::string& fault : faults) first.push_back({fault, true});
-    const bool is_offset = common_offset_ && !causes_.empty();
-    if (first.empty() && is_offset) first.push_back({describe(*common_offset_), true});
-    if (first.empty() && !place_fault_.empty()) first.push_back({place_fault_, false});
-    std::string row_time_error = row_time.error;
-    if (row_time_error.empty() && !causes_.empty()) {
-      const Camera& camera = golden_.calibration.camera;
-      row_time_error = find_row_time_error(lamp_images_, config_.lamps,
-                                           Lens(camera.lens_model, camera.intrinsics), stated);
-    }
-    if (!row_time_error.empty()) first.insert(first.begin(), {row_time_error, false});
-    causes_.insert(causes_.begin(), first.begin(), first.end());
-    RunRecord record = make_record("golden", config_, golden_.camera_id, run, program);
-    record.metrics = metrics;
-    record.images = images_;
-    if (std::string problem = clock_problem(record); !problem.empty()) {
-      causes_.insert(causes_.begin(), {std::move(problem), false});
-    }
-    record.set_verdict(causes_);
+    std::vector<Cause> causes = find_station_causes(row_time, stated);
+    causes.insert(causes.end(), causes_.begin(), causes_.end());
+    record.set_verdict(std::move(causes));
     return record;
   }
 
@@ -134,6 +110,33 @@ class Verification {
   }
 
  private:
+  /// Returns the causes that precede the failed steps and gates.
+  std::vector<Cause> find_station_causes(const RowTimeCheck& row_time, const GivenRowTime& stated) {
+    std::string row_time_error = row_time.error;
+    if (row_time_error.empty() && !causes_.empty()) {
+      const Camera& camera = golden_.calibration.camera;
+      row_time_error = find_row_time_error(lamp_images_, config_.lamps,
+                                           Lens(camera.lens_model, camera.intrinsics), stated);
+    }
+    // Independent of the gates: this camera is known.
+    constexpr double min_offset_px = 0.6;
+    auto faults = describe_lamp_faults(frames_, config_.lamps, golden_.calibration, min_offset_px);
+    if (!causes_.empty()) {
+      // If all gates pass, they decide whether all lamps must be detected.
+      std::ranges::move(describe_missing_lamps(frames_, config_.lamps), std::back_inserter(faults));
+    }
+    std::vector<Cause> causes;
+    if (!row_time_error.empty()) causes.push_back({row_time_error, false});
+    for (const std::string& fault : faults) causes.push_back({fault, true});
+    if (!faults.empty()) return causes;
+    if (common_offset_ && !causes_.empty()) {
+      causes.push_back({describe(*common_offset_), true});
+    } else if (!place_fault_.empty()) {
+      causes.push_back({place_fault_, false});
+    }
+    return causes;
+  }
+
   void add(const char* step, const StepResult& result) {
     if (!result.ok()) {
       const bool is_station_fault =
@@ -186,9 +189,8 @@ void reject_used_images(
     if (!image.refused.empty()) continue;
     const std::string run = find_golden_run(image.sha256);
     if (run.empty()) continue;
-    record.verdict = to_string(Verdict::invalid);
-    record.causes = fmt::format("image {}/{} was used in golden run {}: measure it anew\n{}",
-                                image.step, image.name, run, record.causes);
+    record.invalidate(fmt::format("image {}/{} was used in golden run {}: measure it anew",
+                                  image.step, image.name, run));
     return;
   }
 }

@@ -1,15 +1,18 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "station/unit/lens_fault.h"
+#include "station/unit/station_faults.h"
 
 #include <fmt/core.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "calibration/adjustment/adjustment.h"
+#include "calibration/map/map_errors.h"
 #include "geometry/median.h"
 #include "positioning/positioner.h"
 #include "rig/calibration_error.h"
@@ -17,6 +20,54 @@
 
 namespace vlp {
 namespace {
+
+/// Fewer captures determine no fault.
+constexpr std::size_t kMinFrames = 3;
+/// Fewer fixes at known points do not show what is typical of them.
+constexpr std::size_t kMinErrors = 5;
+/// Fix of a capture minus its known point.
+struct PlaceError {
+  std::string image;
+  Eigen::Vector2d horizontal_m;
+  double yaw_rad;
+  /// Index of the frame.
+  std::size_t frame;
+};
+
+/// Fix of a frame from three lamps or more.
+struct FrameFix {
+  /// Index of the frame.
+  std::size_t frame;
+  Fix fix;
+};
+
+std::vector<FrameFix> locate_by_three_lamps(std::span<const Frame> frames, const LampMap& map,
+                                            const Calibration& calibration) {
+  const Positioner positioner(map, calibration);
+  std::vector<FrameFix> located;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    Fix fix = positioner.locate(frames[i].detections);
+    if (fix.ok() && fix.lamps >= 3) located.push_back({i, std::move(fix)});
+  }
+  return located;
+}
+
+/// Returns the errors of fixes at known points, in the order of the frames.
+std::vector<PlaceError> place_errors(std::span<const Frame> frames, const LampMap& map,
+                                     const Calibration& calibration, const CapturesTable& places) {
+  std::vector<PlaceError> errors;
+  for (const auto& [i, fix] : locate_by_three_lamps(frames, map, calibration)) {
+    const auto entry = places.find(frames[i].image);
+    if (entry == places.end() || entry->second.place == PlaceOf::axis) continue;
+    const Capture& place = entry->second;
+    if (!place.x_m || !place.y_m) continue;
+    const auto& pose = fix.estimate.pose;
+    errors.push_back({frames[i].image,
+                      pose.position_m.head<2>() - Eigen::Vector2d(*place.x_m, *place.y_m),
+                      pose.yaw_rad, i});
+  }
+  return errors;
+}
 
 constexpr Eigen::Index kFocalAndCenter = 4;
 
@@ -56,13 +107,10 @@ struct HeightErrors {
 std::optional<HeightErrors> find_height_errors(const PlacedCaptures& captures, const LampMap& map,
                                                const Calibration& calibration) {
   constexpr std::size_t min_heights = 5;  // fewer make the median unreliable
-  const Positioner positioner(map, calibration);
   std::vector<double> errors_m, sds_m;
-  for (const Frame& frame : captures.frames) {
-    const auto place = captures.places.find(frame.image);
+  for (const auto& [i, fix] : locate_by_three_lamps(captures.frames, map, calibration)) {
+    const auto place = captures.places.find(captures.frames[i].image);
     if (place == captures.places.end() || !place->second.z_m) continue;
-    const Fix fix = positioner.locate(frame.detections);
-    if (!fix.ok() || fix.lamps < 3) continue;
     errors_m.push_back(fix.estimate.pose.position_m.z() - *place->second.z_m);
     sds_m.push_back(std::sqrt(fix.estimate.covariance(2, 2)));
   }
@@ -86,6 +134,93 @@ double max_corner_displacement_px(const Camera& a, const Camera& b) {
 }
 
 }  // namespace
+
+std::vector<std::string> describe_lamp_faults(std::span<const Frame> frames, const LampMap& map,
+                                              const Calibration& calibration,
+                                              double min_offset_px) {
+  std::vector<std::string> faults;
+  if (frames.size() < kMinFrames) return faults;
+  MapErrorOptions options;
+  options.min_offset_px = min_offset_px;
+  for (const MapError& error : find_map_errors(frames, map, calibration, options).errors) {
+    if (!error.lamps.empty() || error.kind == MapErrorKind::mirrored) {
+      faults.push_back(describe(error));
+    }
+  }
+  return faults;
+}
+
+std::vector<std::string> describe_missing_lamps(std::span<const Frame> frames, const LampMap& map) {
+  std::vector<std::string> faults;
+  if (frames.size() < kMinFrames) return faults;
+  for (const MapError& error : find_unseen_lamps(frames, map)) faults.push_back(describe(error));
+  return faults;
+}
+
+std::string describe_place_fault(std::span<const Frame> frames, const LampMap& map,
+                                 const Calibration& calibration, const CapturesTable& places) {
+  std::vector<CheckError> errors;
+  for (const PlaceError& error : place_errors(frames, map, calibration, places)) {
+    errors.push_back({error.image, error.horizontal_m.norm(), error.frame});
+  }
+  return describe_check_outliers(errors);
+}
+
+std::string describe_capture_fault(std::span<const Frame> frames, const LampMap& map,
+                                   const Calibration& calibration) {
+  std::vector<CaptureResidual> residuals;
+  for (const auto& [i, fix] : locate_by_three_lamps(frames, map, calibration)) {
+    residuals.push_back({frames[i].image, fix.residual_px, i});
+  }
+  return describe_residual_outliers(residuals);
+}
+
+std::optional<CommonOffset> find_common_offset(std::span<const Frame> frames, const LampMap& map,
+                                               const Calibration& calibration,
+                                               const CapturesTable& places) {
+  constexpr double max_ratio = 1.0 / 3;
+  const std::vector<PlaceError> errors = place_errors(frames, map, calibration, places);
+  if (errors.size() < kMinErrors) return std::nullopt;
+  const auto count = static_cast<double>(errors.size());
+  const auto in_camera = [](const PlaceError& error) -> Eigen::Vector2d {
+    return Eigen::Rotation2Dd(-error.yaw_rad) * error.horizontal_m;
+  };
+  Eigen::Vector2d camera_offset_m(0, 0), world_offset_m(0, 0);
+  for (const PlaceError& error : errors) {
+    camera_offset_m += in_camera(error) / count;
+    world_offset_m += error.horizontal_m / count;
+  }
+  double squares = 0, camera_squares = 0, world_squares = 0;
+  for (const PlaceError& error : errors) {
+    squares += error.horizontal_m.squaredNorm();
+    camera_squares += (in_camera(error) - camera_offset_m).squaredNorm();
+    world_squares += (error.horizontal_m - world_offset_m).squaredNorm();
+  }
+  const auto explains = [&](double offset_m, double left, double other_left) {
+    constexpr double max_square_ratio = max_ratio * max_ratio;
+    return offset_m >= kMinOutlierError_m && left <= max_square_ratio * squares &&
+           left <= max_square_ratio * other_left;
+  };
+  if (explains(camera_offset_m.norm(), camera_squares, world_squares)) {
+    return CommonOffset{camera_offset_m, true, errors.size()};
+  }
+  if (explains(world_offset_m.norm(), world_squares, camera_squares)) {
+    return CommonOffset{world_offset_m, false, errors.size()};
+  }
+  return std::nullopt;
+}
+
+std::string describe(const CommonOffset& offset) {
+  constexpr double millimeters = 1e3;
+  const Eigen::Vector2d offset_mm = millimeters * offset.offset_m;
+  return fmt::format(
+      "all {} captures of the check are off by {:.1f} mm in one direction of the {} (x {:+.1f} mm, "
+      "y {:+.1f} mm): {}",
+      offset.captures, offset_mm.norm(), offset.in_camera ? "camera" : "room", offset_mm.x(),
+      offset_mm.y(),
+      offset.in_camera ? "it is loose in its housing or on its mount, or another camera took them"
+                       : "the known points or the lamps have moved");
+}
 
 std::string describe_lens_fault(std::span<const Frame> frames, const LampMap& map,
                                 const Calibration& calibration) {
