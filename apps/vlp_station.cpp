@@ -8,7 +8,6 @@
 #include "program/app.h"
 #include "program/station/station_records.h"
 #include "program/station/station_run.h"
-#include "program/station/station_shift.h"
 #include "station/database_name.h"
 #include "station/records/records.h"
 #include "station/station_config.h"

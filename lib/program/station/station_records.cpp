@@ -78,7 +78,9 @@ RunFilter replace_any(RunFilter filter) {
 /// Returns the filter of the options: runs of --station, unless --of-station is given.
 RunFilter requested_runs(const StationRecordsOptions& options, const KnownRuns& known) {
   RunFilter filter = options.filter;
-  if (filter.station.empty() && known.station()) filter.station = known.station()->station;
+  if (filter.station.empty() && known.station() != nullptr) {
+    filter.station = known.station()->station;
+  }
   return replace_any(std::move(filter));
 }
 
@@ -97,10 +99,6 @@ RunFilter comparable_runs(const StationRecordsOptions& options, const KnownRuns&
   return filter;
 }
 
-const StationConfig* find_station(const KnownRuns& known) {
-  return known.station() ? &*known.station() : nullptr;
-}
-
 /// Checks that all points are from one station, if neither options nor filter name a station.
 void check_one_station(const std::vector<TrendPoint>& points,
                        const StationRecordsOptions& options) {
@@ -112,7 +110,7 @@ void check_one_station(const std::vector<TrendPoint>& points,
 void check_output_option(const StationRecordsOptions& options, const KnownRuns& known) {
   if (options.output.empty()) return;
   std::vector<std::string> inputs{options.station, options.records};
-  if (const StationConfig* station = find_station(known)) {
+  if (const StationConfig* station = known.station()) {
     inputs.push_back(station->records);
     for (const auto& file : station->inputs) inputs.push_back(file.string());
   }
@@ -154,8 +152,9 @@ std::map<std::string, double> parse_references(const std::vector<std::string>& t
 }
 
 std::string describe(const EstimateTest& estimate) {
-  return fmt::format("{:>12.4g}{:>12.3g}{:>9.2f}{:>9.4f}   {:.4g} to {:.4g}", estimate.value,
-                     estimate.standard_error, estimate.t, estimate.p, estimate.low, estimate.high);
+  return fmt::format("{:>12.4g}{:>12.3g}{:>9.2f}{:>9.4f}   {:.4g} to {:.4g}{}", estimate.value,
+                     estimate.standard_error, estimate.t, estimate.p, estimate.low, estimate.high,
+                     estimate.is_significant() ? "   shows" : "");
 }
 
 /// Prints bias and linearity of a station against reference units.
@@ -182,12 +181,11 @@ void print_bias(const MetricKind& kind, const StationRecordsOptions& options) {
   print_line(
       fmt::format(head, "unit", "reference", "runs", "bias", "se", "t", "p", "95 % interval"));
   for (const UnitBias& unit : study.units) {
-    print_line(fmt::format("{:<20}{:>10.4g}{:>6}{}{}", unit.unit, unit.reference, unit.count,
-                           describe(unit.bias), unit.bias.is_significant() ? "   shows" : ""));
+    print_line(fmt::format("{:<20}{:>10.4g}{:>6}{}", unit.unit, unit.reference, unit.count,
+                           describe(unit.bias)));
   }
   const auto line = [](const char* name, const EstimateTest& estimate) {
-    fmt::print("{:<36}{}{}\n", name, describe(estimate),
-               estimate.is_significant() ? "   shows" : "");
+    fmt::print("{:<36}{}\n", name, describe(estimate));
   };
   line("all", study.all);
   if (study.linearity) {
@@ -263,14 +261,12 @@ void print_run(const StationRecordsOptions& options) {
     if (metric.limit || !metric.value) continue;
     print_line(fmt::format("{:<28}{:>12.4g} {}", metric.name, *metric.value, metric.unit));
   }
-  const auto used = std::count_if(record.images.begin(), record.images.end(),
-                                  [](const auto& image) { return image.refused.empty(); });
   fmt::print("\n");
   for (const RunField& field : run_fields()) {
     if (field.label == nullptr || (record.*field.text).empty()) continue;
     print_line(fmt::format("{:<11}{}", field.label, record.*field.text));
   }
-  fmt::print("images     {}, {} used\n", record.images.size(), used);
+  fmt::print("images     {}, {} used\n", record.images.size(), record.count_used_images());
   for (const RunEvent& event : record.events) {
     const std::string who = event.who.empty() ? "" : event.who + ": ";
     print_line(fmt::format("{:<11} {} {}{}", event.what, event.utc(), who, event.text));
@@ -427,7 +423,7 @@ void print_trend(const StationRecordsOptions& options) {
   const std::vector<double> values = extract_values(points);
   const auto alarms = find_alarms(values, options.rules);
   const ControlChart chart = compute_control_chart(values);
-  const auto gate = find_gate(options.metric, find_station(*known), records, points);
+  const auto gate = find_gate(options.metric, known->station(), records, points);
   if (!options.output.empty()) draw_trend(options.output, options.metric, points, alarms, gate);
   print_line(fmt::format("{} of {} runs, {} to {}", options.metric, points.size(),
                          points.front().ended_utc, points.back().ended_utc));
@@ -456,7 +452,7 @@ void print_capability(const StationRecordsOptions& options) {
   for (const MetricKind& kind : kinds) {
     const auto points = load_judged_values(records, kind.name, filter);
     check_one_station(points, options);
-    const auto gate = find_gate(kind.name, find_station(*known), records, points);
+    const auto gate = find_gate(kind.name, known->station(), records, points);
     const auto found =
         compute_capability(extract_values(points), make_tolerance_limits(kind, gate));
     if (!found) continue;
@@ -492,7 +488,7 @@ void print_study(const StationRecordsOptions& options) {
     check_runs_share_no_images(records, points, values);
     return analyze_measurements(values);
   });
-  const auto gate = find_gate(options.metric, find_station(*known), records, points);
+  const auto gate = find_gate(options.metric, known->station(), records, points);
   print_line(fmt::format("{}: {} units, {} stations, {} runs each, mean {:.4g} {}", options.metric,
                          study.units, study.stations, study.repeats, study.mean, kind.unit));
   fmt::print("\n");

@@ -5,6 +5,8 @@
 #include <fmt/core.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
+#include <chrono>
 #include <filesystem>
 #include <functional>
 #include <optional>
@@ -14,12 +16,14 @@
 #include "captures/printable.h"
 #include "frontend/image_folder.h"
 #include "program/app.h"
-#include "program/station/station_guide.h"
+#include "program/station/terminal.h"
 #include "rig/input_error.h"
 #include "station/records/golden_unit_schedule.h"
 #include "station/records/hook.h"
 #include "station/records/publish_run.h"
 #include "station/records/spool.h"
+#include "station/unit/station_screen.h"
+#include "station/unit/step_sources.h"
 #include "station/unit/unit_record.h"
 #include "station/unit/verify_station.h"
 
@@ -46,6 +50,93 @@ std::string spool_notice(Spool& spool) {
     spdlog::debug("{}", printable(state));
   }
   return notice;
+}
+
+/// Log of the arrived images, line by line, for use without a terminal.
+class Log {
+ public:
+  explicit Log(bool quiet) : quiet_(quiet) {}
+
+  void report(const Unit& unit, const std::vector<WatchedRun::Arrival>& arrivals) {
+    if (quiet_) return;
+    for (const auto& [step, image, gone] : arrivals) {
+      if (!gone) spdlog::info("{}", make_last_image_line(unit, step, image));
+    }
+    for (; done_ < kStationSteps.size() && unit.step(kStationSteps[done_]).done(); ++done_) {
+      spdlog::info("{} is done", to_string(kStationSteps[done_]));
+    }
+  }
+
+ private:
+  bool quiet_;
+  std::size_t done_ = 0;  // number of steps reported as done
+};
+
+/// Returns true if an image arrived. Of the frames of a source, only used ones are considered.
+bool has_arrived(const Unit& unit, const std::vector<WatchedRun::Arrival>& arrivals,
+                 bool of_source) {
+  return std::any_of(arrivals.begin(), arrivals.end(), [&](const WatchedRun::Arrival& arrival) {
+    const auto& images = unit.step(arrival.step).images;
+    const auto image = images.find(arrival.image);
+    return !of_source || image == images.end() || image->second.is_used();
+  });
+}
+
+/// Checks whether the golden unit is due. Called at the first image of a unit, which may arrive
+/// long after its serial number was scanned.
+void check_golden_unit(Unit& unit, const Terminal& terminal) {
+  std::string why = golden_problem(unit.config());
+  if (!why.empty() && why != unit.invalid_reason() && !terminal.interactive()) {
+    spdlog::warn("{}; no unit passes", why);
+  }
+  unit.invalidate(std::move(why));
+}
+
+/// Processes the images of a unit as they arrive and guides the operator. Returns when the unit is
+/// complete or cannot pass any more, the frames end, no image arrives for options.idle_s, or the
+/// operator requests the verdict. Throws std::runtime_error if the operator leaves.
+void guide_unit(const StationRunOptions& options, Unit& unit, WatchedRun& watched,
+                StepSources& sources, Spool& spool, Terminal& terminal) {
+  using Clock = std::chrono::steady_clock;
+  constexpr int poll_interval_ms = 50;
+  Clock::time_point last = Clock::now();
+  Log log(terminal.interactive());
+  bool changed = true, has_begun = false;
+  while (unit.current() && !unit.is_hopeless()) {
+    const auto arrivals = watched.poll_changes(static_cast<std::size_t>(options.threads));
+    if (!has_begun && !arrivals.empty()) {
+      has_begun = true;
+      check_golden_unit(unit, terminal);
+    }
+    log.report(unit, arrivals);
+    changed = changed || !arrivals.empty();
+    if (changed && terminal.interactive()) {
+      auto lines = make_station_screen(unit);
+      for (ScreenLine& line : make_spool_lines(spool.notice())) lines.push_back(std::move(line));
+      lines.push_back({"q: verdict now   Ctrl-C: leave, to go on later"});
+      terminal.draw(lines);
+    }
+    changed = false;
+    if (has_arrived(unit, arrivals, sources.any())) last = Clock::now();
+    sources.feed(unit, watched);
+    if (sources.ended(unit)) {
+      unit.end_early("the frames ended");
+      break;
+    }
+    const std::chrono::duration<double> idle = Clock::now() - last;
+    if (options.idle_s && idle.count() > *options.idle_s) {
+      unit.end_early(fmt::format("no image came for {:g} s", *options.idle_s));
+      break;
+    }
+    if (terminal.key(arrivals.empty() ? poll_interval_ms : 0) == 'q') {
+      unit.end_early("the operator ended the run");
+      break;
+    }
+    if (interrupted()) {
+      throw std::runtime_error("left before the verdict; the same command goes on where it was");
+    }
+    changed = terminal.resized();
+  }
 }
 
 /// Stores the run in the spool, prints the verdict, writes the files, delivers to the records,
@@ -96,13 +187,17 @@ void finish_run(RunRecord measured, const std::vector<ReportPlot>& pictures, Spo
       fmt::format("{}; the verdict {} is recorded: {}", file_error, record.verdict, remedy));
 }
 
+void warn_of_spool(Spool& spool) {
+  if (const auto notice = spool_notice(spool); !notice.empty()) {
+    spdlog::warn("{}", printable(notice));
+  }
+}
+
 /// Checks the conditions that are known before the first image.
 void prepare(Spool& spool, const StationConfig& config, const std::string& camera) {
   check_results(config.results, camera);
   spool.prepare();
-  if (const auto notice = spool_notice(spool); !notice.empty()) {
-    spdlog::warn("{}", printable(notice));
-  }
+  warn_of_spool(spool);
 }
 
 void prepare(Unit& unit, Spool& spool, const StationConfig& config) {
@@ -114,14 +209,15 @@ void prepare(Unit& unit, Spool& spool, const StationConfig& config) {
 }
 
 /// Throws GateNotMet if the run failed, Undetermined if it is invalid.
-void throw_unless_passed(const RunRecord& record, const std::string& failed) {
-  if (record.passed()) return;
-  if (!record.invalid()) throw GateNotMet(failed + ": " + record.first_cause());
-  throw Undetermined(
-      fmt::format("camera {} is not judged: {}", record.camera, record.first_cause()));
-}
 void throw_unless_passed(const RunRecord& record) {
-  throw_unless_passed(record, "camera " + record.camera + " fails");
+  if (record.passed()) return;
+  if (record.invalid()) {
+    throw Undetermined(
+        fmt::format("camera {} is not judged: {}", record.camera, record.first_cause()));
+  }
+  throw GateNotMet((record.kind == "golden" ? "station " + record.station + " has moved: "
+                                            : "camera " + record.camera + " fails: ") +
+                   record.first_cause());
 }
 
 void add_folders(Unit& unit, const fs::path& folder) {
@@ -234,7 +330,7 @@ void run_verify(const StationRunOptions& options) {
       [&, run = record.run] {
         if (!batch) move_away(arrived, run);
       });
-  throw_unless_passed(record, "station " + record.station + " has moved");
+  throw_unless_passed(record);
 }
 
 void run_hooks(const StationRunOptions& options) {
@@ -242,17 +338,30 @@ void run_hooks(const StationRunOptions& options) {
   if (!config.hook) throw InputError(options.station, "has no hook: add the key 'hook'");
   Spool spool(config.spool, config.records);
   spool.deliver();
-  const HookCounts hooks =
-      run_open_hooks(config, spool, [](const RunRecord& run, const std::string& outcome) {
-        fmt::print("{}\n", printable_line(fmt::format("{} {} {}: {}", run.run, run.camera,
-                                                      run.verdict, outcome)));
-      });
-  if (const auto notice = spool_notice(spool); !notice.empty()) {
-    spdlog::warn("{}", printable(notice));
+  const auto runs = spool.list({.station = config.station, .has_open_hook = true});
+  std::size_t failed = 0;
+  for (const RunSummary& run : runs) {
+    const auto report = [&](const std::string& outcome) {
+      fmt::print("{}\n", printable_line(fmt::format("{} {} {}: {}", run.run, run.camera,
+                                                    run.verdict, outcome)));
+    };
+    const HookLock lock(spool.folder(), run.run);
+    auto record = spool.find(run.run);
+    // Another program can have called it.
+    if (!record || !is_hook_open(*record)) continue;
+    if (!lock.held()) {
+      report("is being run");
+      continue;
+    }
+    const std::string unrecorded = call_hook(*config.hook, *record, lock, spool);
+    const std::string problem = hook_problem(*record);
+    if (!problem.empty()) ++failed;
+    report(problem.empty() ? "done" : problem);
+    if (!unrecorded.empty()) report(unrecorded);
   }
-  if (hooks.failed > 0) {
-    throw std::runtime_error(
-        fmt::format("the hook failed for {} of {} runs", hooks.failed, hooks.runs));
+  warn_of_spool(spool);
+  if (failed > 0) {
+    throw std::runtime_error(fmt::format("the hook failed for {} of {} runs", failed, runs.size()));
   }
 }
 

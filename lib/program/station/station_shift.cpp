@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "program/station/station_shift.h"
+#include "program/station/station_run.h"
 
 #include <fmt/core.h>
 #include <spawn.h>

@@ -15,7 +15,6 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
-#include <memory>
 #include <thread>
 
 #include "captures/printable.h"
@@ -71,32 +70,22 @@ constexpr int kMaxScannerPause_ms = 30;
 
 }  // namespace
 
-struct Terminal::Saved {
-  bool keys = false;
-  termios settings{};
-};
-
-Terminal::Terminal() : interactive_(::isatty(::fileno(stdout)) == 1), saved_(new Saved) {
+Terminal::Terminal() : interactive_(::isatty(::fileno(stdout)) == 1) {
   const char* no_color = std::getenv("NO_COLOR");
   has_color_ = interactive_ && (no_color == nullptr || *no_color == '\0');
   std::signal(SIGINT, [](int) { stop_requested = true; });
   std::signal(SIGTERM, [](int) { stop_requested = true; });
-  if (!interactive_ || ::tcgetattr(STDIN_FILENO, &saved_->settings) != 0) return;
-  termios settings = saved_->settings;
-  settings.c_lflag &= static_cast<tcflag_t>(~(ICANON | ECHO));
-  saved_->keys = ::tcsetattr(STDIN_FILENO, TCSANOW, &settings) == 0;
-  original_settings = saved_->settings;
-  key_settings = settings;
+  if (!interactive_ || ::tcgetattr(STDIN_FILENO, &original_settings) != 0) return;
+  key_settings = original_settings;
+  key_settings.c_lflag &= static_cast<tcflag_t>(~(ICANON | ECHO));
+  reads_keys_ = ::tcsetattr(STDIN_FILENO, TCSANOW, &key_settings) == 0;
   std::signal(SIGQUIT, restore_and_raise);
   std::signal(SIGTSTP, restore_and_raise);
 }
 
 Terminal::~Terminal() {
-  if (saved_->keys) ::tcsetattr(STDIN_FILENO, TCSANOW, &saved_->settings);
-  std::signal(SIGINT, SIG_DFL);
-  std::signal(SIGTERM, SIG_DFL);
-  std::signal(SIGQUIT, SIG_DFL);
-  std::signal(SIGTSTP, SIG_DFL);
+  if (reads_keys_) ::tcsetattr(STDIN_FILENO, TCSANOW, &original_settings);
+  for (const int signal : {SIGINT, SIGTERM, SIGQUIT, SIGTSTP}) std::signal(signal, SIG_DFL);
 }
 
 Terminal::Size Terminal::size() {
@@ -161,7 +150,7 @@ std::string Terminal::colorize(const std::string& text, Tone tone) const {
 }
 
 std::optional<char> Terminal::key(int wait_ms) const {
-  if (!saved_->keys) {
+  if (!reads_keys_) {
     std::this_thread::sleep_for(std::chrono::milliseconds(wait_ms));
     return std::nullopt;
   }
@@ -174,7 +163,7 @@ std::optional<char> Terminal::key(int wait_ms) const {
 
 void Terminal::discard_keys() const {
   char key = 0;
-  while (saved_->keys && !interrupted() && read_key(key, kMaxScannerPause_ms)) continue;
+  while (reads_keys_ && !interrupted() && read_key(key, kMaxScannerPause_ms)) continue;
 }
 
 std::optional<std::string> Terminal::line(std::vector<ScreenLine> prompt) {
@@ -197,7 +186,7 @@ std::optional<std::string> Terminal::line(std::vector<ScreenLine> prompt) {
     if (ended && typed.empty()) return std::nullopt;
     if (ended || key == '\n' || key == '\r') break;
     if (key == escape) {  // an arrow, or another key of several characters
-      while (saved_->keys && read_key(key, 0)) continue;
+      while (reads_keys_ && read_key(key, 0)) continue;
     } else if (key == backspace || key == del) {
       if (!typed.empty()) typed = truncate_utf8(typed, typed.size() - 1);
     } else if (static_cast<unsigned char>(key) >= ' ' &&

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cstddef>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -46,7 +45,6 @@ class Terminal {
   std::optional<std::string> line(std::vector<ScreenLine> prompt);
 
  private:
-  struct Saved;
   struct Size {
     std::size_t columns, rows;
     bool operator==(const Size&) const = default;
@@ -55,11 +53,10 @@ class Terminal {
   void replace_text(const std::string& text, std::size_t lines);
   std::string colorize(const std::string& text, Tone tone) const;
 
-  bool interactive_, has_color_;
+  bool interactive_, has_color_, reads_keys_ = false;
   std::size_t num_drawn_lines_ = 0;
   std::string last_text_;
   Size size_{};
-  std::unique_ptr<Saved> saved_;
 };
 
 /// Returns true if SIGINT or SIGTERM arrived while a Terminal existed. The program should end; its

@@ -156,18 +156,14 @@ struct Process {
 /// failure.
 int make_memory_file(const std::string& text) {
   const int file = ::memfd_create("run", MFD_CLOEXEC);
-  for (std::size_t at = 0; file >= 0 && at < text.size();) {
-    const ssize_t count = ::write(file, text.data() + at, text.size() - at);
-    if (count < 0 && errno == EINTR) continue;
-    if (count <= 0) {
-      const int error = count < 0 ? errno : ENOSPC;
-      ::close(file);
-      errno = error;
-      return -1;
-    }
-    at += static_cast<std::size_t>(count);
+  if (file < 0) return file;
+  // Memory is written as a whole, or is exhausted: signals do not interrupt it.
+  if (::write(file, text.data(), text.size()) != static_cast<ssize_t>(text.size())) {
+    ::close(file);
+    errno = ENOSPC;
+    return -1;
   }
-  if (file >= 0) ::lseek(file, 0, SEEK_SET);
+  ::lseek(file, 0, SEEK_SET);
   return file;
 }
 
@@ -291,29 +287,6 @@ std::string call_hook(const Hook& hook, RunRecord& record, const HookLock& lock,
   }
   spool.deliver();
   return problem;
-}
-
-HookCounts run_open_hooks(
-    const StationConfig& config, Spool& spool,
-    const std::function<void(const RunRecord& run, const std::string& outcome)>& report) {
-  const auto runs = spool.list({.station = config.station, .has_open_hook = true});
-  HookCounts result{runs.size()};
-  for (const RunSummary& run : runs) {
-    const HookLock lock(spool.folder(), run.run);
-    auto record = spool.find(run.run);
-    // Another program can have called it.
-    if (!record || !is_hook_open(*record)) continue;
-    if (!lock.held()) {
-      report(*record, "is being run");
-      continue;
-    }
-    const std::string unrecorded = call_hook(*config.hook, *record, lock, spool);
-    const std::string problem = hook_problem(*record);
-    if (!problem.empty()) ++result.failed;
-    report(*record, problem.empty() ? "done" : problem);
-    if (!unrecorded.empty()) report(*record, unrecorded);
-  }
-  return result;
 }
 
 HookLock::HookLock(const std::filesystem::path& spool, const std::string& run)

@@ -168,8 +168,8 @@ VoidedRun void_run(KnownRuns& known, const std::string& run, const std::string& 
   VoidedRun result{known.find(run)};
   RunRecord& record = result.run;
   const std::string who = printable_line(operator_name);
-  const bool is_own_station = known.station() && record.station == known.station()->station;
-  const StationConfig* station = is_own_station ? &*known.station() : nullptr;
+  const StationConfig* station = known.station();
+  if (station != nullptr && record.station != station->station) station = nullptr;
   std::optional<HookLock> lock;
   if (station != nullptr && station->hook) {
     lock.emplace(known.spool()->folder(), record.run);

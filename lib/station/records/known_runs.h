@@ -36,7 +36,8 @@ class KnownRuns {
   /// offline, or if the file does not exist: no records are created.
   explicit KnownRuns(const std::string& records);
 
-  const std::optional<StationConfig>& station() const { return station_; }
+  /// Returns the station; null for records without a station.
+  const StationConfig* station() const { return station_ ? &*station_ : nullptr; }
   /// Returns the station's spool; null without a station.
   Spool* spool() { return spool_ ? &*spool_ : nullptr; }
   /// Returns the records. Throws RecordsUnavailable if they are offline.

@@ -82,26 +82,33 @@ std::vector<Cause> find_problems(const Unit& unit, StationStep step) {
   return causes;
 }
 
-/// Returns the failed gates of a step, those of the station before those of the camera.
-std::vector<Cause> find_missed_gates(const UnitStep& state,
-                                     const std::vector<CheckedMetric>& metrics) {
+/// Returns a cause for each metric that is selected.
+template <typename Selects>
+std::vector<Cause> describe_failures(const std::vector<CheckedMetric>& metrics, bool of_camera,
+                                     const Selects& is_selected) {
   std::vector<Cause> causes;
-  if (!is_solved(state)) return causes;
-  for (const bool of_camera : {false, true}) {
-    for (const CheckedMetric& metric : metrics) {
-      const bool missed = find_metric_value(state.result->metrics, metric.name) && !metric.passed();
-      if (missed && metric_kind(metric.name)->of_camera == of_camera) {
-        causes.push_back({describe_failure(metric), of_camera});
-      }
-    }
+  for (const CheckedMetric& metric : metrics) {
+    if (is_selected(metric)) causes.push_back({describe_failure(metric), of_camera});
   }
   return causes;
 }
 
+/// Returns true if a gate is not passed by a measured value.
+bool is_missed(const CheckedMetric& metric) { return metric.value && !metric.passed(); }
+
+/// Returns the problems of a step and its failed gates, those of the station before those of the
+/// camera.
 std::vector<Cause> find_step_causes(const Unit& unit, StationStep step,
                                     const std::vector<CheckedMetric>& metrics) {
   std::vector<Cause> causes = find_problems(unit, step);
-  append(causes, find_missed_gates(unit.step(step), metrics));
+  const UnitStep& state = unit.step(step);
+  if (!is_solved(state)) return causes;
+  for (const bool of_camera : {false, true}) {
+    append(causes, describe_failures(metrics, of_camera, [&](const CheckedMetric& metric) {
+             return find_metric_value(state.result->metrics, metric.name) && !metric.passed() &&
+                    metric_kind(metric.name)->of_camera == of_camera;
+           }));
+  }
   return causes;
 }
 
@@ -126,10 +133,10 @@ std::vector<Cause> find_board_causes(const Unit& unit, const std::vector<Checked
   std::vector<Cause> causes;
   const UnitStep& boards = unit.step(StationStep::boards);
   if (is_other_board(boards)) causes.push_back({"wrong board: the tags have other ids"});
-  for (const CheckedMetric& metric : metrics) {
-    const bool blur = metric.name == "blur_px" && metric.value && !metric.passed();
-    if (blur && is_blur_known(boards, unit.config()))
-      causes.push_back({describe_failure(metric), true});
+  if (is_blur_known(boards, unit.config())) {
+    append(causes, describe_failures(metrics, true, [](const CheckedMetric& metric) {
+             return metric.name == "blur_px" && is_missed(metric);
+           }));
   }
   append(causes, find_step_causes(unit, StationStep::boards, metrics));
   return causes;
@@ -143,28 +150,6 @@ std::vector<Cause> find_lamp_step_causes(const Unit& unit,
   for (const StationStep step : kLampSteps) {
     if (!is_solved(unit.step(std::exchange(before, step)))) break;
     append(causes, find_step_causes(unit, step, metrics));
-  }
-  return causes;
-}
-
-/// Returns the failed gates of row_time_metrics(), which refer to all steps together.
-std::vector<Cause> find_missed_row_time_gates(const std::vector<CheckedMetric>& metrics) {
-  std::vector<Cause> causes;
-  for (const CheckedMetric& metric : metrics) {
-    const bool is_row_time = metric.name.starts_with("row_time_");
-    if (is_row_time && metric.value && !metric.passed())
-      causes.push_back({describe_failure(metric)});
-  }
-  return causes;
-}
-
-/// Returns the gates without a value of a unit whose steps are all completed.
-std::vector<Cause> find_missing_metrics(const Unit& unit,
-                                        const std::vector<CheckedMetric>& metrics) {
-  std::vector<Cause> causes;
-  if (unit.current()) return causes;
-  for (const CheckedMetric& metric : metrics) {
-    if (!metric.value) causes.push_back({describe_failure(metric)});
   }
   return causes;
 }
@@ -211,15 +196,12 @@ std::vector<Cause> find_station_faults(const Unit& unit) {
   for (const StationStep step : kLampSteps) {
     for (Frame& frame : collect_frames(unit.step(step))) frames.push_back(std::move(frame));
   }
-  auto faults = describe_lamp_faults(frames, unit.config().lamps, *known);
-  auto unseen = describe_missing_lamps(frames, unit.config().lamps);
-  std::move(unseen.begin(), unseen.end(), std::back_inserter(faults));
-  if (!faults.empty()) {
-    std::vector<Cause> causes;
-    causes.reserve(faults.size());
-    for (std::string& fault : faults) causes.push_back({std::move(fault)});
-    return causes;
+  std::vector<Cause> causes;
+  for (const auto& faults : {describe_lamp_faults(frames, unit.config().lamps, *known),
+                             describe_missing_lamps(frames, unit.config().lamps)}) {
+    for (const std::string& fault : faults) causes.push_back({fault});
   }
+  if (!causes.empty()) return causes;
   if (std::string fault = describe_lens_fault(frames, unit.config().lamps, *known);
       !fault.empty()) {
     return {{std::move(fault)}};
@@ -268,7 +250,11 @@ std::vector<Cause> find_causes(const Unit& unit) {
   const std::vector<CheckedMetric> metrics = unit.metrics();
   const std::vector<Cause> board_causes = find_board_causes(unit, metrics);
   std::vector<Cause> lamp_causes = find_lamp_step_causes(unit, metrics);
-  append(lamp_causes, find_missing_metrics(unit, metrics));
+  if (!unit.current()) {
+    append(lamp_causes, describe_failures(metrics, false, [](const CheckedMetric& metric) {
+             return !metric.value;
+           }));
+  }
 
   std::vector<Cause> causes;
   if (!unit.invalid_reason().empty()) causes.push_back({unit.invalid_reason()});
@@ -279,7 +265,10 @@ std::vector<Cause> find_causes(const Unit& unit) {
     append(causes, find_station_faults(unit));
   }
   append(causes, std::move(lamp_causes));
-  append(causes, find_missed_row_time_gates(metrics));
+  // Gates of row_time_metrics(), which refer to all steps together.
+  append(causes, describe_failures(metrics, false, [](const CheckedMetric& metric) {
+           return metric.name.starts_with("row_time_") && is_missed(metric);
+         }));
   return causes;
 }
 

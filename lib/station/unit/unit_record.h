@@ -8,7 +8,6 @@
 
 #include "station/records/run_record.h"
 #include "station/unit/unit.h"
-#include "station/verdict.h"
 
 namespace vlp {
 

@@ -48,13 +48,11 @@ WatchedRun::WatchedRun(Unit& unit, Spool& spool)
   begin(spool);
   if (finished_) return;
   steps_.reserve(kStationSteps.size());
-  step_folders_.reserve(kStationSteps.size());
   for (const StationStep step : kStationSteps) {
-    step_folders_.push_back(files_.make_folder({to_string(step), folder_, "step"}));
-    steps_.emplace_back(step_folders_.back().path());
+    SharedFolder folder = files_.make_folder({to_string(step), folder_, "step"});
+    const fs::path path = folder.path();
+    steps_.push_back({std::move(folder), WatchedFolder(path)});
   }
-  waiting_.resize(steps_.size());
-  tables_.resize(steps_.size());
 }
 
 WatchedRun::~WatchedRun() {
@@ -111,15 +109,14 @@ std::vector<WatchedRun::Arrival> WatchedRun::poll_changes(std::size_t max_images
   std::vector<Arrival> arrivals;
   bool reread = false;
   for (const StationStep step : kStationSteps) {
-    const auto index = static_cast<std::size_t>(step);
-    auto& waiting = waiting_[index];
-    std::string tables = make_table_state(steps_[index].folder());
-    if (tables != tables_[index]) {
-      tables_[index] = std::move(tables);
+    auto& [folder, images, waiting, known_tables] = steps_[static_cast<std::size_t>(step)];
+    std::string tables = make_table_state(images.folder());
+    if (tables != known_tables) {
+      known_tables = std::move(tables);
       unit_.reread(step);
       reread = true;
     }
-    const auto changes = steps_[index].poll_changes();
+    const auto changes = images.poll_changes();
     for (const std::string& name : changes.gone) {
       std::erase_if(waiting, [&](const fs::path& file) { return file.filename() == name; });
       unit_.remove(step, name);
@@ -146,9 +143,8 @@ void WatchedRun::mark_stored() const {
 }
 
 void WatchedRun::discard(StationStep step, const std::string& image) {
-  WatchedFolder& folder = steps_[static_cast<std::size_t>(step)];
   step_folder(step).remove(image);
-  folder.forget(image);
+  steps_[static_cast<std::size_t>(step)].images.forget(image);
   unit_.discard(step, image);
 }
 

@@ -88,7 +88,7 @@ class WatchedRun {
   const std::string& run() const { return run_; }
   const std::filesystem::path& folder() const { return folder_; }
   const SharedFolder& step_folder(StationStep step) const {
-    return step_folders_[static_cast<std::size_t>(step)];
+    return steps_[static_cast<std::size_t>(step)].folder;
   }
 
   /// Marks the run as stored. It is not judged again afterwards, even if the records are offline.
@@ -97,6 +97,14 @@ class WatchedRun {
   void move_away() const;
 
  private:
+  struct Step {
+    SharedFolder folder;
+    WatchedFolder images;
+    /// Images that wait to be processed.
+    std::vector<std::filesystem::path> waiting = {};
+    /// State of the tables of the captures' positions.
+    std::string tables = {};
+  };
   void begin(Spool& spool);
   bool read_state();
 
@@ -106,10 +114,7 @@ class WatchedRun {
   std::string run_;
   std::optional<RunRecord> finished_;
   int lock_ = -1;
-  std::vector<WatchedFolder> steps_;
-  std::vector<SharedFolder> step_folders_;
-  std::vector<std::vector<std::filesystem::path>> waiting_;
-  std::vector<std::string> tables_;
+  std::vector<Step> steps_;
 };
 
 }  // namespace vlp
