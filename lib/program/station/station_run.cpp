@@ -75,7 +75,7 @@ class Log {
 /// Returns true if an image arrived. Of the frames of a source, only used ones are considered.
 bool has_arrived(const Unit& unit, const std::vector<WatchedRun::Arrival>& arrivals,
                  bool of_source) {
-  return std::any_of(arrivals.begin(), arrivals.end(), [&](const WatchedRun::Arrival& arrival) {
+  return std::ranges::any_of(arrivals, [&](const WatchedRun::Arrival& arrival) {
     const auto& images = unit.step(arrival.step).images;
     const auto image = images.find(arrival.image);
     return !of_source || image == images.end() || image->second.is_used();

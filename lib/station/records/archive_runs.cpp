@@ -114,8 +114,7 @@ ReprocessedArchive read_archive_sessions(const fs::path& results) {
     archive.sessions.push_back(
         {std::move(run), results / (passed || failed ? "sessions" : "failed") / session});
   }
-  std::sort(archive.sessions.begin(), archive.sessions.end(),
-            [](const auto& a, const auto& b) { return a.run.run < b.run.run; });
+  std::ranges::sort(archive.sessions, {}, [](const auto& session) { return session.run.run; });
   return archive;
 }
 

@@ -54,9 +54,7 @@ std::string compute_digest(const RunRecord& run) {
   }
   // Databases sort names differently.
   auto images = run.images;
-  std::sort(images.begin(), images.end(), [](const auto& a, const auto& b) {
-    return std::tie(a.step, a.name) < std::tie(b.step, b.name);
-  });
+  std::ranges::sort(images, {}, [](const auto& image) { return std::tie(image.step, image.name); });
   for (const auto& [step, name, sha256, refused] : images) {
     content.add("image");
     for (const std::string* text : {&step, &name, &sha256, &refused}) content.add(*text);

@@ -71,11 +71,9 @@ std::string subject_part(const RunRecord& record, const Calibration& calibration
 
 /// Describes the inputs that the uncertainty includes, and those that are assumed exact.
 std::string describe_inputs(const RunRecord& record, const Calibration& calibration) {
-  const auto print = std::find_if(
-      record.metrics.begin(), record.metrics.end(),
-      [](const auto& metric) { return metric.name == "board_print_px" && metric.value; });
+  const CheckedMetric* print = record.find_metric("board_print_px");
   const auto& report = calibration.intrinsics_report;
-  if (print == record.metrics.end() || !report || !report->covariance) {
+  if (print == nullptr || !print->value || !report || !report->covariance) {
     return "The board and the known points are taken as exact.";
   }
   return fmt::format(

@@ -91,8 +91,7 @@ void add_board(const Board& board, Lines& lines) {
 }
 
 void add_lamps(LampMap map, Lines& lines) {
-  std::sort(map.lamps.begin(), map.lamps.end(),
-            [](const Lamp& a, const Lamp& b) { return a.id < b.id; });
+  std::ranges::sort(map.lamps, {}, &Lamp::id);
   for (const Lamp& lamp : map.lamps) {
     lines.add({{"lamp", lamp.id},
                {"x_m", lamp.position_m.x()},

@@ -195,13 +195,9 @@ struct Records::Database {
       }
       // A unit takes minutes, in which the server can restart or the network can fail.
       sql.reconnect();
-      return run_watched(
-          [&](ConnectionWatchdog& watch) {
-            configure_connection(sql, timeout_s);
-            watch.on_progress();
-            return action(watch);
-          },
-          timeout_factor);
+      run_watched([&](ConnectionWatchdog&) { configure_connection(sql, timeout_s); },
+                  timeout_factor);
+      return run_watched(action, timeout_factor);
     });
   }
 
@@ -227,9 +223,8 @@ constexpr int kManyRowsTimeoutFactor = 10;
 constexpr int kMigrationTimeoutFactor = 360;
 
 bool same_texts(const RunRecord& a, const RunRecord& b) {
-  const auto fields = run_fields();
-  return std::all_of(fields.begin(), fields.end(),
-                     [&](const RunField& field) { return a.*field.text == b.*field.text; });
+  return std::ranges::all_of(run_fields(),
+                             [&](const RunField& field) { return a.*field.text == b.*field.text; });
 }
 
 void insert_metrics(soci::session& sql, const RunRecord& record, ConnectionWatchdog& watch) {
@@ -286,10 +281,9 @@ const std::string kNotVoided =
     "NOT EXISTS (SELECT 1 FROM events WHERE events.run = runs.run AND events.what = 'voided')";
 /// As is_hook_open().
 const std::string kHookOpen = fmt::format(
-    "EXISTS (SELECT 1 FROM events WHERE events.run = runs.run AND events.what = '{}' AND NOT "
-    "EXISTS "
-    "(SELECT 1 FROM events ended WHERE ended.run = events.run AND ended.what = '{}' AND "
-    "ended.event > events.event))",
+    "EXISTS (SELECT 1 FROM events WHERE events.run = runs.run AND events.what = '{}' AND "
+    "NOT EXISTS (SELECT 1 FROM events ended WHERE ended.run = events.run AND ended.what = '{}' "
+    "AND ended.event > events.event))",
     kHookRequested, kHookDone);
 
 /// Returns the conditions of a filter, and binds their values in this order.
@@ -354,15 +348,16 @@ Records::Records(const std::string& where) : database_(std::make_unique<Database
   database_->where = where;
   database_->name = describe_database(where);
   database_->timeout_s = timeout_s(where);
-  database_->with_database_name([&] { open(database_->sql, where); });
+  soci::session& sql = database_->sql;
+  database_->with_database_name([&] { open(sql, where); });
   const bool are_there = database_->run([&](ConnectionWatchdog& watch) {
-    configure_connection(database_->sql, database_->timeout_s);
+    configure_connection(sql, database_->timeout_s);
     watch.on_progress();
-    return has_current_tables(database_->sql);
+    return has_current_tables(sql);
   });
-  if (!are_there)
-    database_->run([&](ConnectionWatchdog&) { make_record_tables(database_->sql); },
-                   kMigrationTimeoutFactor);
+  if (!are_there) {
+    database_->run([&](ConnectionWatchdog&) { make_record_tables(sql); }, kMigrationTimeoutFactor);
+  }
   database_->ready = true;
 }
 

@@ -165,12 +165,8 @@ void check_clock(const StationConfig& config, Records& records) {
   constexpr double max_idle_s = 366 * day_s;  // longer than a plant is shut
   constexpr double max_ahead_s = day_s;       // between computers that share records
   constexpr int trusted_days = 7;             // within them a wrong clock is noticed
-  RunFilter station_filter;
-  station_filter.station = config.station;
-  const std::vector<RunSummary> runs = records.list(station_filter);
   std::vector<std::string> ended;
-  ended.reserve(runs.size());
-  for (const RunSummary& run : runs) {
+  for (const RunSummary& run : records.list({.station = config.station})) {
     const bool is_time = !std::isnan(seconds_since(run.ended_utc));
     if (run.voided.empty() && is_time) ended.push_back(run.ended_utc);
   }

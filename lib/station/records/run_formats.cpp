@@ -32,20 +32,14 @@ std::string join_lines(std::string text) {
   return joined;
 }
 
-const CheckedMetric* find_metric(const RunRecord& run, const MetricKind& kind) {
-  const auto metric = std::find_if(run.metrics.begin(), run.metrics.end(),
-                                   [&](const auto& each) { return each.name == kind.name; });
-  return metric == run.metrics.end() ? nullptr : &*metric;
-}
-
 /// Returns unit_metrics() and the other metrics of these runs.
 std::vector<MetricKind> list_columns(const std::vector<RunRecord>& runs) {
   auto kinds = unit_metrics();
   for (const MetricKind& kind : metric_kinds({MetricSource::evaluation})) {
-    const bool has_value = std::any_of(runs.begin(), runs.end(), [&](const RunRecord& run) {
-      return find_metric(run, kind) != nullptr;
-    });
-    if (has_value) kinds.push_back(kind);
+    const auto has_kind = [&](const RunRecord& run) {
+      return run.find_metric(kind.name) != nullptr;
+    };
+    if (std::ranges::any_of(runs, has_kind)) kinds.push_back(kind);
   }
   return kinds;
 }
@@ -64,7 +58,7 @@ void write_csv(const std::filesystem::path& file, const std::vector<RunRecord>& 
       if (field.in_csv) row.push_back(join_lines(run.*field.text));
     }
     for (const MetricKind& kind : kinds) {
-      const CheckedMetric* metric = find_metric(run, kind);
+      const CheckedMetric* metric = run.find_metric(kind.name);
       const bool has_value = metric != nullptr && metric->value;
       row.push_back(has_value ? significant(*metric->value, kDigits) : "");
     }

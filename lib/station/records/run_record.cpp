@@ -16,6 +16,7 @@
 #include <opencv2/core/utility.hpp>
 #include <optional>
 #include <random>
+#include <ranges>
 #include <regex>
 #include <set>
 #include <utility>
@@ -73,20 +74,23 @@ void RunRecord::invalidate(const std::string& why) {
   causes = why + "\n" + causes;
 }
 
+const CheckedMetric* RunRecord::find_metric(std::string_view name) const {
+  const auto metric = std::ranges::find(metrics, name, &CheckedMetric::name);
+  return metric == metrics.end() ? nullptr : &*metric;
+}
+
 std::ptrdiff_t RunRecord::count_used_images() const {
   return std::ranges::count_if(images, &Image::is_used);
 }
 
 const RunEvent* voided(const RunRecord& record) {
-  const auto event = std::find_if(record.events.begin(), record.events.end(),
-                                  [](const RunEvent& each) { return each.what == kVoided; });
+  const auto event = std::ranges::find(record.events, kVoided, &RunEvent::what);
   return event == record.events.end() ? nullptr : &*event;
 }
 
 std::ptrdiff_t find_last_event(const RunRecord& record, const char* what) {
-  const auto last = std::find_if(record.events.rbegin(), record.events.rend(),
-                                 [&](const RunEvent& event) { return event.what == what; });
-  return record.events.rend() - last - 1;
+  const auto latest_first = std::views::reverse(record.events);
+  return latest_first.end() - std::ranges::find(latest_first, what, &RunEvent::what) - 1;
 }
 
 std::string format_void_command(const std::string& run, const std::filesystem::path& station_file) {

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "evaluation/gate.h"
@@ -100,6 +101,8 @@ struct RunRecord {
   /// Events, in chronological order.
   std::vector<RunEvent> events;
 
+  /// Returns the metric of this name; null if there is none.
+  const CheckedMetric* find_metric(std::string_view name) const;
   /// Returns the number of images that were used.
   std::ptrdiff_t count_used_images() const;
   bool passed() const { return verdict == to_string(Verdict::pass); }

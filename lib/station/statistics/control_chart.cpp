@@ -94,10 +94,8 @@ bool is_selected_by(const std::string& rule, const std::string& name) {
 /// Throws for an unknown rule.
 void check_rules(const std::vector<std::string>& names) {
   for (const std::string& name : names) {
-    const bool known = name == kEwma || std::any_of(kRules.begin(), kRules.end(), [&](auto& rule) {
-                         return is_selected_by(rule.name, name);
-                       });
-    if (known) continue;
+    const auto is_named = [&](const ChartRule& rule) { return is_selected_by(rule.name, name); };
+    if (name == kEwma || std::ranges::any_of(kRules, is_named)) continue;
     throw std::invalid_argument("there is no rule " + name +
                                 "; there are western-electric-1 to -4, nelson-1 to -8, ewma, and "
                                 "western-electric and nelson for all of them");
@@ -147,8 +145,8 @@ std::vector<ChartAlarm> find_alarms(std::span<const double> values,
   std::vector<ChartAlarm> alarms;
   for (std::size_t i = 0; i < values.size(); ++i) {
     const auto is_selected = [&](const std::string& rule) {
-      return std::any_of(rules.begin(), rules.end(),
-                         [&](const std::string& name) { return is_selected_by(rule, name); });
+      return std::ranges::any_of(
+          rules, [&](const std::string& name) { return is_selected_by(rule, name); });
     };
     for (const ChartRule& rule : kRules) {
       if (is_selected(rule.name) && rule.matches(Sigmas(sigmas).first(i + 1))) {

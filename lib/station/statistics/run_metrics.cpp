@@ -21,8 +21,7 @@ std::vector<MetricKind> list_run_metrics() {
 
 MetricKind find_run_metric(const std::string& name) {
   const auto kinds = list_run_metrics();
-  const auto kind = std::find_if(kinds.begin(), kinds.end(),
-                                 [&](const MetricKind& any) { return any.name == name; });
+  const auto kind = std::ranges::find(kinds, name, &MetricKind::name);
   if (kind != kinds.end()) return *kind;
   const std::string_view present = find_present_name(NameKind::metric, name);
   if (!present.empty()) throw std::invalid_argument("figure " + describe_renaming(name, present));
@@ -60,11 +59,8 @@ std::optional<double> find_gate(const std::string& metric, const StationConfig* 
     return std::nullopt;
   }
   const auto last = points.empty() ? std::nullopt : records.find(points.back().run);
-  if (!last) return std::nullopt;
-  for (const CheckedMetric& any : last->metrics) {
-    if (any.name == metric) return any.limit;
-  }
-  return std::nullopt;
+  const CheckedMetric* gate = last ? last->find_metric(metric) : nullptr;
+  return gate != nullptr ? gate->limit : std::nullopt;
 }
 
 ToleranceLimits make_tolerance_limits(const MetricKind& kind, std::optional<double> gate) {

@@ -4,6 +4,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
@@ -12,6 +13,7 @@
 #include "calibration/intrinsics/lens_sharpness.h"
 #include "calibration/intrinsics/view_pose.h"
 #include "geometry/angles.h"
+#include "station/unit/turn_map.h"
 
 namespace vlp {
 namespace {
@@ -39,6 +41,72 @@ std::string missing_angles(const TurnMap::Height& height) {
     angles += fmt::format(" {:.0f}", 360.0 * double(part) / double(height.parts.size()));
   }
   return angles;
+}
+
+/// Returns a map of the corners over the image: '#' many, '+' some, '.' none.
+std::vector<std::string> draw_board_map(const Unit& unit) {
+  const ImageCoverage coverage =
+      board_coverage(unit.step(StationStep::boards), unit.config().type.imager_px);
+  constexpr int many = 20;
+  std::vector<std::string> lines;
+  const std::string edge = "  +-----------------+";
+  lines.push_back(edge);
+  for (int row = 0; row < ImageCoverage::kRows; ++row) {
+    std::string line = "  |";
+    for (int col = 0; col < ImageCoverage::kCols; ++col) {
+      const int corners = coverage.corners(col, row);
+      line += corners == 0 ? " ." : corners < many ? " +" : " #";
+    }
+    lines.push_back(line + " |");
+  }
+  lines.push_back(edge);
+  lines[1] += fmt::format("   {:.0f} % of the image have corners, {:.0f} % wanted",
+                          100 * coverage.fraction(), 100 * unit.config().sufficient.board_coverage);
+  lines[3] += "   # many corners   + some   . none";
+  const UnitStep& boards = unit.step(StationStep::boards);
+  const auto last = boards.images.find(boards.last);
+  if (last == boards.images.end() || !last->second.seen.board) return lines;
+  if (const auto mtf50 = compute_view_mtf50(last->second.seen.board->seen)) {
+    lines[5] += fmt::format("   sharpness of the last image: MTF50 {:.3f} cycles/px", *mtf50);
+  }
+  return lines;
+}
+
+/// Returns the covered angles of the rotation in place; empty before the lens is known.
+TurnMap compute_unit_turn_map(const Unit& unit) {
+  const auto& lens = unit.step(StationStep::boards).result;
+  if (!lens || !lens->ok()) return {};
+  return compute_turn_map(collect_frames(unit.step(StationStep::rotation)), unit.config(),
+                          lens->calibration);
+}
+
+/// Returns the heights of the rotation with covered and missing angles, as lines.
+std::vector<std::string> describe_turn(const Unit& unit) {
+  std::vector<std::string> lines;
+  for (const TurnMap::Height& height : compute_unit_turn_map(unit).heights) {
+    std::string parts;
+    for (const bool there : height.parts) parts += there ? '#' : '.';
+    const double z_m = std::round(100 * height.z_m) / 100 + 0.0;  // without negative zero
+    lines.push_back(fmt::format("  height {:5.2f} m  [{}]  {} captures over {:.0f} degrees", z_m,
+                                parts, height.captures, deg_from_rad(height.arc_rad)));
+    const std::string missing = missing_angles(height);
+    if (!missing.empty()) lines.push_back("    missing, degrees from the first:" + missing);
+  }
+  return lines;
+}
+
+/// Returns a line with the lamps that the captures of a step contain, and the missing ones.
+std::string describe_lamps(const Unit& unit, const UnitStep& step) {
+  std::map<int, int> seen;
+  for (const UnitImage* image : used_images(step)) {
+    for (const Detection& lamp : collect_lamps(image->seen)) ++seen[lamp.lamp];
+  }
+  std::string there, missing;
+  for (const Lamp& lamp : unit.config().lamps.lamps) {
+    (seen.contains(lamp.id) ? there : missing) += fmt::format(" {}", lamp.id);
+  }
+  return "  lamps seen:" + (there.empty() ? " none" : there) +
+         (missing.empty() ? "" : "   not yet:" + missing);
 }
 
 }  // namespace
@@ -69,10 +137,8 @@ std::string describe_next_action(const Unit& unit, StationStep step) {
       return "show " + recommend_next_view(compute_coverage(unit));
     case StationStep::rotation: {
       const TurnMap turn = compute_unit_turn_map(unit);
-      for (const TurnMap::Height& height : turn.heights) {
-        const bool is_complete = height.captures >= unit.config().sufficient.turn_captures &&
-                                 height.arc_rad >= unit.config().sufficient.turn_arc_rad;
-        if (!is_complete) return "turn the camera on its spot to the next missing angle";
+      if (!std::ranges::all_of(turn.heights, &TurnMap::Height::is_complete)) {
+        return "turn the camera on its spot to the next missing angle";
       }
       return turn.heights.empty() ? "take captures on one spot, turning the camera once around"
                                   : "move the camera to the next height and turn it once around";
@@ -83,68 +149,6 @@ std::string describe_next_action(const Unit& unit, StationStep step) {
       return "take captures at the known points";
   }
   return "";
-}
-
-std::vector<std::string> draw_board_map(const Unit& unit) {
-  const ImageCoverage coverage =
-      board_coverage(unit.step(StationStep::boards), unit.config().type.imager_px);
-  constexpr int many = 20;
-  std::vector<std::string> lines;
-  const std::string edge = "  +-----------------+";
-  lines.push_back(edge);
-  for (int row = 0; row < ImageCoverage::kRows; ++row) {
-    std::string line = "  |";
-    for (int col = 0; col < ImageCoverage::kCols; ++col) {
-      const int corners = coverage.corners(col, row);
-      line += corners == 0 ? " ." : corners < many ? " +" : " #";
-    }
-    lines.push_back(line + " |");
-  }
-  lines.push_back(edge);
-  lines[1] += fmt::format("   {:.0f} % of the image have corners, {:.0f} % wanted",
-                          100 * coverage.fraction(), 100 * unit.config().sufficient.board_coverage);
-  lines[3] += "   # many corners   + some   . none";
-  const UnitStep& boards = unit.step(StationStep::boards);
-  const auto last = boards.images.find(boards.last);
-  if (last == boards.images.end() || !last->second.seen.board) return lines;
-  if (const auto mtf50 = compute_view_mtf50(last->second.seen.board->seen)) {
-    lines[5] += fmt::format("   sharpness of the last image: MTF50 {:.3f} cycles/px", *mtf50);
-  }
-  return lines;
-}
-
-TurnMap compute_unit_turn_map(const Unit& unit) {
-  const auto& lens = unit.step(StationStep::boards).result;
-  if (!lens || !lens->ok()) return {};
-  return compute_turn_map(collect_frames(unit.step(StationStep::rotation)), unit.config(),
-                          lens->calibration);
-}
-
-std::vector<std::string> describe_turn(const Unit& unit) {
-  std::vector<std::string> lines;
-  for (const TurnMap::Height& height : compute_unit_turn_map(unit).heights) {
-    std::string parts;
-    for (const bool there : height.parts) parts += there ? '#' : '.';
-    const double z_m = std::round(100 * height.z_m) / 100 + 0.0;  // without negative zero
-    lines.push_back(fmt::format("  height {:5.2f} m  [{}]  {} captures over {:.0f} degrees", z_m,
-                                parts, height.captures, deg_from_rad(height.arc_rad)));
-    const std::string missing = missing_angles(height);
-    if (!missing.empty()) lines.push_back("    missing, degrees from the first:" + missing);
-  }
-  return lines;
-}
-
-std::string describe_lamps(const Unit& unit, const UnitStep& step) {
-  std::map<int, int> seen;
-  for (const UnitImage* image : used_images(step)) {
-    for (const Detection& lamp : collect_lamps(image->seen)) ++seen[lamp.lamp];
-  }
-  std::string there, missing;
-  for (const Lamp& lamp : unit.config().lamps.lamps) {
-    (seen.contains(lamp.id) ? there : missing) += fmt::format(" {}", lamp.id);
-  }
-  return "  lamps seen:" + (there.empty() ? " none" : there) +
-         (missing.empty() ? "" : "   not yet:" + missing);
 }
 
 }  // namespace vlp

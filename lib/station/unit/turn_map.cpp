@@ -35,8 +35,7 @@ std::vector<LocatedFrame> locate_frames(const std::vector<Frame>& frames,
     const auto& pose = fix.estimate.pose;
     located.push_back({pose.position_m.z(), ceiling_m - pose.position_m.z(), pose.yaw_rad, i});
   }
-  std::sort(located.begin(), located.end(),
-            [](const LocatedFrame& a, const LocatedFrame& b) { return a.z_m < b.z_m; });
+  std::ranges::sort(located, {}, &LocatedFrame::z_m);
   return located;
 }
 
@@ -55,9 +54,7 @@ TurnMap compute_turn_map(const std::vector<Frame>& frames, const StationConfig& 
       ++end;
     }
     const std::span<const LocatedFrame> at_height(located.data() + begin, end - begin);
-    const LocatedFrame& first = *std::min_element(
-        at_height.begin(), at_height.end(),
-        [](const LocatedFrame& a, const LocatedFrame& b) { return a.number < b.number; });
+    const LocatedFrame& first = *std::ranges::min_element(at_height, {}, &LocatedFrame::number);
     std::vector<double> yaws_rad;
     for (const LocatedFrame& located_frame : at_height) {
       yaws_rad.push_back(located_frame.yaw_rad);
@@ -68,14 +65,12 @@ TurnMap compute_turn_map(const std::vector<Frame>& frames, const StationConfig& 
     }
     height.captures = static_cast<int>(yaws_rad.size());
     height.arc_rad = compute_angular_range(yaws_rad);
+    height.is_complete = height.captures >= config.sufficient.turn_captures &&
+                         height.arc_rad >= config.sufficient.turn_arc_rad;
     map.heights.push_back(std::move(height));
   }
-  const auto num_complete =
-      std::count_if(map.heights.begin(), map.heights.end(), [&](const auto& h) {
-        return h.captures >= config.sufficient.turn_captures &&
-               h.arc_rad >= config.sufficient.turn_arc_rad;
-      });
-  map.sufficient = num_complete >= config.sufficient.turn_heights;
+  map.sufficient = std::ranges::count_if(map.heights, &TurnMap::Height::is_complete) >=
+                   config.sufficient.turn_heights;
   return map;
 }
 

@@ -20,6 +20,8 @@ struct TurnMap {
     /// Cells of the rotation with a capture: `turn_captures` equal cells, starting at the yaw of
     /// the first capture.
     std::vector<bool> parts;
+    /// True if captures and angular range meet the station's criteria.
+    bool is_complete = false;
   };
   /// Heights, in increasing order.
   std::vector<Height> heights;

@@ -344,8 +344,7 @@ std::vector<Observation> lamp_observations(const Unit& unit) {
   std::vector<Observation> images;
   for (const StationStep step : kStationSteps) {
     if (step == StationStep::boards) continue;
-    Observations seen = collect_observations(unit.step(step));
-    std::move(seen.images.begin(), seen.images.end(), std::back_inserter(images));
+    std::ranges::move(collect_observations(unit.step(step)).images, std::back_inserter(images));
   }
   return images;
 }

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <iterator>
+#include <ranges>
 #include <string>
 #include <utility>
 #include <vector>
@@ -51,9 +52,9 @@ RejectionSummary summarize_refusals(const UnitStep& state, const StationConfig& 
     rejected.back().rejection = image.seen.rejection;
   }
   if (rejected.empty() || std::cmp_less(rejected.size(), state.used())) return {};
-  const auto blurred = std::count_if(
-      rejected.begin(), rejected.end(),
-      [](const Observation& image) { return image.rejection->reason == RejectionReason::blurred; });
+  const auto blurred = std::ranges::count_if(rejected, [](const Observation& image) {
+    return image.rejection->reason == RejectionReason::blurred;
+  });
   return {fmt::format("{} of {} images refused: {}", rejected.size(), state.images.size(),
                       summarize_rejections(rejected)),
           2 * blurred > std::ssize(rejected) && blurred >= min_images_to_blame(config)};
@@ -114,8 +115,8 @@ std::vector<Cause> find_step_causes(const Unit& unit, StationStep step,
 
 /// Returns true if most of the board images show another board.
 bool is_other_board(const UnitStep& boards) {
-  const auto other = std::count_if(boards.images.begin(), boards.images.end(), [](const auto& i) {
-    return i.second.seen.board && !i.second.seen.board->seen.foreign.empty();
+  const auto other = std::ranges::count_if(std::views::values(boards.images), [](const auto& i) {
+    return i.seen.board && !i.seen.board->seen.foreign.empty();
   });
   return 2 * other > static_cast<std::ptrdiff_t>(boards.images.size());
 }
@@ -123,8 +124,8 @@ bool is_other_board(const UnitStep& boards) {
 /// Returns true if there are enough views to distinguish blur from a shaky hand.
 bool is_blur_known(const UnitStep& boards, const StationConfig& config) {
   return boards.sufficient ||
-         std::count_if(boards.images.begin(), boards.images.end(), [](const auto& image) {
-           return image.second.seen.blur_px.has_value();
+         std::ranges::count_if(std::views::values(boards.images), [](const UnitImage& image) {
+           return image.seen.blur_px.has_value();
          }) >= min_images_to_blame(config);
 }
 

@@ -3,6 +3,7 @@
 #include "station/unit/unit_step.h"
 
 #include <algorithm>
+#include <ranges>
 #include <utility>
 
 #include "captures/digest.h"
@@ -24,8 +25,7 @@ UnitImage observe_unit_image(const std::filesystem::path& file,
 }
 
 int UnitStep::used() const {
-  return static_cast<int>(std::count_if(images.begin(), images.end(),
-                                        [](const auto& image) { return image.second.is_used(); }));
+  return static_cast<int>(std::ranges::count_if(std::views::values(images), &UnitImage::is_used));
 }
 
 Observations collect_observations(const UnitStep& step) {

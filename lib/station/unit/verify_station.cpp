@@ -25,25 +25,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Observes the images of a folder and rejects the repeated ones.
-UnitStep observe_folder(const fs::path& folder, int threads, ImageUse use,
-                        const FrontendOptions& options,
-                        const std::function<Observation(const SourceImage&)>& observe) {
-  const auto files = list_images(folder);
-  std::vector<UnitImage> images(files.size());
-  images_in_parallel(files.size(), threads,
-                     [&](std::size_t i) { images[i] = observe_unit_image(files[i], observe); });
-  UnitStep step;
-  step.folder = folder;
-  Selection selection(use, options);
-  for (UnitImage& image : images) {
-    selection.add(image.seen);
-    std::string name = image.seen.name();
-    step.images.emplace(std::move(name), std::move(image));
-  }
-  return step;
-}
-
 class Verification {
  public:
   Verification(const StationConfig& config, const fs::path& folder, int threads)
@@ -53,8 +34,7 @@ class Verification {
 
   void boards() {
     const BoardIntake intake(config_.board, config_.frontend, config_.type.imager_px);
-    UnitStep step = observe_folder(folder_ / "boards", threads_, ImageUse::boards, config_.frontend,
-                                   [&](const SourceImage& image) { return intake.observe(image); });
+    const UnitStep step = observe_folder(folder_ / "boards", ImageUse::boards, intake);
     if (step.used() > 0)
       add("boards", solve_boards(config_, golden_.camera_id, collect_observations(step)));
     add_images(StationStep::boards, step);
@@ -66,10 +46,8 @@ class Verification {
         LightDetector(config_.lamps, make_detector_camera(golden_.calibration)), ImageUse::places,
         config_.frontend, config_.type.imager_px,
         compute_level_rotations(read_captures_of_folder(folder), golden_.calibration, 0));
-    UnitStep step = observe_folder(folder, threads_, ImageUse::places, config_.frontend,
-                                   [&](const SourceImage& image) { return intake.observe(image); });
-    Observations seen = collect_observations(step);
-    std::move(seen.images.begin(), seen.images.end(), std::back_inserter(lamp_images_));
+    const UnitStep step = observe_folder(folder, ImageUse::places, intake);
+    std::ranges::move(collect_observations(step).images, std::back_inserter(lamp_images_));
     const auto frames = collect_frames(step);
     frames_.insert(frames_.end(), frames.begin(), frames.end());
     const auto places = read_captures_with_truth(step.folder);
@@ -137,6 +115,25 @@ class Verification {
     return causes;
   }
 
+  /// Observes the images of a folder and rejects the repeated ones.
+  template <typename Intake>
+  UnitStep observe_folder(const fs::path& folder, ImageUse use, const Intake& intake) const {
+    const auto files = list_images(folder);
+    std::vector<UnitImage> images(files.size());
+    images_in_parallel(files.size(), threads_, [&](std::size_t i) {
+      images[i] = observe_unit_image(
+          files[i], [&](const SourceImage& image) { return intake.observe(image); });
+    });
+    UnitStep step;
+    step.folder = folder;
+    Selection selection(use, config_.frontend);
+    for (UnitImage& image : images) {
+      selection.add(image.seen);
+      std::string name = image.seen.name();
+      step.images.emplace(std::move(name), std::move(image));
+    }
+    return step;
+  }
   void add(const char* step, const StepResult& result) {
     if (!result.ok()) {
       const bool is_station_fault =
