@@ -47,11 +47,9 @@ std::unique_ptr<KnownRuns> open_runs(const StationRecordsOptions& options) {
     if (options.station.empty()) return std::make_unique<KnownRuns>(options.records);
     auto known = std::make_unique<KnownRuns>(read_station(options.station));
     const std::string state = known->spool()->state();
-    if (state.empty()) return known;
-    if (known->are_offline()) {
-      spdlog::debug("{}", printable(state));
-    } else {
-      spdlog::warn("{}", printable(state));
+    if (!state.empty()) {
+      spdlog::log(known->are_offline() ? spdlog::level::debug : spdlog::level::warn, "{}",
+                  printable(state));
     }
     return known;
   } catch (const RecordsUnavailable& error) {

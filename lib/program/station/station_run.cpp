@@ -52,25 +52,17 @@ std::string spool_notice(Spool& spool) {
   return notice;
 }
 
-/// Log of the arrived images, line by line, for use without a terminal.
-class Log {
- public:
-  explicit Log(bool quiet) : quiet_(quiet) {}
-
-  void report(const Unit& unit, const std::vector<WatchedRun::Arrival>& arrivals) {
-    if (quiet_) return;
-    for (const auto& [step, image, gone] : arrivals) {
-      if (!gone) spdlog::info("{}", make_last_image_line(unit, step, image));
-    }
-    for (; done_ < kStationSteps.size() && unit.step(kStationSteps[done_]).done(); ++done_) {
-      spdlog::info("{} is done", to_string(kStationSteps[done_]));
-    }
+/// Logs the arrived images and the completed steps, for use without a terminal. `num_done` is the
+/// number of steps that were logged as completed.
+void log_arrivals(const Unit& unit, const std::vector<WatchedRun::Arrival>& arrivals,
+                  std::size_t& num_done) {
+  for (const auto& [step, image, gone] : arrivals) {
+    if (!gone) spdlog::info("{}", make_last_image_line(unit, step, image));
   }
-
- private:
-  bool quiet_;
-  std::size_t done_ = 0;  // number of steps reported as done
-};
+  for (; num_done < kStationSteps.size() && unit.step(kStationSteps[num_done]).done(); ++num_done) {
+    spdlog::info("{} is done", to_string(kStationSteps[num_done]));
+  }
+}
 
 /// Returns true if an image arrived. Of the frames of a source, only used ones are considered.
 bool has_arrived(const Unit& unit, const std::vector<WatchedRun::Arrival>& arrivals,
@@ -100,7 +92,7 @@ void guide_unit(const StationRunOptions& options, Unit& unit, WatchedRun& watche
   using Clock = std::chrono::steady_clock;
   constexpr int poll_interval_ms = 50;
   Clock::time_point last = Clock::now();
-  Log log(terminal.interactive());
+  std::size_t num_done = 0;
   bool changed = true, has_begun = false;
   while (unit.current() && !unit.is_hopeless()) {
     const auto arrivals = watched.poll_changes(static_cast<std::size_t>(options.threads));
@@ -108,7 +100,7 @@ void guide_unit(const StationRunOptions& options, Unit& unit, WatchedRun& watche
       has_begun = true;
       check_golden_unit(unit, terminal);
     }
-    log.report(unit, arrivals);
+    if (!terminal.interactive()) log_arrivals(unit, arrivals, num_done);
     changed = changed || !arrivals.empty();
     if (changed && terminal.interactive()) {
       auto lines = make_station_screen(unit);
@@ -141,9 +133,11 @@ void guide_unit(const StationRunOptions& options, Unit& unit, WatchedRun& watche
 
 /// Stores the run in the spool, prints the verdict, writes the files, delivers to the records,
 /// which may be unavailable, and calls the hook.
-void finish_run(RunRecord measured, const std::vector<ReportPlot>& pictures, Spool& spool,
-                const StationConfig& config, Terminal& terminal,
-                const std::function<void()>& mark_stored, const std::function<void()>& move_away) {
+void finish_run(
+    RunRecord measured, const std::vector<ReportPlot>& pictures, Spool& spool,
+    const StationConfig& config, Terminal& terminal,
+    const std::function<void()>& mark_stored = [] {},
+    const std::function<void()>& move_away = [] {}) {
   RunRecord record = printable_run(std::move(measured));  // in the form of the records
   auto lines = make_verdict_screen(record);
   std::optional<HookLock> lock;
@@ -266,8 +260,7 @@ RunRecord run_batch(const StationRunOptions& options, const StationConfig& confi
   unit.advance(true);
   RunRecord record = make_final_record(unit, run, options, spool);
   Terminal terminal;
-  finish_run(
-      record, unit.pictures(), spool, config, terminal, [] {}, [] {});
+  finish_run(record, unit.pictures(), spool, config, terminal);
   return record;
 }
 

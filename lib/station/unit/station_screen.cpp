@@ -36,6 +36,13 @@ void add_wrapped(std::vector<ScreenLine>& lines, const std::string& label, const
   lines.push_back({line.substr(0, kColumns), tone});
 }
 
+/// Returns a problem as lines; no line if it is empty.
+std::vector<ScreenLine> make_problem_lines(const std::string& label, const std::string& problem) {
+  std::vector<ScreenLine> lines;
+  if (!problem.empty()) add_wrapped(lines, label, problem, Tone::bad);
+  return lines;
+}
+
 std::string describe_outcome(const UnitImage& image) {
   return image.is_used() ? "taken" : "refused: " + image.refusal();
 }
@@ -148,17 +155,13 @@ std::string make_last_image_line(const Unit& unit, StationStep step, const std::
 }
 
 std::vector<ScreenLine> make_spool_lines(const std::string& notice) {
-  std::vector<ScreenLine> lines;
-  if (!notice.empty()) add_wrapped(lines, "Records", printable(notice), Tone::bad);
-  return lines;
+  return make_problem_lines("Records", printable(notice));
 }
 
 std::vector<ScreenLine> make_hook_lines(const RunRecord& record) {
-  std::vector<ScreenLine> lines;
   const std::string problem = hook_problem(record);
-  if (problem.empty()) return lines;
-  add_wrapped(lines, "Hook", problem + "; 'vlp-station hook' runs it again", Tone::bad);
-  return lines;
+  return make_problem_lines("Hook",
+                            problem.empty() ? "" : problem + "; 'vlp-station hook' runs it again");
 }
 
 std::vector<ScreenLine> make_verdict_screen(const RunRecord& record) {

@@ -125,8 +125,6 @@ bool Unit::is_hopeless() const {
          !describe_missing_lamps(frames, config_.lamps).empty();
 }
 
-namespace fs = std::filesystem;
-
 void Unit::add(StationStep step, const std::vector<fs::path>& files, bool more_to_come) {
   UnitStep& state = at(step);
   if (files.empty()) return;
