@@ -1,10 +1,11 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
 #include "station/unit/step_sources.h"
-#include "codecs/codecs.h"
-#include "rig/input_error.h"
 
 #include <fmt/core.h>
+
+#include "codecs/codecs.h"
+#include "rig/input_error.h"
 
 namespace vlp {
 

@@ -11,6 +11,7 @@
 #include "rig/input_error.h"
 
 namespace vlp {
+
 UnitImage observe_unit_image(const std::filesystem::path& file,
                              const std::function<Observation(const SourceImage&)>& observe) {
   UnitImage image;

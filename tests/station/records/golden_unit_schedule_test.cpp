@@ -5,7 +5,6 @@
 #include <gmock/gmock.h>
 #include <sys/resource.h>
 
-#include <gtest/gtest.h>
 #include <csignal>
 #include <set>
 
@@ -14,6 +13,8 @@
 
 namespace vlp {
 namespace {
+
+namespace fs = std::filesystem;
 
 using testing::HasSubstr;
 using testing::StartsWith;
@@ -205,8 +206,6 @@ TEST_F(GoldenProblem, ReturnsEmptyWithoutVerifyDue) {
   EXPECT_EQ(problem(), "");
   EXPECT_FALSE(std::filesystem::exists(config.spool));
 }
-
-namespace fs = std::filesystem;
 
 /// The station in datasets/station, with a golden unit.
 class MeasuringDigest : public testing::Test {

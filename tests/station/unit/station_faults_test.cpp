@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "station/unit/station_faults.h"
 
+#include <fmt/core.h>
 #include <gmock/gmock.h>
 
-#include <fmt/core.h>
 #include <Eigen/Geometry>
 #include <cmath>
 #include <span>
@@ -16,9 +16,11 @@
 namespace vlp {
 namespace {
 
+using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::StartsWith;
 
 struct LampFaults : ExampleRig {};
 
@@ -174,9 +176,6 @@ TEST_F(PlaceFault, FindCommonOffsetReturnsFrame) {
               HasSubstr("in one direction of the room (x -30.3 mm, y +0.0 mm): the known points"));
   EXPECT_FALSE(find_common_offset(frames, map, calibration, scattered));
 }
-
-using testing::AllOf;
-using testing::StartsWith;
 
 struct LensFault : ExampleRig {};
 

@@ -13,7 +13,10 @@ namespace vlp {
 namespace {
 
 namespace fs = std::filesystem;
+
+using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::IsEmpty;
 
 /// A run of a unit whose captures others can write to.
 class WatchedRunTest : public testing::Test {
@@ -75,9 +78,6 @@ TEST_F(WatchedRunTest, PutsAwayItsOwnFolderOnly) {
   again.move_away();
   EXPECT_TRUE(fs::exists(folder / ("captures/0001." + again.run())));
 }
-
-using testing::ElementsAre;
-using testing::IsEmpty;
 
 std::vector<std::string> names(const std::vector<std::filesystem::path>& files) {
   std::vector<std::string> all;
