@@ -171,6 +171,12 @@ void YamlMap::check_renamed(std::string_view key) const {
   }
 }
 
+std::optional<double> YamlMap::optional_number(const std::string& key, double min, double max,
+                                               std::string_view unit) {
+  const auto value = optional(key);
+  return value ? std::optional(value->number_within(min, max, unit)) : std::nullopt;
+}
+
 YamlValue YamlMap::required(const std::string& key) {
   if (auto value = optional(key)) return *value;
   std::string names;
@@ -281,6 +287,13 @@ std::vector<double> YamlValue::numbers(std::size_t count) const {
     throw error("should be " + std::to_string(count) + " numbers, not " +
                 std::to_string(values.size()));
   }
+  return values;
+}
+
+std::vector<double> YamlValue::numbers_within(std::size_t count, double min, double max,
+                                              std::string_view unit) const {
+  std::vector<double> values = numbers(count);
+  for (const YamlValue& item : list()) item.number_within(min, max, unit);
   return values;
 }
 

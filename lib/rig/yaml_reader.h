@@ -48,10 +48,18 @@ class YamlValue {
   int integer_within(int min, int max) const;
   bool boolean() const;
   std::string text() const;
-  /// Returns exactly `count` numbers.
+  /// Returns exactly `count` numbers. numbers_within() checks them as number_within().
   std::vector<double> numbers(std::size_t count) const;
+  std::vector<double> numbers_within(std::size_t count, double min, double max,
+                                     std::string_view unit) const;
   std::vector<YamlValue> list() const;
   YamlMap map() const;
+  /// Returns what `read`, a function of a YamlMap&, makes of a mapping; it reads all valid keys.
+  template <typename Read>
+  auto read_map(const Read& read) const;
+  /// Returns what `read` makes of each item of a list of mappings.
+  template <typename Read>
+  auto read_maps(const Read& read) const;
 
   InputError error(const std::string& problem) const;
   /// Returns the error for a word that is not among the valid ones, `known`.
@@ -73,6 +81,20 @@ class YamlMap {
   bool has(const std::string& key) const;
   YamlValue required(const std::string& key);
   std::optional<YamlValue> optional(const std::string& key);
+  /// Return std::nullopt without the key, otherwise YamlValue::number_within() or read_map().
+  std::optional<double> optional_number(const std::string& key, double min, double max,
+                                        std::string_view unit);
+  template <typename Read>
+  auto optional_map(const std::string& key, const Read& read) {
+    const auto value = optional(key);
+    return value ? std::optional(value->read_map(read)) : std::nullopt;
+  }
+  /// Returns YamlValue::read_maps(); an empty list without the key.
+  template <typename Read>
+  auto optional_maps(const std::string& key, const Read& read) {
+    const auto value = optional(key);
+    return value ? value->read_maps(read) : decltype(value->read_maps(read))();
+  }
   /// Throws InputError for the first key that was not read.
   void finish() const;
 
@@ -94,6 +116,21 @@ class YamlMap {
   std::vector<Entry> entries_;
   std::vector<std::string> known_;
 };
+
+template <typename Read>
+auto YamlValue::read_map(const Read& read) const {
+  YamlMap keys = map();
+  auto result = read(keys);
+  keys.finish();
+  return result;
+}
+
+template <typename Read>
+auto YamlValue::read_maps(const Read& read) const {
+  std::vector<decltype(read_map(read))> results;
+  for (const YamlValue& item : list()) results.push_back(item.read_map(read));
+  return results;
+}
 
 /// Parses the text of a YAML file, which may be other than a mapping, by yaml-cpp. Throws
 /// InputError as read_yaml().

@@ -3,6 +3,7 @@
 #include "simulation/board_pdf.h"
 
 #include <cairo-pdf.h>
+#include <fmt/core.h>
 
 #include <cmath>
 #include <memory>
@@ -10,7 +11,7 @@
 
 #include "rig/board_layout.h"
 #include "rig/yaml_text.h"
-#include "simulation/board_pattern.h"
+#include "simulation/board_print.h"
 
 namespace vlp {
 namespace {
@@ -49,8 +50,8 @@ std::optional<Eigen::Vector2d> find_sheet_m(const Board& board, const PageSize& 
 
 /// Draws all black areas as one path, which avoids seams between neighboring bits.
 void draw_board(cairo_t* context, const Board& board) {
-  for (const PrintedRectangle& part : make_board_pattern(board)) {
-    if (part.white) continue;
+  for (const Rectangle& part : make_board_pattern(board, {1, 0})) {
+    if (part.value > 0) continue;
     cairo_rectangle(context, part.left_m, part.top_m, part.right_m - part.left_m,
                     part.bottom_m - part.top_m);
   }
@@ -62,28 +63,19 @@ std::string format_mm(double length_m) {
   return shortest(std::round(length_m * um_per_m) / um_per_mm) + " mm";
 }
 
-std::string describe_square_parameters(const Board& board) {
-  const bool charuco = board.kind == BoardKind::charuco;
-  std::string text = charuco ? "ChArUco, " : "chessboard, ";
-  text.append(std::to_string(board.cols)).append(" x ").append(std::to_string(board.rows));
-  text.append(" squares of ").append(format_mm(board.square_size_m));
-  if (!charuco) return text;
-  text.append(", markers of ")
-      .append(format_mm(board.tag_size_m))
-      .append(", ")
-      .append(board.family);
-  return text.append(" from id ").append(std::to_string(board.first_id));
-}
-
 std::string describe_parameters(const Board& board) {
-  if (board.has_squares()) return describe_square_parameters(board);
-  std::string text = board.family + ", ";
-  text.append(std::to_string(board.cols)).append(" x ").append(std::to_string(board.rows));
-  text.append(" tags of ").append(format_mm(board.tag_size_m)).append(", gap ");
-  text.append(format_mm(board.tag_size_m * board.tag_spacing)).append(", ids from ");
-  text.append(std::to_string(board.first_id)).append(", ").append(to_string(board.id_order));
-  if (board.border_bits == 2) text += ", Kalibr AprilGrid";
-  return text;
+  if (board.kind == BoardKind::apriltags) {
+    return fmt::format("{}, {} x {} tags of {}, gap {}, ids from {}, {}{}", board.family,
+                       board.cols, board.rows, format_mm(board.tag_size_m),
+                       format_mm(board.tag_size_m * board.tag_spacing), board.first_id,
+                       to_string(board.id_order),
+                       board.border_bits == 2 ? ", Kalibr AprilGrid" : "");
+  }
+  const std::string squares =
+      fmt::format("{} x {} squares of {}", board.cols, board.rows, format_mm(board.square_size_m));
+  if (board.kind == BoardKind::chessboard) return "chessboard, " + squares;
+  return fmt::format("ChArUco, {}, markers of {}, {} from id {}", squares,
+                     format_mm(board.tag_size_m), board.family, board.first_id);
 }
 
 void draw_footer(cairo_t* context, const Board& board) {

@@ -3,11 +3,52 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
+#include <string>
+#include <vector>
 
-#include "simulation/mosaic.h"
+#include "rig/board.h"
 #include "simulation/scene.h"
+#include "simulation/shapes.h"
 
 namespace vlp {
+
+/// Printed bits of one AprilTag, in the orientation in which libapriltag renders it.
+struct TagPattern {
+  /// Number of bits along an edge of the black border's square, which is tag_size_m wide.
+  int border_width;
+  /// Number of bits outside that square on each side (families whose border is white inside).
+  int outside;
+  /// Bits row by row from the top left, width() along an edge; true is white.
+  std::vector<bool> white;
+
+  int width() const { return border_width + 2 * outside; }
+  std::size_t index(int column, int row) const {
+    return static_cast<std::size_t>(row) * static_cast<std::size_t>(width()) +
+           static_cast<std::size_t>(column);
+  }
+};
+
+/// Returns the pattern of a tag.
+/// @throws std::invalid_argument if the family has no such id, or if border_bits is 2 for a family
+/// without a plain black border
+TagPattern make_tag_pattern(const std::string& family, int id, int border_bits);
+
+/// Values of white and black areas.
+struct Ink {
+  double white, black;
+};
+
+/// Returns the rectangles printed on white paper, in the board frame (board_layout.h) and in
+/// printing order: later rectangles cover earlier ones.
+/// @throws std::invalid_argument if the family lacks an id, or if the gaps are too small for the
+/// family
+std::vector<Rectangle> make_board_pattern(const Board& board, const Ink& ink);
+
+/// Returns the distance from the edge of the tag field (tag_field_m()) to the outermost printed
+/// edge, m. Corner squares and the outer squares of chessboards extend beyond the field; otherwise
+/// 0.
+double printed_border_m(const Board& board);
 
 /// Deflection of a warped board along z of the board frame (SceneBoard::warp_m).
 class BoardWarp {

@@ -1,6 +1,8 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
+
 #include <algorithm>
+#include <cmath>
 
 #include "geometry/angles.h"
 #include "simulation/scene_parts.h"
@@ -8,18 +10,104 @@
 namespace vlp {
 namespace {
 
+/// Largest number of captures of one folder.
+constexpr int kMaxCaptures = 1'000'000;
+
+/// Rejects more than kMaxCaptures captures. `where` provides error() for the message.
+template <typename Place>
+void check_count(double captures, const Place& where) {
+  if (captures <= kMaxCaptures) return;
+  throw where.error("makes more than " + std::to_string(kMaxCaptures) + " captures");
+}
+
 /// Rejects a height at which a light would not be above the camera.
 void check_height(const YamlValue& item, double height_m, const Scene& scene) {
   const auto check = [&](const Glow& glow, const std::string& name) {
     if (glow.position_m.z() <= height_m + 1e-3) throw item.error(name + " is not above the camera");
   };
+  const Clutter& clutter = scene.clutter;
   for (const SceneLamp& lamp : scene.lamps) check(lamp.glow, "lamp " + std::to_string(lamp.id));
-  for (const Glow& lamp : scene.clutter.steady_lamps) check(lamp, "a steady lamp");
-  for (const Reflection& reflection : scene.clutter.reflections) {
-    check(reflection.glow, "a reflection");
+  for (const Glow& lamp : clutter.steady_lamps) check(lamp, "a steady lamp");
+  for (const Reflection& reflection : clutter.reflections) check(reflection.glow, "a reflection");
+  for (const ForeignLight& light : clutter.foreign_lights) check(light.glow, "a foreign light");
+}
+
+/// Rejects a spot that does not leave space in the room for a rotation of the camera about it.
+void check_spot(const Eigen::Vector2d& spot_m, const Room& room, double lever_arm_m,
+                const YamlValue& value) {
+  const Eigen::Array2d spot = spot_m.array();
+  const bool inside = (spot - lever_arm_m >= room.min_m.head<2>().array()).all() &&
+                      (spot + lever_arm_m <= room.max_m.head<2>().array()).all();
+  if (!inside) throw value.error("takes the camera outside the room");
+}
+
+Eigen::Vector2d read_spot(const YamlValue& value, const Room& room, double lever_arm_m) {
+  const Eigen::Vector2d spot_m(value.numbers(2).data());
+  check_spot(spot_m, room, lever_arm_m, value);
+  return spot_m;
+}
+
+std::vector<Eigen::Vector2d> read_grid(const YamlValue& value, const Room& room,
+                                       double lever_arm_m) {
+  YamlMap map = value.map();
+  const auto x = map.required("x_m").numbers(2), y = map.required("y_m").numbers(2);
+  const int columns = map.required("columns").integer_within(2, 1000);
+  const int rows = map.required("rows").integer_within(2, 1000);
+  map.finish();
+  for (const std::size_t end : {0U, 1U}) check_spot({x[end], y[end]}, room, lever_arm_m, value);
+  std::vector<Eigen::Vector2d> spots;
+  for (int row = 0; row < rows; ++row) {
+    for (int column = 0; column < columns; ++column) {
+      spots.emplace_back(x[0] + (x[1] - x[0]) * column / (columns - 1),
+                         y[0] + (y[1] - y[0]) * row / (rows - 1));
+    }
   }
-  for (const ForeignLight& light : scene.clutter.foreign_lights) {
-    check(light.glow, "a foreign light");
+  return spots;
+}
+
+StraightDrive read_drive(const YamlValue& value, const Room& room, double lever_arm_m) {
+  const StraightDrive drive = value.read_map([&](YamlMap& map) {
+    return StraightDrive{read_spot(map.required("from_m"), room, lever_arm_m),
+                         read_spot(map.required("to_m"), room, lever_arm_m),
+                         map.required("speed_m_per_s").number_within(1e-6, 20, "m/s")};
+  });
+  if (drive.from_m == drive.to_m) throw value.error("has no length");
+  return drive;
+}
+
+std::vector<Eigen::Vector2d> compute_positions_along(const StraightDrive& drive, double interval_s,
+                                                     const YamlValue& value) {
+  const Eigen::Vector2d displacement = drive.to_m - drive.from_m;
+  const double step_m = drive.speed_m_per_s * interval_s;
+  constexpr double rounding = 1e-12;
+  const double steps = std::floor(displacement.norm() / step_m * (1 + rounding));
+  check_count(steps + 1, value);
+  std::vector<Eigen::Vector2d> places;
+  for (int i = 0; i <= steps; ++i) {
+    places.push_back(drive.from_m + displacement.normalized() * (step_m * i));
+  }
+  return places;
+}
+
+/// Reads the position of the rotation axis at each capture: spots, a grid or a drive, all inside
+/// the room.
+void read_places(YamlMap& map, const Scene& scene, const Room& room, LampShots& captures) {
+  const double lever_arm_m = scene.mount.lever_arm_m.norm();
+  const auto spots = map.optional("spots_m"), grid = map.optional("grid");
+  const auto drive = map.optional("drive");
+  if (spots.has_value() + grid.has_value() + drive.has_value() != 1) {
+    throw map.error("needs one of the keys spots_m, grid, drive, views");
+  }
+  if (spots) {
+    for (const YamlValue& spot : spots->list()) {
+      captures.spots_m.push_back(read_spot(spot, room, lever_arm_m));
+    }
+    if (captures.spots_m.empty()) throw spots->error("holds no spot");
+  } else if (grid) {
+    captures.spots_m = read_grid(*grid, room, lever_arm_m);
+  } else {
+    captures.drive = read_drive(*drive, room, lever_arm_m);
+    captures.spots_m = compute_positions_along(*captures.drive, captures.interval_s, *drive);
   }
 }
 
@@ -57,23 +145,21 @@ void read_yaws(YamlMap& map, LampShots& captures) {
   for (int i = 0; i < count; ++i) captures.yaws_rad.push_back(rad_from_deg(360.0 * i / count));
 }
 
+Vibration read_vibration(YamlMap& map) {
+  return {rad_from_deg(map.required("amplitude_deg").number_within(0, 10, "degrees")),
+          map.required("frequency_hz").number_within(1e-3, 1000, "Hz")};
+}
+
 void read_roll_pitch(YamlMap map, LampShots& captures) {
   const auto ramp = [&](const std::string& key) {
     const auto value = map.optional(key);
     if (!value) return std::pair(0.0, 0.0);
-    for (const YamlValue& end : value->list()) end.number_within(-85, 85, "degrees");
-    const auto ends = value->numbers(2);
+    const auto ends = value->numbers_within(2, -85, 85, "degrees");
     return std::pair(rad_from_deg(ends[0]), rad_from_deg(ends[1]));
   };
   captures.roll_rad = ramp("roll_deg");
   captures.pitch_rad = ramp("pitch_deg");
-  if (const auto vibration = map.optional("vibration")) {
-    YamlMap keys = vibration->map();
-    captures.vibration = {
-        rad_from_deg(keys.required("amplitude_deg").number_within(0, 10, "degrees")),
-        keys.required("frequency_hz").number_within(1e-3, 1000, "Hz")};
-    keys.finish();
-  }
+  captures.vibration = map.optional_map("vibration", read_vibration).value_or(captures.vibration);
   map.finish();
 }
 
@@ -84,9 +170,8 @@ LampShots read_lamp_captures(YamlMap& map, const Scene& scene, const Room& room)
   read_places(map, scene, room, captures);
   read_heights(map.required("heights_m"), scene, room, captures);
   read_yaws(map, captures);
-  const auto rate = map.optional("turn_rate_deg_per_s");
-  captures.turn_rate_rad_per_s =
-      rate ? rad_from_deg(rate->number_within(-720, 720, "degrees per second")) : 0;
+  captures.turn_rate_rad_per_s = rad_from_deg(
+      map.optional_number("turn_rate_deg_per_s", -720, 720, "degrees per second").value_or(0));
   if (const auto lean = map.optional("roll_pitch")) read_roll_pitch(lean->map(), captures);
   const auto repeat = map.optional("repeat");
   captures.repeat = repeat ? repeat->integer_within(1, kMaxCaptures) : 1;
@@ -101,7 +186,7 @@ LampShots read_lamp_captures(YamlMap& map, const Scene& scene, const Room& room)
   return captures;
 }
 
-BoardViews read_board_views(YamlMap map) {
+BoardViews read_board_views(YamlMap& map) {
   BoardViews views;
   views.count = map.required("count").integer_within(1, kMaxCaptures);
   views.distance_m = read_range(map.required("distance_m"), 1e-3, 100, "m");
@@ -111,10 +196,8 @@ BoardViews read_board_views(YamlMap map) {
       map.required("field_coverage").number_within(0, 1, "(of the way to the image's edge)");
   views.velocity_m_per_s.setZero();
   if (const auto velocity = map.optional("velocity_m_per_s")) {
-    views.velocity_m_per_s = Eigen::Vector3d(velocity->numbers(3).data());
-    for (const YamlValue& part : velocity->list()) part.number_within(-10, 10, "m/s");
+    views.velocity_m_per_s = Eigen::Vector3d(velocity->numbers_within(3, -10, 10, "m/s").data());
   }
-  map.finish();
   return views;
 }
 
@@ -132,17 +215,16 @@ std::string read_folder(const YamlValue& value) {
 
 }  // namespace
 
-CaptureSet read_capture_set(YamlMap map, const Scene& scene, const Room& room) {
+CaptureSet read_capture_set(YamlMap& map, const Scene& scene, const Room& room) {
   CaptureSet set;
   set.folder = read_folder(map.required("folder"));
   set.exposure_s = map.required("exposure_s").number_within(1e-7, 1, "s");
   if (const auto views = map.optional("views")) {
     if (!scene.board) throw map.error("views are of a board, and the scene has none");
-    set.board = read_board_views(views->map());
+    set.board = views->read_map(read_board_views);
   } else {
     set.lamps = read_lamp_captures(map, scene, room);
   }
-  map.finish();
   return set;
 }
 

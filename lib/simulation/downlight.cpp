@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "simulation/disc.h"
+#include "simulation/shapes.h"
 
 namespace vlp {
 namespace {

@@ -4,10 +4,39 @@
 
 #include <cstdint>
 #include <opencv2/core.hpp>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include "simulation/scene.h"
 
 namespace vlp {
+
+/// Returns the white level of the sensor, 255 or 65535.
+double white_dn(const Sensor& sensor);
+
+/// Returns the Bayer filter of a pixel: 0 blue, 1 green, 2 red, as in color images.
+int filter_at(int line, int place);
+
+/// Returns the fraction of a pixel's light that its filter passes, relative to green.
+double filter_transmission(const Bayer& bayer, int line, int place);
+
+/// Demosaics the gray levels behind a mosaic of filters and balances the three colors.
+std::vector<cv::Mat1f> demosaic(const Bayer& bayer, const Sensor& sensor, const cv::Mat1f& levels);
+
+/// Applies the tone curve of Picture to one gray level, DN.
+double apply_tone_curve(const ImageProcessing& picture, const Sensor& sensor, double level_dn);
+
+/// Applies tone curve and sharpening of Picture to gray levels before rounding. Border pixels are
+/// replicated.
+void develop(const ImageProcessing& picture, const Sensor& sensor, cv::Mat1f& levels);
+
+/// Returns the file name extension of the images: ".jpg" or ".png".
+std::string image_extension(const std::optional<ImageProcessing>& picture);
+
+/// Encodes the image as JPEG, or losslessly as PNG.
+std::vector<unsigned char> encode_image(const cv::Mat& image,
+                                        const std::optional<ImageProcessing>& picture);
 
 /// Simulates a sensor (see Sensor) from the mean number of electrons of each pixel.
 ///

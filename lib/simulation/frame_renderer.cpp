@@ -11,12 +11,10 @@
 
 #include "rig/board_layout.h"
 #include "simulation/coverage.h"
-#include "simulation/disc.h"
 #include "simulation/downlight.h"
-#include "simulation/mirror.h"
-#include "simulation/mosaic.h"
 #include "simulation/pixel_window.h"
-#include "simulation/smear.h"
+#include "simulation/scene.h"
+#include "simulation/shapes.h"
 
 namespace vlp {
 

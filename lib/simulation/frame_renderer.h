@@ -9,7 +9,6 @@
 #include "simulation/pixel_rays.h"
 #include "simulation/point_spread.h"
 #include "simulation/shot.h"
-#include "simulation/shutter.h"
 
 namespace vlp {
 

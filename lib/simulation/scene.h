@@ -8,16 +8,101 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <utility>
+#include <variant>
 #include <vector>
 
 #include "geometry/frames.h"
 #include "rig/board.h"
 #include "rig/calibration.h"
 #include "rig/lamp_map.h"
-#include "simulation/capture_set.h"
-#include "simulation/modulation.h"
 
 namespace vlp {
+
+/// Square wave that switches a lamp: lit while frac(frequency t + phase) < duty.
+struct SquareWave {
+  double frequency_hz;
+  double duty;
+  double phase;  // in periods
+
+  /// Returns the lit fraction of the time from begin_s to end_s > begin_s, in closed form.
+  double lit_fraction(double begin_s, double end_s) const;
+};
+
+/// Wave of a light on the mains, as a fraction of its greatest brightness:
+///   1 - depth + depth |sin(pi (frequency t + phase))|
+/// The frequency is that of the light, twice the mains frequency.
+struct RectifiedSine {
+  double frequency_hz;
+  double depth;
+  double phase;  // in periods
+
+  /// Returns the mean over the time from begin_s to end_s > begin_s, in closed form.
+  double lit_fraction(double begin_s, double end_s) const;
+};
+
+using LightWave = std::variant<SquareWave, RectifiedSine>;
+
+/// Returns the wave with another phase, in periods.
+LightWave with_phase(LightWave wave, double phase);
+
+/// Straight drive at constant speed.
+struct StraightDrive {
+  Eigen::Vector2d from_m, to_m;
+  double speed_m_per_s;
+};
+
+/// Sinusoidal vibration of roll and pitch.
+struct Vibration {
+  double amplitude_rad, frequency_hz;
+};
+
+/// Captures of the lamps, on spots or on a drive; the last-named index changes fastest.
+///   On spots: at each height, at each spot, at each yaw, `repeat` captures.
+///   On a drive: at each height, at each yaw, `repeat` passes, with a capture every interval_s.
+struct LampShots {
+  std::vector<double> heights_m;
+  /// Position of the rotation axis in the world; on a drive, at each capture of a pass.
+  std::vector<Eigen::Vector2d> spots_m;
+  std::optional<StraightDrive> drive;
+  std::vector<double> yaws_rad;
+  /// Amplitude of the uniform random error of each yaw.
+  double yaw_jitter_rad;
+  /// Yaw rate during each capture; on a drive also between captures.
+  double turn_rate_rad_per_s;
+  int repeat;
+  /// Time from one capture to the next.
+  double interval_s;
+  /// True if captures.csv contains the exact camera position, as from a fixture that holds the
+  /// camera itself.
+  bool known;
+  /// Roll and pitch of the base at the first and at the last capture, linear in between, and their
+  /// vibration.
+  std::pair<double, double> roll_rad{0, 0}, pitch_rad{0, 0};
+  Vibration vibration{0, 0};
+};
+
+/// Random views of the board from all sides.
+struct BoardViews {
+  int count;
+  /// Minimum and maximum distance from the camera to the board's center.
+  std::pair<double, double> distance_m;
+  /// Largest angle between the board's normal and the line of sight, and largest rotation about the
+  /// normal.
+  double tilt_rad, roll_rad;
+  /// Range of the board's center over the image: 0 for the image center, 1 up to the image edges.
+  double spread;
+  /// Velocity of the board relative to the camera, in the camera frame.
+  Eigen::Vector3d velocity_m_per_s;
+};
+
+/// Captures of one folder, either of the lamps or of the board.
+struct CaptureSet {
+  std::string folder;
+  double exposure_s;
+  std::optional<LampShots> lamps;
+  std::optional<BoardViews> board;
+};
 
 /// Radiances (names that end in _e_per_s) are photoelectrons per second in a pixel on the optical
 /// axis that the source fills.
@@ -350,5 +435,14 @@ Scene read_scene(const std::filesystem::path& file);
 ///
 /// read_scene() calls it. Call it again after a change of the seed or of one of these parts.
 void draw_random_parts(Scene& scene);
+
+/// Returns the reflection about a panel's plane, in the world:
+///   p -> p - 2 n n'(p - corner), with the unit normal n.
+/// It is its own inverse; its linear part has the determinant -1.
+Eigen::Isometry3d reflection_about(const Panel& pane);
+
+/// Returns true if light and eye are on one side of the mirror's plane, so that the mirror may show
+/// the light.
+bool is_before(const Mirror& mirror, const Eigen::Vector3d& light_m, const Eigen::Vector3d& eye_m);
 
 }  // namespace vlp

@@ -1,5 +1,9 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
 #include <tuple>
 
 #include "geometry/angles.h"
@@ -13,7 +17,12 @@ double read_fraction(YamlMap& map, const std::string& key) {
   return map.required(key).number_within(0, 1, "(of the source's radiance)");
 }
 
-Recess read_recess(YamlMap map, const Glow& rim) {
+DarkSide read_dark_side(YamlMap& map) {
+  return {read_fraction(map, "reflector_ratio"),
+          rad_from_deg(map.required("azimuth_deg").number_within(-360, 360, "degrees"))};
+}
+
+Recess read_recess(YamlMap& map, const Glow& rim) {
   Recess recess;
   recess.depth_m = map.required("depth_m").number_within(0, 2, "m");
   const YamlValue source = map.required("source_diameter_m");
@@ -22,27 +31,17 @@ Recess read_recess(YamlMap map, const Glow& rim) {
     throw source.error("is larger than the rim, diameter_m");
   }
   recess.reflector_ratio = read_fraction(map, "reflector_ratio");
-  if (const auto dark = map.optional("dark_side")) {
-    YamlMap keys = dark->map();
-    recess.dark_side =
-        DarkSide{read_fraction(keys, "reflector_ratio"),
-                 rad_from_deg(keys.required("azimuth_deg").number_within(-360, 360, "degrees"))};
-    keys.finish();
-  }
-  const auto read_power = [&](const std::string& key, double min_power, double& power) {
-    if (const auto value = map.optional(key)) power = value->number_within(min_power, 30, "");
-  };
-  read_power("source_power", 0.5, recess.source_power);
-  read_power("rim_power", 0, recess.rim_power);
-  read_power("beam_power", 0, recess.beam_power);
-  if (const auto slope = map.optional("far_side_slope")) {
-    recess.far_side_slope = slope->number_within(0.01, 100, "(meters sideways for each meter up)");
-  }
-  map.finish();
+  recess.dark_side = map.optional_map("dark_side", read_dark_side);
+  recess.source_power =
+      map.optional_number("source_power", 0.5, 30, "").value_or(recess.source_power);
+  recess.rim_power = map.optional_number("rim_power", 0, 30, "").value_or(recess.rim_power);
+  recess.beam_power = map.optional_number("beam_power", 0, 30, "").value_or(recess.beam_power);
+  recess.far_side_slope =
+      map.optional_number("far_side_slope", 0.01, 100, "(meters sideways for each meter up)");
   return recess;
 }
 
-Chips read_chips(YamlMap map, const Glow& disc) {
+Chips read_chips(YamlMap& map, const Glow& disc) {
   Chips chips;
   chips.fraction = read_fraction(map, "fraction");
   const YamlValue pitch = map.required("pitch_m");
@@ -53,11 +52,10 @@ Chips read_chips(YamlMap map, const Glow& disc) {
   if (chips.width_m > 2 * chips.pitch_m) {
     throw width.error("is more than twice pitch_m: such chips are an even disc");
   }
-  map.finish();
   return chips;
 }
 
-RandomChips read_random_chips(YamlMap map) {
+RandomChips read_random_chips(YamlMap& map) {
   RandomChips chips;
   chips.count = map.required("count").integer_within(1, 1000);
   chips.sigma_fraction =
@@ -66,12 +64,14 @@ RandomChips read_random_chips(YamlMap map) {
       map.required("within_fraction").number_within(0, 1, "(of the disc's radius)");
   std::tie(chips.min_excess, chips.max_excess) =
       read_range(map.required("excess"), 0, 10, "(of the disc's radiance)");
-  map.finish();
   return chips;
 }
 
-}  // namespace
+Halo read_halo(YamlMap& map) {
+  return {read_fraction(map, "fraction"), map.required("length_m").number_within(1e-3, 2, "m")};
+}
 
+/// Reads the keys of a glow except those of read_profile().
 Glow read_glow(YamlMap& map, const Room& room) {
   const YamlValue position = map.required("position_m");
   Glow glow{read_point(position), read_shape(map), 0, 1};
@@ -84,50 +84,179 @@ Glow read_glow(YamlMap& map, const Room& room) {
   return glow;
 }
 
+/// Reads the brightness profile of a disc: recess or rim_to_center_ratio, and halo. Other shapes
+/// are evenly bright.
 void read_profile(YamlMap& map, Glow& glow) {
   if (glow.shape.kind != ShapeKind::disc) return;
-  if (const auto recess = map.optional("recess")) {
-    glow.recess = read_recess(recess->map(), glow);
-  } else {
+  glow.recess = map.optional_map("recess", [&](YamlMap& keys) { return read_recess(keys, glow); });
+  if (!glow.recess) {
     glow.rim_to_center_ratio =
         map.required("rim_to_center_ratio").number_within(0, 2, "(of the radiance at the center)");
-    if (const auto chips = map.optional("chips")) glow.chips = read_chips(chips->map(), glow);
+    glow.chips = map.optional_map("chips", [&](YamlMap& keys) { return read_chips(keys, glow); });
     if (const auto chips = map.optional("random_chips")) {
       if (glow.chips) throw chips->error("stands beside chips: a disc has one of them");
-      glow.random_chips = read_random_chips(chips->map());
+      glow.random_chips = chips->read_map(read_random_chips);
     }
   }
-  if (const auto halo = map.optional("halo")) {
-    YamlMap keys = halo->map();
-    glow.halo = Halo{read_fraction(keys, "fraction"),
-                     keys.required("length_m").number_within(1e-3, 2, "m")};
-    keys.finish();
-  }
+  glow.halo = map.optional_map("halo", read_halo);
 }
+
+Glow read_steady_lamp(YamlMap& map, const Room& room) {
+  Glow glow = read_glow(map, room);
+  read_profile(map, glow);
+  return glow;
+}
+
+Reflection read_reflection(YamlMap& map, const std::vector<SceneLamp>& lamps, const Room& room) {
+  const YamlValue id = map.required("of_lamp");
+  const int wanted = id.integer_within(0, std::numeric_limits<int>::max());
+  const auto lamp = std::ranges::find(lamps, wanted, &SceneLamp::id);
+  if (lamp == lamps.end()) throw id.error("there is no lamp " + std::to_string(wanted));
+  Reflection reflection{read_glow(map, room), std::size_t(lamp - lamps.begin())};
+  reflection.glow.rim_to_center_ratio = 0;
+  return reflection;
+}
+
+/// Reads a panel's corner and edges.
+Panel read_place(YamlMap& map) {
+  Panel panel{};
+  panel.corner_m = read_point(map.required("corner_m"));
+  const YamlValue edges = map.required("edges_m");
+  const auto list = edges.list();
+  if (list.size() != 2) throw edges.error("should be two vectors, from the corner along each edge");
+  panel.edge_a_m = read_point(list[0]);
+  panel.edge_b_m = read_point(list[1]);
+  const double lengths = panel.edge_a_m.norm() * panel.edge_b_m.norm();
+  constexpr double right_angle = 1e-6;
+  if (!(lengths > 0) || std::abs(panel.edge_a_m.dot(panel.edge_b_m)) > right_angle * lengths) {
+    throw edges.error("should be at right angles to each other and not of length zero");
+  }
+  return panel;
+}
+
+Panel read_panel(YamlMap& map) {
+  Panel panel = read_place(map);
+  panel.electron_rate_e_per_s = read_radiance(map, "electron_rate_e_per_s");
+  return panel;
+}
+
+RectifiedSine read_mains(YamlMap& map) {
+  return {map.required("frequency_hz").number_within(10, 1000, "Hz"),
+          map.required("depth").number_within(0, 1, "(of the light)"), 0};
+}
+
+SquareWave read_pwm(YamlMap& map) {
+  return {map.required("frequency_hz").number_within(1, 1e6, "Hz"),
+          map.required("duty").number_within(1e-3, 1, "(of a period)"), 0};
+}
+
+ForeignLight read_foreign_light(YamlMap& map, const Room& room) {
+  ForeignLight light{read_steady_lamp(map, room), {}, {}};
+  const auto pwm = map.optional("pwm"), mains = map.optional("mains");
+  if (pwm.has_value() == mains.has_value()) throw map.error("needs one of the keys pwm and mains");
+  if (pwm) {
+    light.wave = pwm->read_map(read_pwm);
+  } else {
+    light.wave = mains->read_map(read_mains);
+  }
+  light.phase = map.optional_number("phase", 0, 1, "(of a period)");
+  return light;
+}
+
+Mirror read_mirror(YamlMap& map) {
+  return {read_place(map), map.required("reflectance").number_within(0, 1, "(of the light)")};
+}
+
+Blind read_blind(YamlMap& map) {
+  return {read_panel(map), map.required("slats").integer_within(1, 1000),
+          map.required("open_fraction").number_within(0, 1, "(of a slat's pitch)")};
+}
+
+Sign read_sign(YamlMap& map) {
+  return {read_panel(map),
+          map.required("lines").integer_within(1, 100),
+          map.required("letters").integer_within(1, 100),
+          {}};
+}
+
+/// Returns the height of the lowest light, m. Mirror images do not count.
+double find_lowest_light_m(const std::vector<SceneLamp>& lamps, const Clutter& clutter) {
+  double lowest_m = std::numeric_limits<double>::infinity();
+  const auto include_glow = [&](const Glow& glow) {
+    lowest_m = std::min(lowest_m, glow.position_m.z());
+  };
+  const auto include_panel = [&](const Panel& panel) {
+    lowest_m = std::min(lowest_m, panel.corner_m.z() + std::min(0.0, panel.edge_a_m.z()) +
+                                      std::min(0.0, panel.edge_b_m.z()));
+  };
+  for (const SceneLamp& lamp : lamps) include_glow(lamp.glow);
+  for (const Glow& lamp : clutter.steady_lamps) include_glow(lamp);
+  for (const Reflection& reflection : clutter.reflections) include_glow(reflection.glow);
+  for (const ForeignLight& light : clutter.foreign_lights) include_glow(light.glow);
+  for (const Panel& window : clutter.windows) include_panel(window);
+  for (const Blind& blind : clutter.blinds) include_panel(blind.window);
+  for (const Sign& sign : clutter.signs) include_panel(sign.panel);
+  return lowest_m;
+}
+
+/// Rejects an occluder that is not below every light, since it is rendered as hiding all lights.
+void check_occluder(const YamlValue& item, const Panel& occluder, double lowest_light_m) {
+  const double highest_m = occluder.corner_m.z() + std::max(0.0, occluder.edge_a_m.z()) +
+                           std::max(0.0, occluder.edge_b_m.z());
+  if (highest_m < lowest_light_m) return;
+  throw item.error("is not below every lamp and other light");
+}
+
+SceneLamp read_scene_lamp(YamlMap& map, const Lamp& lamp, const Room& room) {
+  SceneLamp read{lamp.id,
+                 read_glow(map, room),
+                 map.required("frequency_hz").number(),
+                 map.required("duty").number(),
+                 {},
+                 Eigen::Vector3d::Zero()};
+  read_profile(map, read.glow);
+  read.phase = map.optional_number("phase", 0, 1, "(of a period)");
+  if (const auto error = map.optional("map_error_m")) read.map_error_m = read_point(*error);
+  return read;
+}
+
+}  // namespace
 
 std::vector<SceneLamp> read_scene_lamps(const YamlValue& list, const Room& room) {
   std::vector<SceneLamp> lamps;
   UniqueLamps earlier;
   for (const YamlValue& item : list.list()) {
-    YamlMap map = item.map();
-    const Lamp lamp = read_lamp(map);
-    earlier.check(lamp, item);
-    earlier.add(lamp);
-    SceneLamp read{lamp.id,
-                   read_glow(map, room),
-                   map.required("frequency_hz").number(),
-                   map.required("duty").number(),
-                   {},
-                   Eigen::Vector3d::Zero()};
-    read_profile(map, read.glow);
-    if (const auto phase = map.optional("phase")) {
-      read.phase = phase->number_within(0, 1, "(of a period)");
-    }
-    if (const auto error = map.optional("map_error_m")) read.map_error_m = read_point(*error);
-    map.finish();
-    lamps.push_back(read);
+    lamps.push_back(item.read_map([&](YamlMap& map) {
+      const Lamp lamp = read_lamp(map);
+      earlier.check(lamp, item);
+      earlier.add(lamp);
+      return read_scene_lamp(map, lamp, room);
+    }));
   }
   return lamps;
+}
+
+Clutter read_clutter(YamlMap& map, const std::vector<SceneLamp>& lamps, const Room& room) {
+  Clutter clutter;
+  clutter.steady_lamps = map.optional_maps(
+      "steady_lamps", [&](YamlMap& keys) { return read_steady_lamp(keys, room); });
+  clutter.windows = map.optional_maps("windows", read_panel);
+  clutter.reflections = map.optional_maps(
+      "reflections", [&](YamlMap& keys) { return read_reflection(keys, lamps, room); });
+  clutter.foreign_lights = map.optional_maps(
+      "foreign_lights", [&](YamlMap& keys) { return read_foreign_light(keys, room); });
+  clutter.mirrors = map.optional_maps("mirrors", read_mirror);
+  clutter.blinds = map.optional_maps("blinds", read_blind);
+  clutter.signs = map.optional_maps("signs", read_sign);
+  clutter.ambient_flicker = map.optional_map("ambient_flicker", read_mains);
+  const double lowest_m = find_lowest_light_m(lamps, clutter);
+  if (const auto occluders = map.optional("occluders")) {
+    for (const YamlValue& item : occluders->list()) {
+      clutter.occluders.push_back(item.read_map(read_panel));
+      check_occluder(item, clutter.occluders.back(), lowest_m);
+    }
+  }
+  return clutter;
 }
 
 }  // namespace vlp

@@ -1,33 +1,40 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
+
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <set>
+#include <stdexcept>
 
 #include "geometry/angles.h"
+#include "rig/board_layout.h"
 #include "rig/yaml_parts.h"
+#include "simulation/board_print.h"
+#include "simulation/exposure.h"
 #include "simulation/scene_parts.h"
 
 namespace vlp {
 namespace {
 
 constexpr double kLargest = 1e12;
+constexpr double kMaxDefocus_px = 20;
+constexpr double kMaxSpot_px = 1e4;
 
-Room read_room(YamlMap map) {
+Room read_room(YamlMap& map) {
   Room room;
   for (const auto& [key, axis] : {std::pair("x_m", 0), std::pair("y_m", 1), std::pair("z_m", 2)}) {
     const YamlValue value = map.required(key);
     const auto range = value.numbers(2);
     if (!(range[0] < range[1])) throw value.error("should be [least, most]");
-    for (const YamlValue& end : value.list()) end.number_within(-200, 200, "m");
+    value.numbers_within(2, -200, 200, "m");
     room.min_m[axis] = range[0];
     room.max_m[axis] = range[1];
   }
-  map.finish();
   return room;
 }
 
-Camera read_scene_camera(YamlMap map) {
+Camera read_scene_camera(YamlMap& map) {
   Camera camera = read_camera(map);
   for (const std::string key : {"row_time_s", "readout"}) map.required(key);
   for (int focal : {0, 1}) {
@@ -39,117 +46,139 @@ Camera read_scene_camera(YamlMap map) {
   if (double(camera.imager_px[0]) * camera.imager_px[1] > max_px) {
     throw imager.error("has more than 64 million pixels");
   }
-  map.finish();
   return camera;
 }
 
-constexpr double kMaxDefocus_px = 20;
-constexpr double kMaxSpot_px = 1e4;
-
-Defocus read_defocus(YamlMap map) {
+Defocus read_defocus(YamlMap& map) {
   Defocus defocus{map.required("radius_px").number_within(0, kMaxDefocus_px, "px")};
   if (const auto tilt = map.optional("tilt_px")) {
-    defocus.tilt_px = Eigen::Vector2d(tilt->numbers(2).data());
-    for (const YamlValue& component : tilt->list()) {
-      component.number_within(-kMaxDefocus_px, kMaxDefocus_px, "px");
-    }
+    defocus.tilt_px =
+        Eigen::Vector2d(tilt->numbers_within(2, -kMaxDefocus_px, kMaxDefocus_px, "px").data());
   }
-  map.finish();
   return defocus;
 }
 
 Eigen::Vector2d read_spot(YamlMap& map) {
-  const YamlValue at = map.required("at_px");
-  const Eigen::Vector2d at_px(at.numbers(2).data());
-  for (const YamlValue& component : at.list()) {
-    component.number_within(-kMaxSpot_px, kMaxSpot_px, "px");
-  }
-  return at_px;
+  return Eigen::Vector2d(
+      map.required("at_px").numbers_within(2, -kMaxSpot_px, kMaxSpot_px, "px").data());
 }
 
-LensSmear read_smear(YamlMap map) {
-  const LensSmear smear{read_spot(map),
-                        map.required("radius_px").number_within(1, kMaxSpot_px, "px"),
-                        map.required("fraction").number_within(0, 1, "(of the light)"),
-                        map.required("sigma_px").number_within(0.3, 50, "px")};
-  map.finish();
-  return smear;
+LensSmear read_smear(YamlMap& map) {
+  return {read_spot(map), map.required("radius_px").number_within(1, kMaxSpot_px, "px"),
+          map.required("fraction").number_within(0, 1, "(of the light)"),
+          map.required("sigma_px").number_within(0.3, 50, "px")};
 }
 
-Dust read_dust(YamlMap map) {
-  const Dust dust{read_spot(map), map.required("radius_px").number_within(1, kMaxSpot_px, "px"),
-                  map.required("depth").number_within(0, 1, "(of the light)")};
-  map.finish();
-  return dust;
+Dust read_dust(YamlMap& map) {
+  return {read_spot(map), map.required("radius_px").number_within(1, kMaxSpot_px, "px"),
+          map.required("depth").number_within(0, 1, "(of the light)")};
 }
 
-template <typename Item>
-std::vector<Item> read_each(const YamlValue& list, Item (*read)(YamlMap map)) {
-  const std::vector<YamlValue> values = list.list();
-  std::vector<Item> items;
-  items.reserve(values.size());
-  for (const YamlValue& value : values) items.push_back(read(value.map()));
-  return items;
+Optics read_optics(YamlMap& map) {
+  return {map.required("blur_px").number_within(0, 20, "px"),
+          map.required("vignetting_power").number_within(0, 20, ""),
+          map.optional_map("defocus", read_defocus),
+          map.optional_number("veil", 0, 1, "(of the light)").value_or(0),
+          map.optional_maps("smears", read_smear),
+          map.optional_maps("dust", read_dust)};
 }
 
-Optics read_optics(YamlMap map) {
-  Optics optics{map.required("blur_px").number_within(0, 20, "px"),
-                map.required("vignetting_power").number_within(0, 20, "")};
-  if (const auto defocus = map.optional("defocus")) optics.defocus = read_defocus(defocus->map());
-  if (const auto veil = map.optional("veil")) {
-    optics.veil = veil->number_within(0, 1, "(of the light)");
-  }
-  if (const auto smears = map.optional("smears")) {
-    optics.smears = read_each<LensSmear>(*smears, read_smear);
-  }
-  if (const auto dust = map.optional("dust")) optics.dust = read_each<Dust>(*dust, read_dust);
-  map.finish();
-  return optics;
+Bloom read_bloom(YamlMap& map) {
+  return {map.required("fraction").number_within(0, 1, "(of the charge)"),
+          map.required("sigma_px").number_within(0.3, 50, "px")};
 }
 
-Bloom read_bloom(YamlMap map) {
-  const Bloom bloom{map.required("fraction").number_within(0, 1, "(of the charge)"),
-                    map.required("sigma_px").number_within(0.3, 50, "px")};
-  map.finish();
-  return bloom;
-}
-
-Sensor read_sensor(YamlMap map) {
+Sensor read_sensor(YamlMap& map) {
   Sensor sensor;
   const YamlValue bits = map.required("bits");
   sensor.bits = bits.integer_within(8, 16);
   if (sensor.bits != 8 && sensor.bits != 16) throw bits.error("should be 8 or 16");
-  const double white_dn = sensor.bits == 8 ? 255 : 65535;
   sensor.gain_dn_per_e = map.required("gain_dn_per_e").number_within(1e-6, 1e4, "DN per electron");
-  sensor.black_level_dn = map.required("black_level_dn").number_within(0, white_dn, "DN");
+  sensor.black_level_dn = map.required("black_level_dn").number_within(0, white_dn(sensor), "DN");
   sensor.full_well_e = map.required("full_well_e").number_within(1, 1e9, "electrons");
   sensor.read_noise_e = map.required("read_noise_e").number_within(0, 1e6, "electrons");
   sensor.shot_noise = map.required("shot_noise").boolean();
-  if (const auto bloom = map.optional("bloom")) sensor.bloom = read_bloom(bloom->map());
-  map.finish();
+  sensor.bloom = map.optional_map("bloom", read_bloom);
   return sensor;
 }
 
-Mount read_mount(YamlMap map) {
+Sharpening read_sharpening(YamlMap& map) {
+  return {map.required("amount").number_within(0, 10, "(of the detail)"),
+          map.required("radius_px").number_within(0.3, 50, "px")};
+}
+
+Bayer read_bayer(YamlMap& map) {
+  const std::string unit = "(of what green filters pass)";
+  return {map.required("red_share").number_within(0.05, 2, unit),
+          map.required("blue_share").number_within(0.05, 2, unit)};
+}
+
+ImageProcessing read_image_processing(YamlMap& map, const Sensor& sensor) {
+  if (sensor.black_level_dn >= white_dn(sensor)) {
+    throw map.error("needs levels between sensor.black_level_dn and white");
+  }
+  ImageProcessing picture;
+  picture.gamma = map.required("gamma").number_within(0.1, 10, "(of the tone curve)");
+  picture.sharpening = map.optional_map("sharpening", read_sharpening);
+  if (const auto quality = map.optional("jpeg_quality")) {
+    picture.jpeg_quality = quality->integer_within(1, 100);
+    if (sensor.bits != 8) throw quality->error("JPEG has 8 bits: set sensor.bits to 8");
+  }
+  picture.bayer = map.optional_map("bayer", read_bayer);
+  return picture;
+}
+
+Mount read_mount(YamlMap& map) {
   const double tilt = rad_from_deg(map.required("tilt_deg").number_within(0, 45, "degrees"));
   const double azimuth =
       rad_from_deg(map.required("tilt_azimuth_deg").number_within(-360, 360, "degrees"));
-  const YamlValue lever_arm = map.required("lever_arm_m");
   const Eigen::Vector3d zenith_in_camera(std::sin(tilt) * std::cos(azimuth),
                                          std::sin(tilt) * std::sin(azimuth), std::cos(tilt));
-  const Mount mount{level_from_zenith(zenith_in_camera),
-                    Eigen::Vector2d(lever_arm.numbers(2).data())};
-  for (const YamlValue& component : lever_arm.list()) component.number_within(-5, 5, "m");
-  map.finish();
-  return mount;
+  return {level_from_zenith(zenith_in_camera),
+          Eigen::Vector2d(map.required("lever_arm_m").numbers_within(2, -5, 5, "m").data())};
+}
+
+SceneBoard read_scene_board(YamlMap& map) {
+  SceneBoard board;
+  const YamlValue print = map.required("pattern");
+  board.print = print.read_map([](YamlMap& keys) { return read_board(keys); });
+  board.margin_m = map.required("margin_m").number_within(0, 2, "m");
+  constexpr double micrometers = 1e6;  // unit of the bound in messages
+  const double tenth_m =
+      0.1 * compute_tag_pitch_m(board.print) * std::min(board.print.cols, board.print.rows);
+  const double max_warp_m = std::round(micrometers * tenth_m) / micrometers;
+  board.warp_m = Eigen::Vector2d(
+      map.required("warp_m").numbers_within(2, -max_warp_m, max_warp_m, "m").data());
+  board.white_e_per_s = read_radiance(map, "white_e_per_s");
+  board.black_e_per_s = read_radiance(map, "black_e_per_s");
+  board.surround_e_per_s = read_radiance(map, "surround_e_per_s");
+  try {
+    BoardPattern{board};
+  } catch (const std::invalid_argument& failure) {
+    throw print.error(failure.what());
+  }
+  return board;
+}
+
+ArchiveVariation read_archive_variation(YamlMap& map) {
+  const auto fraction = [&](const char* key, double max_fraction) {
+    return map.required(key).number_within(0, max_fraction, "");
+  };
+  return {map.required("sessions_per_camera").integer_within(1, 10'000),
+          fraction("focal_share", 0.5),
+          map.required("center_px").number_within(0, 1e4, "px"),
+          fraction("distortion_share", 0.5),
+          rad_from_deg(map.required("tilt_deg").number_within(0, 20, "degrees")),
+          map.required("lever_arm_m").number_within(0, 1, "m"),
+          map.required("map_error_m").number_within(0, 1, "m"),
+          fraction("fault_share", 1),
+          fraction("damage_share", 1)};
 }
 
 }  // namespace
 
 Eigen::Vector3d read_point(const YamlValue& value) {
-  const Eigen::Vector3d point(value.numbers(3).data());
-  for (const YamlValue& component : value.list()) component.number_within(-200, 200, "m");
-  return point;
+  return Eigen::Vector3d(value.numbers_within(3, -200, 200, "m").data());
 }
 
 double read_radiance(YamlMap& map, const std::string& key) {
@@ -158,8 +187,7 @@ double read_radiance(YamlMap& map, const std::string& key) {
 
 std::pair<double, double> read_range(const YamlValue& value, double min, double max,
                                      std::string_view unit) {
-  const auto range = value.numbers(2);
-  for (const YamlValue& end : value.list()) end.number_within(min, max, unit);
+  const auto range = value.numbers_within(2, min, max, unit);
   if (range[0] > range[1]) throw value.error("should be [least, most]");
   return {range[0], range[1]};
 }
@@ -169,30 +197,27 @@ Scene read_scene(const std::filesystem::path& file) {
   Scene scene;
   scene.seed = static_cast<std::uint64_t>(
       document.required("seed").integer_within(0, std::numeric_limits<int>::max()));
-  const Room room = read_room(document.required("room").map());
-  scene.camera = read_scene_camera(document.required("camera").map());
-  scene.optics = read_optics(document.required("optics").map());
-  scene.sensor = read_sensor(document.required("sensor").map());
-  if (const auto picture = document.optional("processing")) {
-    scene.picture = read_image_processing(picture->map(), scene.sensor);
-  }
-  scene.mount = read_mount(document.required("mount").map());
+  const Room room = document.required("room").read_map(read_room);
+  scene.camera = document.required("camera").read_map(read_scene_camera);
+  scene.optics = document.required("optics").read_map(read_optics);
+  scene.sensor = document.required("sensor").read_map(read_sensor);
+  scene.picture = document.optional_map(
+      "processing", [&](YamlMap& map) { return read_image_processing(map, scene.sensor); });
+  scene.mount = document.required("mount").read_map(read_mount);
   scene.ambient_e_per_s = read_radiance(document, "ambient_e_per_s");
   if (const auto lamps = document.optional("lamps")) scene.lamps = read_scene_lamps(*lamps, room);
   if (const auto clutter = document.optional("clutter")) {
-    scene.clutter = read_clutter(clutter->map(), scene.lamps, room);
+    scene.clutter =
+        clutter->read_map([&](YamlMap& map) { return read_clutter(map, scene.lamps, room); });
   }
-  if (const auto board = document.optional("board")) {
-    scene.board = read_scene_board(board->map());
-  }
-  if (const auto archive = document.optional("archive")) {
-    scene.archive = read_archive_variation(archive->map());
-  }
+  scene.board = document.optional_map("board", read_scene_board);
+  scene.archive = document.optional_map("archive", read_archive_variation);
   const YamlValue captures = document.required("captures");
   document.finish();
   std::set<std::string> folders;
   for (const YamlValue& item : captures.list()) {
-    scene.sets.push_back(read_capture_set(item.map(), scene, room));
+    scene.sets.push_back(
+        item.read_map([&](YamlMap& map) { return read_capture_set(map, scene, room); }));
     if (!folders.insert(scene.sets.back().folder).second) {
       throw item.error("folder '" + scene.sets.back().folder + "' stands twice");
     }

@@ -10,7 +10,7 @@
 #include "camera/lens.h"
 #include "geometry/frames.h"
 #include "rig/board_layout.h"
-#include "simulation/picture.h"
+#include "simulation/exposure.h"
 #include "simulation/seeded_random.h"
 
 namespace vlp {

@@ -60,4 +60,11 @@ SimulationSummary simulate(const Scene& scene, const std::filesystem::path& outp
 /// @throws InputError if the folder holds something else
 void claim_output_folder(const std::filesystem::path& output, const std::string& provenance);
 
+/// Returns warnings about conditions that make the captures of a set useless though the scene is
+/// valid. Each is one line that begins with the folder.
+///
+/// Covers images that are nearly black or white, exposures that blur the stripes, and stripes that
+/// are too fine.
+std::vector<std::string> find_warnings(const Scene& scene, const CaptureSet& set);
+
 }  // namespace vlp

@@ -22,7 +22,6 @@
 #include "session/lens_step.h"
 #include "simulation/exposure.h"
 #include "simulation/frame_renderer.h"
-#include "simulation/picture.h"
 #include "support/observed_view.h"
 
 namespace vlp {

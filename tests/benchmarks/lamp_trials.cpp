@@ -32,7 +32,6 @@
 #include "simulation/downlight.h"
 #include "simulation/exposure.h"
 #include "simulation/frame_renderer.h"
-#include "simulation/picture.h"
 #include "simulation/pixel_window.h"
 #include "simulation/seeded_random.h"
 #include "simulation/truth.h"

@@ -15,7 +15,6 @@
 #include "frontend/mat_view.h"
 #include "lamps/light_detector.h"
 #include "simulation/exposure.h"
-#include "simulation/picture.h"
 #include "simulation/truth.h"
 
 namespace vlp {

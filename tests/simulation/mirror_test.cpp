@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
 /// Panes that reflect lamps.
-#include "simulation/mirror.h"
+#include "simulation/scene.h"
 
 #include <gtest/gtest.h>
 

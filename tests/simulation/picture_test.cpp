@@ -1,14 +1,13 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
 /// In-camera processing of the sensor's levels.
-#include "simulation/picture.h"
+#include "simulation/exposure.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <opencv2/imgcodecs.hpp>
 
-#include "simulation/exposure.h"
 #include "simulation/plain_scene.h"
 
 namespace vlp {

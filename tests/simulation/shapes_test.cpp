@@ -4,8 +4,7 @@
 
 #include <numbers>
 
-#include "simulation/disc.h"
-#include "simulation/mosaic.h"
+#include "simulation/shapes.h"
 #include "support/random.h"
 
 namespace vlp {

@@ -9,9 +9,9 @@
 #include <map>
 
 #include "geometry/angles.h"
+#include "simulation/board_print.h"
 #include "simulation/exposure.h"
 #include "simulation/plain_scene.h"
-#include "simulation/tag_pattern.h"
 #include "simulation/truth.h"
 
 namespace vlp {

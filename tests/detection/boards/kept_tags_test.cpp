@@ -14,7 +14,6 @@
 #include "rig/board_layout.h"
 #include "simulation/exposure.h"
 #include "simulation/frame_renderer.h"
-#include "simulation/picture.h"
 #include "simulation/scene.h"
 
 namespace vlp {

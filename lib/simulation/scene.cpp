@@ -1,11 +1,14 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
+
+#include "simulation/scene.h"
+
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
 #include <string_view>
 
-#include "simulation/scene.h"
 #include "simulation/seeded_random.h"
 
 namespace vlp {
@@ -61,7 +64,38 @@ void draw_letters(cv::RNG random, Sign& sign) {
   }
 }
 
+Eigen::Vector3d compute_normal(const Panel& pane) {
+  return pane.edge_a_m.cross(pane.edge_b_m).normalized();
+}
+
 }  // namespace
+
+double SquareWave::lit_fraction(double begin_s, double end_s) const {
+  const auto lit_periods_until = [&](double t_s) {
+    const double periods = frequency_hz * t_s + phase;
+    const double whole = std::floor(periods);
+    return whole * duty + std::min(periods - whole, duty);
+  };
+  return (lit_periods_until(end_s) - lit_periods_until(begin_s)) /
+         (frequency_hz * (end_s - begin_s));
+}
+
+double RectifiedSine::lit_fraction(double begin_s, double end_s) const {
+  // The integral of |sin(pi x)| from 0 to x grows by 2 / pi for each whole period.
+  const auto integral_until = [&](double t_s) {
+    const double periods = frequency_hz * t_s + phase;
+    const double whole = std::floor(periods);
+    return (2 * whole + 1 - std::cos(std::numbers::pi * (periods - whole))) / std::numbers::pi;
+  };
+  const double mean =
+      (integral_until(end_s) - integral_until(begin_s)) / (frequency_hz * (end_s - begin_s));
+  return 1 - depth + depth * mean;
+}
+
+LightWave with_phase(LightWave wave, double phase) {
+  std::visit([&](auto& each) { each.phase = phase; }, wave);
+  return wave;
+}
 
 void draw_random_parts(Scene& scene) {
   const auto random = [&](std::string_view name, std::size_t index) {
@@ -80,6 +114,19 @@ void draw_random_parts(Scene& scene) {
   for (std::size_t i = 0; i < clutter.signs.size(); ++i) {
     draw_letters(random("sign", i), clutter.signs[i]);
   }
+}
+
+Eigen::Isometry3d reflection_about(const Panel& pane) {
+  const Eigen::Vector3d normal = compute_normal(pane);
+  Eigen::Isometry3d reflection;
+  reflection.linear() = Eigen::Matrix3d::Identity() - 2 * normal * normal.transpose();
+  reflection.translation() = 2 * normal.dot(pane.corner_m) * normal;
+  return reflection;
+}
+
+bool is_before(const Mirror& mirror, const Eigen::Vector3d& light_m, const Eigen::Vector3d& eye_m) {
+  const Eigen::Vector3d normal = compute_normal(mirror.pane);
+  return normal.dot(light_m - mirror.pane.corner_m) * normal.dot(eye_m - mirror.pane.corner_m) > 0;
 }
 
 }  // namespace vlp
