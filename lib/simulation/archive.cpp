@@ -11,6 +11,7 @@
 #include <numbers>
 #include <optional>
 #include <stdexcept>
+#include <tuple>
 #include <vector>
 
 #include "captures/csv_writer.h"
@@ -40,21 +41,22 @@ void truncate_image(const fs::path& image) {
   if (fs::file_size(image) > kept_bytes) fs::resize_file(image, kept_bytes);
 }
 
-constexpr std::array kFaults = {ArchiveFault::tilted, ArchiveFault::out_of_focus,
-                                ArchiveFault::moved_lamp, ArchiveFault::cut_image};
+/// Names in archive.csv, in the order of ArchiveFault and ArchiveDamage.
+constexpr std::array<std::string_view, 5> kFaultNames = {"", "leaning", "out-of-focus",
+                                                         "moved-lamp", "cut-image"};
+constexpr std::array<std::string_view, 5> kDamageNames = {"", "cut-images", "missing",
+                                                          "wrong-board", "empty"};
 
-struct DamageTarget {
-  ArchiveDamage damage;
-  const char* target;
-};
-constexpr std::array kDamageTargets = {DamageTarget{ArchiveDamage::cut_images, "boards"},
-                                       DamageTarget{ArchiveDamage::missing, "lamps.yaml"},
-                                       DamageTarget{ArchiveDamage::wrong_board, "board.yaml"},
-                                       DamageTarget{ArchiveDamage::empty, "rotation"},
-                                       DamageTarget{ArchiveDamage::cut_images, "rotation"},
-                                       DamageTarget{ArchiveDamage::missing, "board.yaml"},
-                                       DamageTarget{ArchiveDamage::empty, "boards"},
-                                       DamageTarget{ArchiveDamage::missing, "rotation"}};
+/// Kinds of damage with their files or folders, in the order of their use.
+constexpr std::array<std::pair<ArchiveDamage, const char*>, 8> kDamageTargets = {
+    {{ArchiveDamage::cut_images, "boards"},
+     {ArchiveDamage::missing, "lamps.yaml"},
+     {ArchiveDamage::wrong_board, "board.yaml"},
+     {ArchiveDamage::empty, "rotation"},
+     {ArchiveDamage::cut_images, "rotation"},
+     {ArchiveDamage::missing, "board.yaml"},
+     {ArchiveDamage::empty, "boards"},
+     {ArchiveDamage::missing, "rotation"}}};
 
 /// Returns how many of the first n sessions are chosen if the fraction `fraction` of all is chosen.
 /// Rounded to nearest, so that small archives have chosen sessions, too.
@@ -87,14 +89,10 @@ void draw_camera(Scene& scene, const ArchiveVariation& variation, cv::RNG random
   const auto fraction = [&] { return random.uniform(-1.0, 1.0); };
   std::vector<double>& intrinsics = scene.camera.intrinsics;
   const double focal = 1 + variation.focal_share * fraction();
-  for (std::size_t i = 0; i < intrinsics.size(); ++i) {
-    if (i < 2) {
-      intrinsics[i] *= focal;
-    } else if (i < 4) {
-      intrinsics[i] += variation.center_px * fraction();
-    } else {
-      intrinsics[i] *= 1 + variation.distortion_share * fraction();
-    }
+  for (std::size_t i = 0; i < 2; ++i) intrinsics[i] *= focal;
+  for (std::size_t i = 2; i < 4; ++i) intrinsics[i] += variation.center_px * fraction();
+  for (std::size_t i = 4; i < intrinsics.size(); ++i) {
+    intrinsics[i] *= 1 + variation.distortion_share * fraction();
   }
   const double tilt_rad = variation.tilt_rad * std::abs(fraction());
   scene.mount = tilted(scene.mount, tilt_rad, std::numbers::pi * fraction());
@@ -118,12 +116,9 @@ void apply(ArchiveFault fault, Scene& scene) {
   if (fault == ArchiveFault::moved_lamp) scene.lamps.front().map_error_m.x() += 0.03;
 }
 
-namespace fs = std::filesystem;
-
 void check(const Scene& scene) {
   const auto has = [&](const std::string& folder) {
-    return std::any_of(scene.sets.begin(), scene.sets.end(),
-                       [&](const CaptureSet& set) { return set.folder == folder; });
+    return std::ranges::find(scene.sets, folder, &CaptureSet::folder) != scene.sets.end();
   };
   if (!scene.archive) throw std::invalid_argument("the scene has no key 'archive'");
   if (scene.lamps.empty() || !scene.board || !has("boards") || !has("rotation")) {
@@ -162,35 +157,11 @@ bool render(const ArchiveSession& session, const fs::path& output, const std::st
 }  // namespace
 
 std::string_view to_string(ArchiveFault fault) {
-  switch (fault) {
-    case ArchiveFault::tilted:
-      return "leaning";
-    case ArchiveFault::out_of_focus:
-      return "out-of-focus";
-    case ArchiveFault::moved_lamp:
-      return "moved-lamp";
-    case ArchiveFault::cut_image:
-      return "cut-image";
-    case ArchiveFault::none:
-      break;
-  }
-  return "";
+  return kFaultNames[static_cast<std::size_t>(fault)];
 }
 
 std::string_view to_string(ArchiveDamage damage) {
-  switch (damage) {
-    case ArchiveDamage::cut_images:
-      return "cut-images";
-    case ArchiveDamage::missing:
-      return "missing";
-    case ArchiveDamage::wrong_board:
-      return "wrong-board";
-    case ArchiveDamage::empty:
-      return "empty";
-    case ArchiveDamage::none:
-      break;
-  }
-  return "";
+  return kDamageNames[static_cast<std::size_t>(damage)];
 }
 
 void damage(const ArchiveSession& session, const fs::path& folder) {
@@ -237,10 +208,10 @@ ArchiveSession make_archive_session(const Scene& scene, std::size_t index) {
   draw_session(session.scene, variation, make_random(scene.seed, "archive session", index));
   const auto fault = find_choice(index, variation.fault_share);
   if (const auto damage_target = find_choice(index, variation.damage_share)) {
-    session.damage = kDamageTargets[*damage_target % kDamageTargets.size()].damage;
-    session.damaged = kDamageTargets[*damage_target % kDamageTargets.size()].target;
+    std::tie(session.damage, session.damaged) =
+        kDamageTargets[*damage_target % kDamageTargets.size()];
   } else if (fault) {
-    session.fault = kFaults[*fault % kFaults.size()];
+    session.fault = static_cast<ArchiveFault>(1 + *fault % (kFaultNames.size() - 1));
     apply(session.fault, session.scene);
   }
   return session;

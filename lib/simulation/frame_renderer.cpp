@@ -90,6 +90,33 @@ Mosaic make_mosaic(const Panel& panel) {
   return Mosaic({{0, 0, panel.edge_a_m.norm(), panel.edge_b_m.norm(), 1}});
 }
 
+/// Light with its wave in a capture.
+struct Source {
+  const Glow& glow;
+  LightWave wave;
+};
+
+/// Lists the lights that are switched, or that a mirror shows.
+std::vector<Source> list_sources(const Scene& scene, const LampShot& shot, bool in_mirror) {
+  constexpr RectifiedSine always_on{1, 0, 0};
+  const Clutter& clutter = scene.clutter;
+  std::vector<Source> sources;
+  for (std::size_t i = 0; i < scene.lamps.size(); ++i) {
+    sources.push_back({scene.lamps[i].glow, shot.waves[i]});
+  }
+  if (in_mirror) {
+    for (const Glow& lamp : clutter.steady_lamps) sources.push_back({lamp, always_on});
+  } else {
+    for (const Reflection& each : clutter.reflections) {
+      sources.push_back({each.glow, shot.waves[each.lamp]});
+    }
+  }
+  for (std::size_t i = 0; i < clutter.foreign_lights.size(); ++i) {
+    sources.push_back({clutter.foreign_lights[i].glow, shot.foreign_waves[i]});
+  }
+  return sources;
+}
+
 /// Light on the sensor during one part of an exposure, in electrons per second, without vignetting.
 /// Direct light, or the light reflected by a mirror.
 class LampFrame {
@@ -144,34 +171,33 @@ class LampFrame {
   }
 
   /// Adds a switched light. In a mirror: only lights on the camera's side of its plane.
-  template <typename Wave>
-  void add(const Glow& glow, const Wave& wave, cv::Mat1f& image) const {
+  void add(const Source& source, cv::Mat1f& image) const {
     const Eigen::Vector3d eye_m = motion_.world_from_camera(0).translation();
-    if (mirror_ && !is_before(*mirror_, glow.position_m, eye_m)) return;
-    const PixelWindow window = compute_light_window(glow);
+    if (mirror_ && !is_before(*mirror_, source.glow.position_m, eye_m)) return;
+    const PixelWindow window = compute_light_window(source.glow);
     if (window.empty()) return;
     cv::Mat1f patch = window.image(0);
-    draw(glow, window, patch);
+    draw(source.glow, window, patch);
     if (!transmittance_.empty()) patch = patch.mul(window.crop(transmittance_, rays_.margin_px()));
     optics_.spread(patch, {window.line_begin, window.place_begin});
-    add_scattered(optics_.scatter(patch), wave, image);
+    // Light that a veil scatters to all pixels.
+    if (const float scattered_e_per_s = optics_.scatter(patch); scattered_e_per_s != 0) {
+      for (int row = 0; row < image.rows; ++row) {
+        image.row(row) += lit_fraction(source.wave, row - rays_.margin_px()) * scattered_e_per_s;
+      }
+    }
     cv::Mat1f target = window.crop(image, rays_.margin_px());
     for (int line = window.line_begin; line < window.line_end; ++line) {
       const int row = line - window.line_begin;
-      target.row(row) += wave.lit_fraction(part_.begin_s(line), part_.end_s(line)) * patch.row(row);
+      target.row(row) += lit_fraction(source.wave, line) * patch.row(row);
     }
   }
 
  private:
-  /// Adds the light of a switched light that a veil scatters to all pixels.
-  template <typename Wave>
-  void add_scattered(float scattered_e_per_s, const Wave& wave, cv::Mat1f& image) const {
-    if (scattered_e_per_s == 0) return;
-    for (int row = 0; row < image.rows; ++row) {
-      const int line = row - rays_.margin_px();
-      image.row(row) +=
-          wave.lit_fraction(part_.begin_s(line), part_.end_s(line)) * scattered_e_per_s;
-    }
+  double lit_fraction(const LightWave& wave, int line) const {
+    return std::visit(
+        [&](const auto& each) { return each.lit_fraction(part_.begin_s(line), part_.end_s(line)); },
+        wave);
   }
 
   /// Returns the ceiling's radiance while a line is exposed.
@@ -179,16 +205,17 @@ class LampFrame {
     if (!scene_.clutter.ambient_flicker) return scene_.ambient_e_per_s;
     RectifiedSine wave = *scene_.clutter.ambient_flicker;
     wave.phase = shot_.ambient_phase;
-    return scene_.ambient_e_per_s * wave.lit_fraction(part_.begin_s(line), part_.end_s(line));
+    return scene_.ambient_e_per_s * lit_fraction(wave, line);
   }
+
   cv::Mat1f render_ceiling() const {
-    cv::Mat1f image = rays_.image(static_cast<float>(scene_.ambient_e_per_s));
-    if (!scene_.clutter.ambient_flicker) return image;
+    cv::Mat1f image = rays_.image(0);
     for (int row = 0; row < image.rows; ++row) {
       image.row(row) = static_cast<float>(ceiling_radiance(row - rays_.margin_px()));
     }
     return image;
   }
+
   /// Replaces the radiance of the ceiling by that of a panel where the pattern is 1.
   void replace_ceiling(const Panel& panel, const Mosaic& pattern, cv::Mat1f& image) const {
     const PixelWindow window = compute_window(outline_of(panel), motion_, part_, rays_);
@@ -283,25 +310,6 @@ class LampFrame {
   Eigen::Isometry3d reflection_ = Eigen::Isometry3d::Identity();
 };
 
-struct AlwaysOn {
-  static double lit_fraction(double, double) { return 1; }
-};
-
-/// Adds the mirror images of all lights.
-void add_mirror_images(const Scene& scene, const LampShot& shot, const LampFrame& mirrored,
-                       cv::Mat1f& image) {
-  for (std::size_t i = 0; i < scene.lamps.size(); ++i) {
-    mirrored.add(scene.lamps[i].glow, shot.waves[i], image);
-  }
-  for (const Glow& lamp : scene.clutter.steady_lamps) mirrored.add(lamp, AlwaysOn{}, image);
-  for (std::size_t i = 0; i < scene.clutter.foreign_lights.size(); ++i) {
-    const auto add = [&](const auto& wave) {
-      mirrored.add(scene.clutter.foreign_lights[i].glow, wave, image);
-    };
-    std::visit(add, shot.foreign_waves[i]);
-  }
-}
-
 /// Returns points on the outlines of everything in view, for compute_motion_px().
 std::vector<Eigen::Vector3d> collect_outlines(const Scene& scene) {
   std::vector<Eigen::Vector3d> points_m;
@@ -336,18 +344,10 @@ cv::Mat1f FrameRenderer::lamp_electrons(const LampShot& shot) const {
   for (; part.index < part.count; ++part.index) {
     const LampFrame frame(scene_, rays_, optics_, shot, part);
     sum += frame.render_steady();
-    for (std::size_t i = 0; i < scene_.lamps.size(); ++i) {
-      frame.add(scene_.lamps[i].glow, shot.waves[i], sum);
-    }
-    for (const Reflection& reflection : scene_.clutter.reflections) {
-      frame.add(reflection.glow, shot.waves[reflection.lamp], sum);
-    }
-    for (std::size_t i = 0; i < scene_.clutter.foreign_lights.size(); ++i) {
-      const Glow& glow = scene_.clutter.foreign_lights[i].glow;
-      std::visit([&](const auto& wave) { frame.add(glow, wave, sum); }, shot.foreign_waves[i]);
-    }
+    for (const Source& source : list_sources(scene_, shot, false)) frame.add(source, sum);
     for (const Mirror& mirror : scene_.clutter.mirrors) {
-      add_mirror_images(scene_, shot, LampFrame(scene_, rays_, optics_, shot, part, &mirror), sum);
+      const LampFrame mirrored(scene_, rays_, optics_, shot, part, &mirror);
+      for (const Source& source : list_sources(scene_, shot, true)) mirrored.add(source, sum);
     }
   }
   return apply_exposure(sum, shot.exposure_s / part.count);

@@ -25,18 +25,13 @@ std::vector<CaptureSet> select_sets(const Scene& scene, const std::vector<std::s
   if (folders.empty()) return scene.sets;
   std::vector<CaptureSet> sets;
   for (const std::string& folder : folders) {
-    const auto same = [&](const CaptureSet& each) { return each.folder == folder; };
-    const auto set = std::find_if(scene.sets.begin(), scene.sets.end(), same);
+    const auto set = std::ranges::find(scene.sets, folder, &CaptureSet::folder);
     if (set == scene.sets.end()) {
-      std::string problem = "the scene has no captures called '";
-      problem += folder + "'; it has";
-      for (const CaptureSet& each : scene.sets) {
-        problem += ' ';
-        problem += each.folder;
-      }
+      std::string problem = "the scene has no captures called '" + folder + "'; it has";
+      for (const CaptureSet& each : scene.sets) problem.append(" ").append(each.folder);
       throw std::invalid_argument(problem);
     }
-    if (std::none_of(sets.begin(), sets.end(), same)) sets.push_back(*set);
+    if (std::ranges::find(sets, folder, &CaptureSet::folder) == sets.end()) sets.push_back(*set);
   }
   return sets;
 }

@@ -216,8 +216,8 @@ void write_other_lights(const Scene& scene, const FrameRenderer& renderer, const
   for (std::size_t i = 0; i < count_shots(set); ++i) {
     const LampShot shot = make_lamp_shot(scene, set, i);
     for (const auto& [kind, lamp, at_px, in_view] : find_true_other_lights(scene, renderer, shot)) {
-      table.row({shot.image, std::string(to_string(kind)), lamp ? std::to_string(*lamp) : "",
-                 pixel(at_px.x()), pixel(at_px.y()), significant(in_view, 3)});
+      table.row({shot.image, kind, lamp ? std::to_string(*lamp) : "", pixel(at_px.x()),
+                 pixel(at_px.y()), significant(in_view, 3)});
     }
   }
   table.save();
@@ -266,18 +266,6 @@ std::vector<TrueLamp> find_true_lamps(const Scene& scene, const FrameRenderer& r
   return lamps;
 }
 
-std::string_view to_string(OtherLightKind kind) {
-  switch (kind) {
-    case OtherLightKind::mirror_image:
-      return "mirror_image";
-    case OtherLightKind::pwm:
-      return "pwm";
-    case OtherLightKind::mains:
-      return "mains";
-  }
-  return "";
-}
-
 std::vector<TrueOtherLight> find_true_other_lights(const Scene& scene,
                                                    const FrameRenderer& renderer,
                                                    const LampShot& shot) {
@@ -286,15 +274,14 @@ std::vector<TrueOtherLight> find_true_other_lights(const Scene& scene,
     for (const SceneLamp& lamp : scene.lamps) {
       const auto image = find_glow_image(scene, renderer, shot, lamp.glow, &mirror);
       if (!image) continue;
-      lights.push_back({OtherLightKind::mirror_image, lamp.id, image->pixel, image->in_view});
+      lights.push_back({"mirror_image", lamp.id, image->pixel, image->in_view});
     }
   }
   for (const ForeignLight& light : scene.clutter.foreign_lights) {
     const auto image = find_glow_image(scene, renderer, shot, light.glow);
     if (!image) continue;
     const bool is_pwm = std::holds_alternative<SquareWave>(light.wave);
-    lights.push_back(
-        {is_pwm ? OtherLightKind::pwm : OtherLightKind::mains, {}, image->pixel, image->in_view});
+    lights.push_back({is_pwm ? "pwm" : "mains", {}, image->pixel, image->in_view});
   }
   return lights;
 }

@@ -4,7 +4,7 @@
 
 #include <filesystem>
 #include <optional>
-#include <string_view>
+#include <string>
 #include <vector>
 
 #include "rig/calibration.h"
@@ -28,18 +28,11 @@ struct TrueLamp {
 std::vector<TrueLamp> find_true_lamps(const Scene& scene, const FrameRenderer& renderer,
                                       const LampShot& shot);
 
-enum class OtherLightKind {
-  mirror_image,  ///< a lamp of the map, reflected by a mirror
-  pwm,           ///< a foreign light that a square wave dims
-  mains          ///< a foreign light on the mains
-};
-
-/// Returns the kind as in find_true_other_lights.csv: "mirror_image", "pwm", "mains".
-std::string_view to_string(OtherLightKind kind);
-
 /// Flickering light that is not one of the lamps, as it appears in a capture.
 struct TrueOtherLight {
-  OtherLightKind kind;
+  /// "mirror_image" (of a lamp of the map), or a foreign light: "pwm" (dimmed by a square wave),
+  /// "mains".
+  std::string kind;
   /// Lamp id of a mirror image.
   std::optional<int> lamp;
   /// Image of its center; see TrueLamp.

@@ -180,8 +180,8 @@ TEST_F(FrameRendererForeignLight, IsListedInTrueOtherLightsOnly) {
   const FrameRenderer renderer(scene_);
   const auto lights = find_true_other_lights(scene_, renderer, shot());
   ASSERT_EQ(lights.size(), 2U) << "the third is out of view";
-  EXPECT_EQ(lights[0].kind, OtherLightKind::pwm);
-  EXPECT_EQ(lights[1].kind, OtherLightKind::mains);
+  EXPECT_EQ(lights[0].kind, "pwm");
+  EXPECT_EQ(lights[1].kind, "mains");
   EXPECT_FALSE(lights[0].lamp);
   EXPECT_NEAR(lights[0].pixel.x(), 499.5, 1e-6);
   EXPECT_EQ(lights[0].in_view, 1);

@@ -129,7 +129,7 @@ TEST_F(FrameRendererMirror, GlossyCeilingShowsDiscButNotRecessedLamp) {
 TEST_F(FrameRendererMirror, MirrorImageIsListedInTrueOtherLightsOnly) {
   const auto lights = truth();
   ASSERT_EQ(lights.size(), 1U);
-  EXPECT_EQ(lights[0].kind, OtherLightKind::mirror_image);
+  EXPECT_EQ(lights[0].kind, "mirror_image");
   EXPECT_EQ(lights[0].lamp, 1);
   EXPECT_LT((lights[0].pixel - Eigen::Vector2d(399.5 + 500 * 0.8 / 1.5, 299.5)).norm(), 1e-6);
   EXPECT_EQ(lights[0].in_view, 1);
