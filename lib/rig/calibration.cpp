@@ -1,5 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
+
 #include "rig/calibration.h"
 
 #include <algorithm>
@@ -9,10 +10,32 @@
 
 #include "camera/lens_table.h"
 #include "rig/calibration_error.h"
+#include "rig/calibration_text.h"
+#include "rig/file.h"
 #include "rig/yaml_parts.h"
+#include "rig/yaml_writer.h"
 
 namespace vlp {
 namespace {
+
+LensModel read_lens_model(const YamlValue& value) {
+  if (const auto model = lens_model_from_name(value.text())) return *model;
+  throw value.unknown("the models are: " + lens_model_names());
+}
+
+Readout read_readout(const YamlValue& value) {
+  if (value.text() == "rows") return Readout::rows;
+  if (value.text() == "columns") return Readout::columns;
+  throw value.unknown("the read-out is along rows or columns");
+}
+
+std::vector<double> read_intrinsics(const YamlValue& value, LensModel model) {
+  std::vector<double> intrinsics = value.numbers(parameter_count(model));
+  if (intrinsics[0] <= 0 || intrinsics[1] <= 0) {
+    throw value.error("the focal lengths, the first two, should be positive");
+  }
+  return intrinsics;
+}
 
 constexpr int kLarge = std::numeric_limits<int>::max();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -94,7 +117,19 @@ Matrix2 read_covariance(const YamlValue& value) {
   return covariance;
 }
 
-IntrinsicsReport read_intrinsics_report(YamlMap map, std::size_t intrinsics) {
+template <typename Matrix>
+std::optional<Matrix> read_optional_matrix(YamlMap& map, const std::string& key, std::size_t rows,
+                                           std::size_t cols) {
+  const auto value = map.optional(key);
+  return value ? std::optional<Matrix>(read_matrix(*value, rows, cols)) : std::nullopt;
+}
+
+std::optional<Matrix2> read_optional_covariance(YamlMap& map, const std::string& key) {
+  const auto value = map.optional(key);
+  return value ? std::optional(read_covariance(*value)) : std::nullopt;
+}
+
+IntrinsicsReport read_intrinsics_report(YamlMap& map, std::size_t intrinsics) {
   IntrinsicsReport report;
   report.views = map.required("views").integer_within(0, kLarge);
   report.corners = map.required("corners").integer_within(0, kLarge);
@@ -104,24 +139,20 @@ IntrinsicsReport read_intrinsics_report(YamlMap map, std::size_t intrinsics) {
     const auto warp = value->numbers(2);
     report.board_warp_m = {warp[0], warp[1]};
   }
-  if (const auto value = map.optional("expected_max_error_px")) {
-    report.expected_max_error_px = value->number_within(0, kInfinity, "px");
-  }
+  report.expected_max_error_px = map.optional_number("expected_max_error_px", 0, kInfinity, "px");
   if (const auto value = map.optional("covariance")) {
     report.covariance = read_joint_covariance(*value, intrinsics);
   }
   if (const auto value = map.optional("valid_region_px")) {
     for (const YamlValue& corner : value->list()) {
-      const auto pixel = corner.numbers(2);
-      report.region_px.emplace_back(pixel[0], pixel[1]);
+      report.region_px.emplace_back(corner.numbers(2).data());
     }
     if (report.region_px.size() < 3) throw value->error("should have three corners or more");
   }
-  map.finish();
   return report;
 }
 
-RotationCenter read_rotation_center(YamlMap map, std::size_t intrinsics) {
+RotationCenter read_rotation_center(YamlMap& map, std::size_t intrinsics) {
   RotationCenter center;
   const YamlValue model = map.required("model");
   if (model.text() != "shift" && model.text() != "tilt") {
@@ -135,81 +166,68 @@ RotationCenter read_rotation_center(YamlMap map, std::size_t intrinsics) {
   if (std::abs(center.zenith_in_camera.norm() - 1) > 1e-5 || center.zenith_in_camera.z() <= 0) {
     throw zenith.error("should be a unit vector with z > 0");
   }
-  if (const auto value = map.optional("covariance")) center.covariance = read_covariance(*value);
-  if (const auto value = map.optional("lever_arm_m")) {
-    center.lever_arm_m = Eigen::Vector2d(value->numbers(2).data());
-  }
-  if (const auto value = map.optional("lever_arm_covariance")) {
-    if (!center.lever_arm_m) throw value->error("is of no lever_arm_m");
-    center.lever_arm_covariance = read_covariance(*value);
-  }
-  if (const auto value = map.optional("jacobian_intrinsics")) {
-    center.by_intrinsics = read_matrix(*value, 2, intrinsics);
-  }
-  if (const auto value = map.optional("lever_arm_jacobian_zenith")) {
-    if (!center.lever_arm_m) throw value->error("is of no lever_arm_m");
-    center.lever_arm_by_zenith = read_matrix(*value, 2, 2);
-  }
-  if (const auto value = map.optional("lever_arm_jacobian_intrinsics")) {
-    if (!center.lever_arm_m) throw value->error("is of no lever_arm_m");
-    center.lever_arm_by_intrinsics = read_matrix(*value, 2, intrinsics);
-  }
-  map.finish();
+  center.covariance = read_optional_covariance(map, "covariance");
+  const auto lever_arm = map.optional("lever_arm_m");
+  if (lever_arm) center.lever_arm_m = Eigen::Vector2d(lever_arm->numbers(2).data());
+  const auto check_lever_arm = [&](const std::string& key) {
+    const auto value = map.optional(key);
+    if (value && !lever_arm) throw value->error("is of no lever_arm_m");
+    return key;
+  };
+  center.lever_arm_covariance =
+      read_optional_covariance(map, check_lever_arm("lever_arm_covariance"));
+  center.by_intrinsics = read_optional_matrix<MatrixX>(map, "jacobian_intrinsics", 2, intrinsics);
+  center.lever_arm_by_zenith =
+      read_optional_matrix<Matrix2>(map, check_lever_arm("lever_arm_jacobian_zenith"), 2, 2);
+  center.lever_arm_by_intrinsics = read_optional_matrix<MatrixX>(
+      map, check_lever_arm("lever_arm_jacobian_intrinsics"), 2, intrinsics);
   return center;
 }
 
-Dispersion::UncertainLamp read_uncertain_lamp(YamlMap map) {
+Dispersion::UncertainLamp read_uncertain_lamp(YamlMap& map) {
   Dispersion::UncertainLamp lamp;
   lamp.id = map.required("id").integer_within(0, kLarge);
   lamp.position_m = Eigen::Vector3d(map.required("position_m").numbers(3).data());
   lamp.sd_m = map.required("sd_m").number_within(0, kMaxSd, "m");
   lamp.by_position = read_matrix(map.required("by_position"), 2, 3);
-  map.finish();
   return lamp;
 }
 
-Dispersion read_dispersion(YamlMap map, std::size_t intrinsics) {
+Dispersion read_dispersion(YamlMap& map, std::size_t intrinsics) {
   Dispersion dispersion;
   dispersion.offset_px = Eigen::Vector2d(map.required("offset_px").numbers(2).data());
   dispersion.radius_m = map.required("radius_m").number_within(0, kInfinity, "m");
   dispersion.center_m = Eigen::Vector2d(map.required("center_m").numbers(2).data());
   dispersion.captures = map.required("captures").integer_within(1, kLarge);
-  if (const auto value = map.optional("covariance")) {
-    dispersion.covariance = read_covariance(*value);
-  }
-  if (const auto value = map.optional("jacobian_intrinsics")) {
-    dispersion.by_intrinsics = read_matrix(*value, 2, intrinsics);
-  }
-  if (const auto value = map.optional("jacobian_zenith")) {
-    dispersion.by_zenith = read_matrix(*value, 2, 2);
-  }
+  dispersion.covariance = read_optional_covariance(map, "covariance");
+  dispersion.by_intrinsics =
+      read_optional_matrix<MatrixX>(map, "jacobian_intrinsics", 2, intrinsics);
+  dispersion.by_zenith = read_optional_matrix<Matrix2>(map, "jacobian_zenith", 2, 2);
   if (const auto value = map.optional("by_lamps")) {
     const auto items = value->list();
     if (items.size() > kMaxUncertainLamps) throw value->error("holds more than 1,000 lamps");
-    dispersion.by_lamps.reserve(items.size());
     for (const YamlValue& item : items) {
-      const Dispersion::UncertainLamp lamp = read_uncertain_lamp(item.map());
+      const Dispersion::UncertainLamp lamp = item.read_map(read_uncertain_lamp);
       const auto has_same_id = [&](const auto& earlier) { return earlier.id == lamp.id; };
       if (std::ranges::any_of(dispersion.by_lamps, has_same_id)) throw item.error("stands twice");
       dispersion.by_lamps.push_back(lamp);
     }
   }
-  map.finish();
   return dispersion;
 }
 
-Adjustment read_adjustment(YamlMap map, const Camera& camera) {
+Adjustment::Place read_place(YamlMap& map) {
+  return {map.required("id").integer_within(0, kLarge),
+          Eigen::Vector3d(map.required("position_m").numbers(3).data())};
+}
+
+Adjustment read_adjustment(YamlMap& map, const Camera& camera) {
   Adjustment adjustment;
   for (const YamlValue& item : map.required("sets").list()) adjustment.sets.push_back(item.text());
   adjustment.captures = map.required("captures").integer_within(1, kLarge);
   adjustment.detections = map.required("detections").integer_within(1, kLarge);
   adjustment.residual_px = map.required("residual_px").number_within(0, kInfinity, "px");
-  for (const YamlValue& item : map.required("lamps").list()) {
-    YamlMap lamp = item.map();
-    adjustment.lamps.push_back({lamp.required("id").integer_within(0, kLarge),
-                                Eigen::Vector3d(lamp.required("position_m").numbers(3).data())});
-    lamp.finish();
-  }
+  adjustment.lamps = map.required("lamps").read_maps(read_place);
   const YamlValue parameters = map.required("parameters");
   const auto found = parameters.list();
   const auto names = parameter_names(camera, adjustment);
@@ -221,26 +239,181 @@ Adjustment read_adjustment(YamlMap map, const Camera& camera) {
     }
   }
   adjustment.covariance = read_joint_covariance(map.required("covariance"), names.size());
-  map.finish();
   return adjustment;
 }
 
-HistoryEntry read_history_entry(YamlMap map) {
-  HistoryEntry entry;
-  entry.part = map.required("part").text();
-  entry.program = map.required("program").text();
-  entry.version = map.required("version").text();
-  entry.options = map.required("options").text();
-  for (const YamlValue& item : map.required("inputs").list()) {
-    YamlMap input = item.map();
-    entry.inputs.push_back({input.required("file").text(), input.required("sha256").text()});
-    input.finish();
+HistoryEntry::Input read_input(YamlMap& map) {
+  return {map.required("file").text(), map.required("sha256").text()};
+}
+
+HistoryEntry read_history_entry(YamlMap& map) {
+  return {map.required("part").text(), map.required("program").text(),
+          map.required("version").text(), map.required("options").text(),
+          map.required("inputs").read_maps(read_input)};
+}
+
+void begin_part(YAML::Emitter& out, const char* key) {
+  out << YAML::Key << key << YAML::Value << YAML::BeginMap;
+}
+
+/// Required keys come last, see write_calibration().
+void emit_camera(YAML::Emitter& out, const Camera& camera) {
+  begin_part(out, "camera");
+  emit_quoted(out, "id", camera.id);
+  if (camera.pixel_pitch_m) emit_number(out, "pixel_pitch_m", *camera.pixel_pitch_m);
+  if (camera.row_time_s) emit_number(out, "row_time_s", *camera.row_time_s);
+  if (camera.readout) {
+    emit_word(out, "readout", *camera.readout == Readout::rows ? "rows" : "columns");
   }
-  map.finish();
-  return entry;
+  emit_integers(out, "imager_px", camera.imager_px);
+  emit_word(out, "lens_model", to_string(camera.lens_model));
+  emit_numbers(out, "intrinsics", camera.intrinsics);
+  out << YAML::EndMap;
+}
+
+void emit_matrix(YAML::Emitter& out, const char* key, const Eigen::MatrixXd& matrix) {
+  out << YAML::Key << key << YAML::Value << YAML::Flow << YAML::BeginSeq;
+  for (Eigen::Index row = 0; row < matrix.rows(); ++row) {
+    const Eigen::VectorXd numbers = matrix.row(row);
+    emit_row(out, {numbers.data(), static_cast<std::size_t>(numbers.size())});
+  }
+  out << YAML::EndSeq;
+}
+
+/// Writes the rows of the lower triangle.
+void emit_joint_covariance(YAML::Emitter& out, const Eigen::MatrixXd& covariance) {
+  out << YAML::Key << "covariance" << YAML::Value << YAML::BeginSeq;
+  for (Eigen::Index row = 0; row < covariance.rows(); ++row) {
+    const Eigen::VectorXd numbers = covariance.row(row).head(row + 1);
+    emit_row(out, {numbers.data(), static_cast<std::size_t>(numbers.size())});
+  }
+  out << YAML::EndSeq;
+}
+
+void emit_intrinsics_report(YAML::Emitter& out, const IntrinsicsReport& report) {
+  begin_part(out, "intrinsics_report");
+  emit_integer(out, "views", report.views);
+  emit_integer(out, "corners", report.corners);
+  emit_integer(out, "outliers", report.outliers);
+  emit_number(out, "rms_px", report.rms_px);
+  if (report.board_warp_m) emit_numbers(out, "board_warp_m", *report.board_warp_m);
+  // Infinite if the lens has no ray, which YAML cannot represent; a gate reports it.
+  if (report.expected_max_error_px && std::isfinite(*report.expected_max_error_px)) {
+    emit_number(out, "expected_max_error_px", *report.expected_max_error_px);
+  }
+  if (report.covariance) emit_joint_covariance(out, *report.covariance);
+  if (!report.region_px.empty()) {
+    out << YAML::Key << "valid_region_px" << YAML::Value << YAML::Flow << YAML::BeginSeq;
+    for (const Eigen::Vector2d& corner : report.region_px) {
+      emit_row(out, std::array{corner.x(), corner.y()});
+    }
+    out << YAML::EndSeq;
+  }
+  out << YAML::EndMap;
+}
+
+void emit_optional_matrix(YAML::Emitter& out, const char* key, const auto& matrix) {
+  if (matrix) emit_matrix(out, key, *matrix);
+}
+
+void emit_rotation_center(YAML::Emitter& out, const RotationCenter& center) {
+  begin_part(out, "rotation_center");
+  emit_word(out, "model", center.model == RotationModel::tilt ? "tilt" : "shift");
+  emit_numbers(out, "center_px", center.center_px);
+  emit_numbers(out, "zenith_in_camera", center.zenith_in_camera);
+  emit_optional_matrix(out, "covariance", center.covariance);
+  if (center.lever_arm_m) emit_numbers(out, "lever_arm_m", *center.lever_arm_m);
+  emit_optional_matrix(out, "lever_arm_covariance", center.lever_arm_covariance);
+  emit_optional_matrix(out, "jacobian_intrinsics", center.by_intrinsics);
+  emit_optional_matrix(out, "lever_arm_jacobian_zenith", center.lever_arm_by_zenith);
+  emit_optional_matrix(out, "lever_arm_jacobian_intrinsics", center.lever_arm_by_intrinsics);
+  out << YAML::EndMap;
+}
+
+void emit_uncertain_lamps(YAML::Emitter& out, const std::vector<Dispersion::UncertainLamp>& lamps) {
+  out << YAML::Key << "by_lamps" << YAML::Value << YAML::BeginSeq;
+  for (const auto& [id, position_m, sd_m, by_position] : lamps) {
+    out << YAML::Flow << YAML::BeginMap;
+    emit_integer(out, "id", id);
+    emit_numbers(out, "position_m", position_m);
+    emit_number(out, "sd_m", sd_m);
+    emit_matrix(out, "by_position", by_position);
+    out << YAML::EndMap;
+  }
+  out << YAML::EndSeq;
+}
+
+void emit_dispersion(YAML::Emitter& out, const Dispersion& dispersion) {
+  begin_part(out, "dispersion");
+  emit_numbers(out, "offset_px", dispersion.offset_px);
+  emit_number(out, "radius_m", dispersion.radius_m);
+  emit_numbers(out, "center_m", dispersion.center_m);
+  emit_integer(out, "captures", dispersion.captures);
+  emit_optional_matrix(out, "covariance", dispersion.covariance);
+  emit_optional_matrix(out, "jacobian_intrinsics", dispersion.by_intrinsics);
+  emit_optional_matrix(out, "jacobian_zenith", dispersion.by_zenith);
+  if (!dispersion.by_lamps.empty()) emit_uncertain_lamps(out, dispersion.by_lamps);
+  out << YAML::EndMap;
+}
+
+void emit_adjustment(YAML::Emitter& out, const Camera& camera, const Adjustment& adjustment) {
+  begin_part(out, "adjustment");
+  out << YAML::Key << "sets" << YAML::Value << YAML::Flow << YAML::BeginSeq;
+  for (const std::string& set : adjustment.sets) out << YAML::DoubleQuoted << set;
+  out << YAML::EndSeq;
+  emit_integer(out, "captures", adjustment.captures);
+  emit_integer(out, "detections", adjustment.detections);
+  emit_number(out, "residual_px", adjustment.residual_px);
+  out << YAML::Key << "lamps" << YAML::Value << YAML::BeginSeq;
+  for (const auto& [id, position_m] : adjustment.lamps) {
+    out << YAML::Flow << YAML::BeginMap;
+    emit_integer(out, "id", id);
+    emit_numbers(out, "position_m", position_m);
+    out << YAML::EndMap;
+  }
+  out << YAML::EndSeq << YAML::Key << "parameters" << YAML::Value << YAML::Flow << YAML::BeginSeq;
+  for (const std::string& name : parameter_names(camera, adjustment)) out << name;
+  out << YAML::EndSeq;
+  emit_joint_covariance(out, adjustment.covariance);
+  out << YAML::EndMap;
+}
+
+void emit_history(YAML::Emitter& out, const std::vector<HistoryEntry>& history) {
+  out << YAML::Key << "history" << YAML::Value << YAML::BeginSeq;
+  for (const HistoryEntry& entry : history) {
+    out << YAML::BeginMap;
+    emit_word(out, "part", entry.part);
+    emit_word(out, "program", entry.program);
+    emit_quoted(out, "version", entry.version);
+    emit_quoted(out, "options", entry.options);
+    out << YAML::Key << "inputs" << YAML::Value << YAML::BeginSeq;
+    for (const auto& input : entry.inputs) {
+      out << YAML::Flow << YAML::BeginMap;
+      emit_quoted(out, "file", input.file);
+      emit_quoted(out, "sha256", input.sha256);
+      out << YAML::EndMap;
+    }
+    out << YAML::EndSeq << YAML::EndMap;
+  }
+  out << YAML::EndSeq;
 }
 
 }  // namespace
+
+Camera read_camera(YamlMap& map) {
+  Camera camera;
+  camera.id = map.required("id").text();
+  const YamlValue imager_px = map.required("imager_px");
+  const auto imager = imager_px.list();
+  if (imager.size() != 2) throw imager_px.error("should be [width, height]");
+  camera.imager_px = {imager[0].integer_within(1, 1 << 20), imager[1].integer_within(1, 1 << 20)};
+  camera.lens_model = read_lens_model(map.required("lens_model"));
+  camera.intrinsics = read_intrinsics(map.required("intrinsics"), camera.lens_model);
+  camera.pixel_pitch_m = map.optional_number("pixel_pitch_m", 1e-7, 1e-4, "m");
+  camera.row_time_s = map.optional_number("row_time_s", 1e-8, 1e-3, "s");
+  if (const auto value = map.optional("readout")) camera.readout = read_readout(*value);
+  return camera;
+}
 
 std::vector<std::string> parameter_names(const Camera& camera, const Adjustment& adjustment) {
   std::vector<std::string> names{"fx", "fy", "cx", "cy"};
@@ -265,21 +438,19 @@ Calibration read_calibration(const std::filesystem::path& file) {
   const auto adjustment = document.optional("adjustment");
   const auto history = document.optional("history");
   document.finish();
-  YamlMap camera_map = camera.map();
-  calibration.camera = read_camera(camera_map);
-  camera_map.finish();
+  calibration.camera = camera.read_map(read_camera);
+  const auto read_if = [](const auto& value, const auto& read, const auto& argument) {
+    const auto read_part = [&](YamlMap& map) { return read(map, argument); };
+    return value ? std::optional(value->read_map(read_part)) : std::nullopt;
+  };
   const auto intrinsics = static_cast<std::size_t>(count_reported_intrinsics(calibration.camera));
-  if (report) calibration.intrinsics_report = read_intrinsics_report(report->map(), intrinsics);
-  if (rotation_center) {
-    calibration.rotation_center = read_rotation_center(rotation_center->map(), intrinsics);
-  }
-  if (dispersion) calibration.dispersion = read_dispersion(dispersion->map(), intrinsics);
-  if (adjustment) {
-    calibration.adjustment = read_adjustment(adjustment->map(), calibration.camera);
-  }
+  calibration.intrinsics_report = read_if(report, read_intrinsics_report, intrinsics);
+  calibration.rotation_center = read_if(rotation_center, read_rotation_center, intrinsics);
+  calibration.dispersion = read_if(dispersion, read_dispersion, intrinsics);
+  calibration.adjustment = read_if(adjustment, read_adjustment, calibration.camera);
   if (!history) return calibration;
   for (const YamlValue& item : history->list()) {
-    calibration.history.push_back(read_history_entry(item.map()));
+    calibration.history.push_back(item.read_map(read_history_entry));
     const std::string& part = calibration.history.back().part;
     if ((part == "rotation_center" && !rotation_center) || (part == "dispersion" && !dispersion) ||
         (part == "adjustment" && !adjustment)) {
@@ -287,6 +458,26 @@ Calibration read_calibration(const std::filesystem::path& file) {
     }
   }
   return calibration;
+}
+
+std::string calibration_text(const Calibration& calibration) {
+  YAML::Emitter out;
+  out << YAML::BeginMap;
+  emit_word(out, "format", "vlp-calibration/1");
+  if (!calibration.history.empty()) emit_history(out, calibration.history);
+  if (calibration.intrinsics_report) emit_intrinsics_report(out, *calibration.intrinsics_report);
+  if (calibration.rotation_center) emit_rotation_center(out, *calibration.rotation_center);
+  if (calibration.dispersion) emit_dispersion(out, *calibration.dispersion);
+  if (calibration.adjustment) {
+    emit_adjustment(out, calibration.camera, *calibration.adjustment);
+  }
+  emit_camera(out, calibration.camera);
+  out << YAML::EndMap << YAML::Newline;
+  return out.c_str();
+}
+
+void write_calibration(const std::filesystem::path& file, const Calibration& calibration) {
+  write_file(file, calibration_text(calibration));
 }
 
 }  // namespace vlp

@@ -20,12 +20,6 @@ constexpr double kMaxHeight_m = 200;  // higher ceilings indicate millimeters
 constexpr double kCoincident_m = 1e-3;
 constexpr double kMaxSurveySd_m = 1;  // larger values indicate millimeters
 
-std::optional<double> optional_within(YamlMap& map, const std::string& key, double min, double max,
-                                      std::string_view unit) {
-  const auto value = map.optional(key);
-  return value ? std::optional(value->number_within(min, max, unit)) : std::nullopt;
-}
-
 }  // namespace
 
 Lamp read_lamp(YamlMap& map) {
@@ -35,9 +29,9 @@ Lamp read_lamp(YamlMap& map) {
   lamp.position_m = Eigen::Vector3d(position.numbers(3).data());
   position.list()[2].number_within(-kMaxHeight_m, kMaxHeight_m, "m");
   lamp.shape = read_shape(map);
-  lamp.frequency_hz = optional_within(map, "frequency_hz", 50, 1e6, "Hz");
-  lamp.duty = optional_within(map, "duty", 0.01, 0.99, "(a share of the period)");
-  lamp.sd_m = optional_within(map, "sd_m", 0, kMaxSurveySd_m, "m");
+  lamp.frequency_hz = map.optional_number("frequency_hz", 50, 1e6, "Hz");
+  lamp.duty = map.optional_number("duty", 0.01, 0.99, "(a share of the period)");
+  lamp.sd_m = map.optional_number("sd_m", 0, kMaxSurveySd_m, "m");
   return lamp;
 }
 
@@ -73,7 +67,7 @@ LampMap read_lamps_of_room(const std::filesystem::path& file, const std::string&
 
 LampMapFile read_lamps_with_rooms(const std::filesystem::path& file, const std::string& room) {
   YamlMap document = read_yaml(file, kLampsFormat);
-  const auto sd_m = optional_within(document, "sd_m", 0, kMaxSurveySd_m, "m");
+  const auto sd_m = document.optional_number("sd_m", 0, kMaxSurveySd_m, "m");
   const YamlValue list = document.required("lamps");
   document.finish();
   LampMapFile result{file, {}, {}};

@@ -68,7 +68,7 @@ class BoardWarp {
   Eigen::Vector2d field_m_, warp_m_;
 };
 
-/// Printed board, warped or flat, for add_shape_supersampled(). Values are radiances minus that of
+/// Printed board, warped or flat, for add_shape(). Values are radiances minus that of
 /// the surroundings.
 class BoardPattern {
  public:

@@ -387,8 +387,8 @@ cv::Mat1f FrameRenderer::board_electrons(const BoardShot& shot) const {
     const auto board_from_camera = [&](int line) {
       return shot.camera_from_board(part.middle_s(line)).inverse();
     };
-    add_shape_supersampled(rays_, whole_window(rays_), board_from_camera, *pattern_,
-                           1.0 / part.count, supersampled);
+    add_shape(rays_, whole_window(rays_), board_from_camera, *pattern_, 1.0 / part.count,
+              supersampled, 2);
   }
   optics_.spread(supersampled, {-rays_.margin_px(), -rays_.margin_px(), 2});
   cv::resize(supersampled, image, pixels, 0, 0, cv::INTER_AREA);

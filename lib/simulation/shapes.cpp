@@ -32,6 +32,11 @@ int find_closest_line(const std::vector<double>& lines, double at) {
   return static_cast<int>(std::min_element(lines.begin(), lines.end(), closer) - lines.begin());
 }
 
+/// Returns the corners of a quadrilateral as columns.
+Eigen::Matrix<double, 2, 4> to_matrix(const std::array<Eigen::Vector2d, 4>& corners) {
+  return Eigen::Matrix<double, 2, 4>::Map(corners[0].data());
+}
+
 /// Traversal of the cells along one axis: the current cell, and the fraction of the path at which
 /// it ends.
 struct CellTraversal {
@@ -115,12 +120,9 @@ double Mosaic::integrate_edge(const Eigen::Vector2d& p, const Eigen::Vector2d& q
 }
 
 std::optional<double> Mosaic::constant_value(const std::array<Eigen::Vector2d, 4>& corners) const {
-  Eigen::Vector2d lower = corners[0], upper = corners[0];
-  for (const Eigen::Vector2d& corner : corners) {
-    if (!corner.allFinite()) return std::nullopt;
-    lower = lower.cwiseMin(corner);
-    upper = upper.cwiseMax(corner);
-  }
+  const auto points = to_matrix(corners);
+  if (!points.allFinite()) return std::nullopt;
+  const Eigen::Vector2d lower = points.rowwise().minCoeff(), upper = points.rowwise().maxCoeff();
   const int column = find_cell(x_m_, lower.x()), row = find_cell(y_m_, lower.y());
   const auto ends_before = [](const std::vector<double>& lines, int cell, double at) {
     return cell < static_cast<int>(lines.size()) && lines[static_cast<std::size_t>(cell)] <= at;
@@ -136,6 +138,13 @@ double Disc::integrate_triangle(const Eigen::Vector2d& p, const Eigen::Vector2d&
 
 double Disc::integrate_sector(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const {
   return std::atan2(cross(p, q), p.dot(q)) * (0.5 - fall_ / 4);
+}
+
+std::optional<double> Disc::constant_value(const std::array<Eigen::Vector2d, 4>& corners) const {
+  const auto points = to_matrix(corners);
+  const bool outside =
+      points.rowwise().minCoeff().maxCoeff() > 1 || points.rowwise().maxCoeff().minCoeff() < -1;
+  return outside ? std::optional(0.0) : std::nullopt;
 }
 
 double Disc::integrate_edge(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const {

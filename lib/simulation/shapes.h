@@ -27,12 +27,6 @@ class Mosaic {
     return plane_hit(origin, direction);
   }
 
-  /// Returns the box around all rectangles; empty without rectangles.
-  Eigen::AlignedBox2d bounds() const {
-    if (x_m_.empty() || y_m_.empty()) return {};
-    return {Eigen::Vector2d(x_m_.front(), y_m_.front()), Eigen::Vector2d(x_m_.back(), y_m_.back())};
-  }
-
   /// Returns the integral of G dy along the edge from p to q. G(x, y) is the integral of the
   /// pattern along the row from minus infinity to x.
   double integrate_edge(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const;
@@ -67,9 +61,8 @@ class Disc {
     return plane_hit(origin, direction).cwiseQuotient(half_axes_m_);
   }
 
-  Eigen::AlignedBox2d bounds() const {
-    return {Eigen::Vector2d::Constant(-1), Eigen::Vector2d::Constant(1)};
-  }
+  /// Returns 0 for a quadrilateral on the outer side of one side of the square around the disc.
+  std::optional<double> constant_value(const std::array<Eigen::Vector2d, 4>& corners) const;
 
   /// Returns the integral over the part of the triangle (0, p, q) inside the disc, in units of the
   /// radius. add_shape() needs no other triangles.
