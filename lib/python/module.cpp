@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
 /// The Python module vlp: functions of the toolbox for notebooks, with numpy arrays.
+#include <pybind11/eigen.h>
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
@@ -38,22 +39,25 @@ namespace py = pybind11;
 namespace vlp {
 namespace {
 
+using namespace pybind11::literals;
+
 using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
 using Integers = py::array_t<int, py::array::c_style | py::array::forcecast>;
 using Pair = std::array<double, 2>;
+/// Rows of two or three numbers, which become arrays (n, 2) and (n, 3).
+using Rows2 = Eigen::Matrix<double, Eigen::Dynamic, 2, Eigen::RowMajor>;
+using Rows3 = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr int kStatuses = static_cast<int>(FixStatus::row_time_unknown) + 1;
 
-Doubles doubles(std::vector<py::ssize_t> shape) { return Doubles(std::move(shape)); }
-
 /// Returns the number of rows of an array with `columns` columns.
-std::size_t count_rows(const Doubles& array, py::ssize_t columns, const char* name) {
+py::ssize_t count_rows(const Doubles& array, py::ssize_t columns, const char* name) {
   if (array.ndim() != 2 || array.shape(1) != columns) {
     throw std::invalid_argument(std::string(name) + " should have the shape (n, " +
                                 std::to_string(columns) + ")");
   }
-  return static_cast<std::size_t>(array.shape(0));
+  return array.shape(0);
 }
 
 template <typename Wide>
@@ -82,19 +86,8 @@ void check_length(const py::array& array, std::size_t length, const char* name) 
   }
 }
 
-template <typename Vector>
-Doubles to_array(const Vector& values) {
-  return Doubles(static_cast<py::ssize_t>(values.size()), values.data());
-}
-
-Doubles to_array(const Matrix4& matrix) {
-  Doubles array = doubles({4, 4});
-  Eigen::Map<Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(array.mutable_data()) = matrix;
-  return array;
-}
-
 /// Position and covariance of a frame without a fix.
-const Eigen::Vector3d kNowhere(kNone, kNone, kNone);
+const Eigen::Vector3d kNowhere = Eigen::Vector3d::Constant(kNone);
 const Matrix4 kUnknown = Matrix4::Constant(kNone);
 
 // Lamp map, calibration, lens
@@ -103,19 +96,16 @@ LampMapFile lamps_of(const std::filesystem::path& file, const std::optional<std:
   return read_lamps_with_rooms(file, room.value_or(""));
 }
 
-Doubles positions_of(const LampMapFile& lamps) {
-  const LampMap& map = lamps.map;
-  Doubles positions = doubles({static_cast<py::ssize_t>(map.lamps.size()), 3});
-  double* next = positions.mutable_data();
-  for (const Lamp& lamp : map.lamps) next = std::copy_n(lamp.position_m.data(), 3, next);
+Rows3 positions_of(const LampMapFile& lamps) {
+  Rows3 positions(std::ssize(lamps.map.lamps), 3);
+  Eigen::Index row = 0;
+  for (const Lamp& lamp : lamps.map.lamps) positions.row(row++) = lamp.position_m;
   return positions;
 }
 
-Integers ids_of(const LampMapFile& lamps) {
-  const LampMap& map = lamps.map;
-  Integers ids(static_cast<py::ssize_t>(map.lamps.size()));
-  std::transform(map.lamps.begin(), map.lamps.end(), ids.mutable_data(),
-                 [](const Lamp& lamp) { return lamp.id; });
+Eigen::VectorXi ids_of(const LampMapFile& lamps) {
+  Eigen::VectorXi ids(std::ssize(lamps.map.lamps));
+  std::ranges::transform(lamps.map.lamps, ids.begin(), &Lamp::id);
   return ids;
 }
 
@@ -125,25 +115,20 @@ Lens make_lens(const std::string& model, const std::vector<double>& intrinsics) 
   return Lens(*known, intrinsics);
 }
 
-Doubles project(const Lens& lens, const Doubles& points) {
-  const std::size_t n = count_rows(points, 3, "points");
-  Doubles pixels = doubles({static_cast<py::ssize_t>(n), 2});
-  for (std::size_t i = 0; i < n; ++i) {
+Rows2 project(const Lens& lens, const Doubles& points) {
+  Rows2 pixels(count_rows(points, 3, "points"), 2);
+  for (Eigen::Index i = 0; i < pixels.rows(); ++i) {
     const auto pixel = lens.project(Eigen::Vector3d(points.data() + 3 * i));
-    pixels.mutable_data()[2 * i] = pixel ? pixel->x() : kNone;
-    pixels.mutable_data()[2 * i + 1] = pixel ? pixel->y() : kNone;
+    pixels.row(i) = pixel.value_or(Eigen::Vector2d::Constant(kNone));
   }
   return pixels;
 }
 
-Doubles unproject(const Lens& lens, const Doubles& pixels) {
-  const std::size_t n = count_rows(pixels, 2, "pixels");
-  Doubles rays = doubles({static_cast<py::ssize_t>(n), 3});
-  for (std::size_t i = 0; i < n; ++i) {
+Rows3 unproject(const Lens& lens, const Doubles& pixels) {
+  Rows3 rays(count_rows(pixels, 2, "pixels"), 3);
+  for (Eigen::Index i = 0; i < rays.rows(); ++i) {
     const auto ray = lens.unproject(Eigen::Vector2d(pixels.data() + 2 * i));
-    const Eigen::Vector3d direction =
-        ray ? ray->direction.normalized() : Eigen::Vector3d(kNone, kNone, kNone);
-    std::copy_n(direction.data(), 3, rays.mutable_data() + 3 * i);
+    rays.row(i) = ray ? ray->direction.normalized() : kNowhere;
   }
   return rays;
 }
@@ -199,7 +184,7 @@ Sensors make_sensors(const std::optional<Pair>& inclination_rad, double inclinat
 
 std::vector<Detection> make_detections(const Integers& lamps, const Doubles& pixels,
                                        const std::optional<Doubles>& sigma_px) {
-  const std::size_t n = count_rows(pixels, 2, "pixels");
+  const auto n = static_cast<std::size_t>(count_rows(pixels, 2, "pixels"));
   check_length(lamps, n, "lamps");
   if (sigma_px) check_length(*sigma_px, n, "sigma_px");
   std::vector<Detection> detections(n);
@@ -247,55 +232,36 @@ py::dict locate_frames(const Positioner& positioner, const py::object& frame_of_
   check_length(frames, detections.size(), "frames");
   const auto begins = find_frame_begins(frames);
   const auto n = static_cast<py::ssize_t>(begins.size()) - 1;
-  Integers frame(n), status(n), used(n);
-  Doubles position = doubles({n, 3}), yaw = doubles({n}), residual = doubles({n});
-  Doubles covariance = doubles({n, 4, 4});
-  int* const frame_out = frame.mutable_data();
-  int* const status_out = status.mutable_data();
-  int* const used_out = used.mutable_data();
-  double* const position_out = position.mutable_data();
-  double* const yaw_out = yaw.mutable_data();
-  double* const residual_out = residual.mutable_data();
+  Eigen::VectorXi frame(n), status(n), used(n);
+  Rows3 position(n, 3);
+  Eigen::VectorXd yaw(n), residual(n);
+  Doubles covariance(std::vector<py::ssize_t>{n, 4, 4});
   double* const covariance_out = covariance.mutable_data();
   const int* const frame_in = frames.data();
   {
     const py::gil_scoped_release others_may_run;
-    for (std::size_t i = 0; i + 1 < begins.size(); ++i) {
-      const Fix fix =
-          positioner.locate({detections.data() + begins[i], begins[i + 1] - begins[i]}, sensors);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const std::size_t begin = begins[static_cast<std::size_t>(i)];
+      const std::size_t end = begins[static_cast<std::size_t>(i) + 1];
+      const Fix fix = positioner.locate({detections.data() + begin, end - begin}, sensors);
       const bool ok = fix.ok();
-      frame_out[i] = frame_in[begins[i]];
-      status_out[i] = static_cast<int>(fix.status);
-      used_out[i] = ok ? fix.lamps : 0;
-      const auto& [pose, of_pose] = fix.estimate;
-      for (int k = 0; k < 3; ++k)
-        position_out[3 * i + static_cast<std::size_t>(k)] = ok ? pose.position_m[k] : kNone;
-      yaw_out[i] = ok ? pose.yaw_rad : kNone;
-      residual_out[i] = ok ? fix.residual_px : kNone;
-      Eigen::Map<Matrix4> rows(covariance_out + 16 * i);  // symmetric
-      if (ok) {
-        rows = of_pose;
-      } else {
-        rows.setConstant(kNone);
-      }
+      frame[i] = frame_in[begin];
+      status[i] = static_cast<int>(fix.status);
+      used[i] = ok ? fix.lamps : 0;
+      position.row(i) = ok ? fix.estimate.pose.position_m : kNowhere;
+      yaw[i] = ok ? fix.estimate.pose.yaw_rad : kNone;
+      residual[i] = ok ? fix.residual_px : kNone;
+      Eigen::Map<Matrix4>(covariance_out + 16 * i) =  // symmetric
+          ok ? fix.estimate.covariance : kUnknown;
     }
   }
-  py::dict fixes;
-  fixes["frame"] = frame;
-  fixes["status"] = status;
-  fixes["position_m"] = position;
-  fixes["yaw_rad"] = yaw;
-  fixes["covariance"] = covariance;
-  fixes["residual_px"] = residual;
-  fixes["lamps"] = used;
-  return fixes;
+  return py::dict("frame"_a = frame, "status"_a = status, "position_m"_a = position,
+                  "yaw_rad"_a = yaw, "covariance"_a = covariance, "residual_px"_a = residual,
+                  "lamps"_a = used);
 }
 
-py::object body_covariance(const Fix& fix) {
-  if (!fix.body) return py::none();
-  Doubles rows = doubles({kBodyStates, kBodyStates});
-  Eigen::Map<BodyCovariance>(rows.mutable_data()) = fix.body->covariance;  // symmetric
-  return rows;
+std::optional<BodyCovariance> body_covariance(const Fix& fix) {
+  return fix.body ? std::optional(fix.body->covariance) : std::nullopt;
 }
 
 std::vector<int> rejected_ids(const Fix& fix) {
@@ -327,13 +293,15 @@ ImageView make_image_view(const py::array& array) {
 }
 
 py::tuple to_arrays(const std::vector<Detection>& detections) {
-  const auto n = static_cast<py::ssize_t>(detections.size());
-  Integers lamps(n);
-  Doubles pixels = doubles({n, 2}), sigma_px = doubles({n});
-  for (std::size_t i = 0; i < detections.size(); ++i) {
-    lamps.mutable_data()[i] = detections[i].lamp;
-    std::copy_n(detections[i].pixel.data(), 2, pixels.mutable_data() + 2 * i);
-    sigma_px.mutable_data()[i] = detections[i].sigma_px.value_or(kNone);
+  const auto n = std::ssize(detections);
+  Eigen::VectorXi lamps(n);
+  Rows2 pixels(n, 2);
+  Eigen::VectorXd sigma_px(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Detection& detection = detections[static_cast<std::size_t>(i)];
+    lamps[i] = detection.lamp;
+    pixels.row(i) = detection.pixel;
+    sigma_px[i] = detection.sigma_px.value_or(kNone);
   }
   return py::make_tuple(lamps, pixels, sigma_px);
 }
@@ -398,58 +366,43 @@ py::dict detections_table(const std::filesystem::path& file) {
     images.append(frame.image);
   }
   const py::tuple arrays = to_arrays(all);
-  py::dict table;
-  table["images"] = images;
-  table["frames"] = Integers(static_cast<py::ssize_t>(frames.size()), frames.data());
-  table["lamps"] = arrays[0];
-  table["pixels"] = arrays[1];
-  table["sigma_px"] = arrays[2];
-  return table;
+  return py::dict("images"_a = images, "frames"_a = Integers(std::ssize(frames), frames.data()),
+                  "lamps"_a = arrays[0], "pixels"_a = arrays[1], "sigma_px"_a = arrays[2]);
 }
 
 py::dict fixes_table(const std::filesystem::path& file) {
   const auto rows = read_fixes(file);
-  const auto n = static_cast<py::ssize_t>(rows.size());
+  const auto n = std::ssize(rows);
   py::list images, statuses;
-  Doubles position = doubles({n, 3}), yaw = doubles({n}), sd = doubles({n, 4});
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    images.append(rows[i].image);
-    statuses.append(rows[i].status);
-    const auto& fix = rows[i].fix;
-    const Eigen::Vector3d none = Eigen::Vector3d::Constant(kNone);
-    const Eigen::Vector3d at = fix ? fix->pose.position_m : none;
-    const Eigen::Vector4d stated =
-        fix && fix->sd ? *fix->sd : Eigen::Vector4d(Eigen::Vector4d::Constant(kNone));
-    std::copy_n(at.data(), 3, position.mutable_data() + 3 * i);
-    std::copy_n(stated.data(), 4, sd.mutable_data() + 4 * i);
-    yaw.mutable_data()[i] = fix ? fix->pose.yaw_rad : kNone;
+  Rows3 position(n, 3);
+  Eigen::VectorXd yaw(n);
+  Eigen::Matrix<double, Eigen::Dynamic, 4, Eigen::RowMajor> sd(n, 4);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const FixRow& row = rows[static_cast<std::size_t>(i)];
+    images.append(row.image);
+    statuses.append(row.status);
+    position.row(i) = row.fix ? row.fix->pose.position_m : kNowhere;
+    yaw[i] = row.fix ? row.fix->pose.yaw_rad : kNone;
+    sd.row(i).setConstant(kNone);
+    if (row.fix && row.fix->sd) sd.row(i) = *row.fix->sd;
   }
-  py::dict table;
-  table["images"] = images;
-  table["statuses"] = statuses;
-  table["position_m"] = position;
-  table["yaw_rad"] = yaw;
-  table["sd"] = sd;
-  return table;
+  return py::dict("images"_a = images, "statuses"_a = statuses, "position_m"_a = position,
+                  "yaw_rad"_a = yaw, "sd"_a = sd);
 }
 
 py::dict truth_table(const std::filesystem::path& file) {
   const auto rows = read_truth(file);
-  const auto n = static_cast<py::ssize_t>(rows.size());
+  const auto n = std::ssize(rows);
   py::list images;
-  Doubles position = doubles({n, 3}), yaw = doubles({n});
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    images.append(rows[i].image);
-    double* const xyz = position.mutable_data() + 3 * i;
-    std::copy_n(rows[i].xy_m.data(), 2, xyz);
-    xyz[2] = rows[i].z_m.value_or(kNone);
-    yaw.mutable_data()[i] = rows[i].yaw_rad.value_or(kNone);
+  Rows3 position(n, 3);
+  Eigen::VectorXd yaw(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const TruthRow& row = rows[static_cast<std::size_t>(i)];
+    images.append(row.image);
+    position.row(i) << row.xy_m.x(), row.xy_m.y(), row.z_m.value_or(kNone);
+    yaw[i] = row.yaw_rad.value_or(kNone);
   }
-  py::dict table;
-  table["images"] = images;
-  table["position_m"] = position;
-  table["yaw_rad"] = yaw;
-  return table;
+  return py::dict("images"_a = images, "position_m"_a = position, "yaw_rad"_a = yaw);
 }
 
 /// Throws ImportError if this module cannot read the arrays of the installed numpy: pybind11 before
@@ -468,7 +421,6 @@ void check_numpy() {
 
 /// Defines the statuses of fixes and their explanations.
 void define_statuses(py::module_& m) {
-  using namespace pybind11::literals;
   py::list statuses;
   for (int i = 0; i < kStatuses; ++i) statuses.append(to_string(static_cast<FixStatus>(i)));
   m.attr("STATUSES") = py::tuple(statuses);
@@ -483,7 +435,6 @@ void define_statuses(py::module_& m) {
 
 /// Defines lamp map, lens and calibration.
 void define_calibration(py::module_& m) {
-  using namespace pybind11::literals;
   py::class_<LampMapFile>(m, "LampMap", "The lamps of a room, lamps.yaml.")
       .def(py::init(&lamps_of), "file"_a, "room"_a = py::none(),
            "room: only the lamps that state this room; None: all lamps.")
@@ -506,7 +457,10 @@ void define_calibration(py::module_& m) {
       .def_property_readonly("lens_model",
                              [](const Calibration& c) { return to_string(c.camera.lens_model); })
       .def_property_readonly("intrinsics",
-                             [](const Calibration& c) { return to_array(c.camera.intrinsics); })
+                             [](const Calibration& c) -> Eigen::VectorXd {
+                               return Eigen::VectorXd::Map(c.camera.intrinsics.data(),
+                                                           std::ssize(c.camera.intrinsics));
+                             })
       .def_property_readonly("row_time_s", [](const Calibration& c) { return c.camera.row_time_s; })
       .def_property_readonly("lens", [](const Calibration& c) {
         return Lens(c.camera.lens_model, c.camera.intrinsics);
@@ -519,19 +473,18 @@ void define_fix(py::module_& m) {
       .def_property_readonly("ok", &Fix::ok)
       .def_property_readonly("status", [](const Fix& fix) { return to_string(fix.status); })
       .def_property_readonly("explanation", [](const Fix& fix) { return describe(fix.status); })
-      .def_property_readonly("position_m",
-                             [](const Fix& fix) {
-                               return to_array(fix.ok() ? fix.estimate.pose.position_m : kNowhere);
-                             })
+      .def_property_readonly(
+          "position_m",
+          [](const Fix& fix) { return fix.ok() ? fix.estimate.pose.position_m : kNowhere; })
       .def_property_readonly(
           "yaw_rad", [](const Fix& fix) { return fix.ok() ? fix.estimate.pose.yaw_rad : kNone; })
       .def_property_readonly(
           "covariance",
-          [](const Fix& fix) { return to_array(fix.ok() ? fix.estimate.covariance : kUnknown); },
+          [](const Fix& fix) { return fix.ok() ? fix.estimate.covariance : kUnknown; },
           "(4, 4), of x, y, z, yaw: all that is known of the error.")
       .def_property_readonly(
           "noise_covariance",
-          [](const Fix& fix) { return to_array(fix.ok() ? fix.noise_covariance : kUnknown); },
+          [](const Fix& fix) { return fix.ok() ? fix.noise_covariance : kUnknown; },
           "The part that is of this frame alone and averages out.")
       .def_property_readonly(
           "lean_rad",
@@ -565,7 +518,6 @@ void define_fix(py::module_& m) {
 
 /// Defines sensors, positioner and lamp detector.
 void define_positioner(py::module_& m) {
-  using namespace pybind11::literals;
   py::class_<Sensors>(m, "Sensors", "What a robot knows of a frame besides the image.")
       .def(py::init(&make_sensors), py::kw_only(), "inclination_rad"_a = py::none(),
            "inclination_sigma_rad"_a = 0.0, "height_and_yaw"_a = py::none(),
@@ -606,7 +558,6 @@ void define_positioner(py::module_& m) {
 
 /// Defines the readers of tables.
 void define_tables(py::module_& m) {
-  using namespace pybind11::literals;
   m.def("read_detections", &detections_table, "file"_a,
         "detections.csv as a dict: images, and for each detection frames (an index of images),\n"
         "lamps, pixels, sigma_px.");

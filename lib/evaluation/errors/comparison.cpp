@@ -8,28 +8,9 @@
 
 #include "captures/name_index.h"
 #include "captures/number_text.h"
-#include "rig/input_error.h"
 
 namespace vlp {
 namespace {
-
-/// Checks that every image of `fixes` is in `others`.
-void check_images_in(const FromFile<FixRow>& fixes, const FromFile<FixRow>& others) {
-  NameIndex images(others.rows.size());
-  for (const FixRow& row : others.rows) images.insert(row.image);
-  std::size_t num_unmatched = 0;
-  const FixRow* first = nullptr;
-  for (const FixRow& row : fixes.rows) {
-    if (images.find(row.image)) continue;
-    ++num_unmatched;
-    if (first == nullptr) first = &row;
-  }
-  if (first == nullptr) return;
-  throw InputError(fixes.file, first->line, "image",
-                   "'" + first->image + "' is not in " + others.file.string() + "; " +
-                       std::to_string(num_unmatched) + " of " + std::to_string(fixes.rows.size()) +
-                       " images are not: are both of the same captures?");
-}
 
 std::size_t count_distinct(std::vector<std::size_t> clusters) {
   std::sort(clusters.begin(), clusters.end());
@@ -91,11 +72,6 @@ Comparison compare(const std::vector<FixRow>& fixes, const std::vector<FixError>
     comparison.clusters = count_distinct(std::move(clusters));
   }
   return comparison;
-}
-
-void check_same_images(const FromFile<FixRow>& fixes, const FromFile<FixRow>& others) {
-  check_images_in(others, fixes);
-  check_images_in(fixes, others);
 }
 
 }  // namespace vlp

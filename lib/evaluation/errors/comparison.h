@@ -57,8 +57,4 @@ Comparison compare(const std::vector<FixRow>& fixes, const std::vector<FixError>
                    const std::vector<FixRow>& other_fixes,
                    const std::vector<FixError>& other_errors, int threads);
 
-/// @throws InputError if the two files do not have rows of the same images, with the count and the
-/// line of the first
-void check_same_images(const FromFile<FixRow>& fixes, const FromFile<FixRow>& others);
-
 }  // namespace vlp

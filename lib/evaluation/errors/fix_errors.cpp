@@ -12,52 +12,29 @@
 namespace vlp {
 namespace {
 
-/// Finds rows of the ground truth by image; fastest for images in the order of the rows.
-class TruthRowFinder {
- public:
-  explicit TruthRowFinder(const std::vector<TruthRow>& truth) : truth_(truth) {}
-
-  std::optional<std::size_t> operator()(const std::string& image) {
-    if (next_ < truth_.size() && truth_[next_].image == image) return next_++;
-    if (!index_) {
-      index_.emplace(truth_.size());
-      for (const TruthRow& row : truth_) index_->insert(row.image);
-    }
-    const auto found = index_->find(image);
-    if (found) next_ = *found + 1;
-    return found;
-  }
-
- private:
-  const std::vector<TruthRow>& truth_;
-  std::size_t next_ = 0;
-  std::optional<NameIndex> index_;
-};
-
-/// Returns the row of the ground truth for each fix.
-std::vector<std::size_t> match_rows(const FromFile<FixRow>& fixes,
-                                    const FromFile<TruthRow>& truth) {
-  TruthRowFinder find_row(truth.rows);
+/// Returns the row of `table` for the image of each fix. Throws InputError if an image has none;
+/// `hint` follows the name of the table's file in the message, `question` ends it.
+template <typename Row>
+std::vector<std::size_t> match_rows(const FromFile<FixRow>& fixes, const FromFile<Row>& table,
+                                    const std::string& hint, const std::string& question) {
+  NameIndex images(table.rows.size());
+  for (const Row& row : table.rows) images.insert(row.image);
   std::vector<std::size_t> rows;
   rows.reserve(fixes.rows.size());
   std::size_t num_unmatched = 0;
   const FixRow* first = nullptr;
   for (const FixRow& fix : fixes.rows) {
-    const auto row = find_row(fix.image);
+    const auto row = images.find(fix.image);
     rows.push_back(row.value_or(0));
     if (row) continue;
     ++num_unmatched;
     if (first == nullptr) first = &fix;
   }
-  if (first != nullptr) {
-    throw InputError(fixes.file, first->line, "image",
-                     "'" + first->image + "' is not in " + truth.file.string() +
-                         ", whose first is '" + truth.rows.front().image + "'; " +
-                         std::to_string(num_unmatched) + " of " +
-                         std::to_string(fixes.rows.size()) +
-                         " images are not: is it the truth of these captures?");
-  }
-  return rows;
+  if (first == nullptr) return rows;
+  throw InputError(fixes.file, first->line, "image",
+                   "'" + first->image + "' is not in " + table.file.string() + hint + "; " +
+                       std::to_string(num_unmatched) + " of " + std::to_string(fixes.rows.size()) +
+                       " images are not: " + question);
 }
 
 std::vector<std::size_t> group_captures(const std::vector<TruthRow>& truth, double station_m) {
@@ -73,7 +50,10 @@ std::vector<std::size_t> group_captures(const std::vector<TruthRow>& truth, doub
 
 FixErrors errors_against_truth(const FromFile<FixRow>& fixes, const FromFile<TruthRow>& truth,
                                double station_m) {
-  const std::vector<std::size_t> truth_rows = match_rows(fixes, truth);
+  const std::string hint =
+      truth.rows.empty() ? "" : ", whose first is '" + truth.rows.front().image + "'";
+  const std::vector<std::size_t> truth_rows =
+      match_rows(fixes, truth, hint, "is it the truth of these captures?");
   const std::vector<std::size_t> stations = group_captures(truth.rows, station_m);
   FixErrors result;
   result.captures = truth.rows.size();
@@ -119,6 +99,12 @@ FixErrors errors_against_path(const std::vector<FixRow>& fixes, const Path& path
   const std::size_t count = result.errors.size(), runs = std::min(count, kPathRuns);
   for (std::size_t i = 0; i < count; ++i) result.errors[i].cluster = i * runs / count;
   return result;
+}
+
+void check_same_images(const FromFile<FixRow>& fixes, const FromFile<FixRow>& others) {
+  const std::string question = "are both of the same captures?";
+  match_rows(others, fixes, "", question);
+  match_rows(fixes, others, "", question);
 }
 
 }  // namespace vlp

@@ -67,4 +67,8 @@ inline constexpr std::size_t kPathRuns = 30;
 /// the Analysis of Simulation Output", 1982, recommends 10 to 30 batches.
 FixErrors errors_against_path(const std::vector<FixRow>& fixes, const Path& path);
 
+/// @throws InputError if the two files do not have rows of the same images, with the count and the
+/// line of the first
+void check_same_images(const FromFile<FixRow>& fixes, const FromFile<FixRow>& others);
+
 }  // namespace vlp
