@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "rig/file_mode.h"
+#include "rig/file.h"
 #include "rig/input_error.h"
 
 namespace vlp {

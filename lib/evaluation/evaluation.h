@@ -9,13 +9,13 @@
 #include <utility>
 #include <vector>
 
-#include "evaluation/errors/bias_and_scatter.h"
 #include "evaluation/errors/bootstrap.h"
 #include "evaluation/errors/comparison.h"
 #include "evaluation/errors/error_figures.h"
 #include "evaluation/errors/error_ratios.h"
 #include "evaluation/errors/fix_errors.h"
 #include "evaluation/errors/line_fit.h"
+#include "evaluation/metric.h"
 
 namespace vlp {
 
@@ -74,5 +74,9 @@ FixErrors compute_errors(const EvaluationInput& input, const FromFile<FixRow>& f
 /// Evaluates the fixes of `input`.
 /// @throws InputError if image names do not match
 Evaluation evaluate(const EvaluationInput& input);
+
+/// Returns the metrics of MetricSource::evaluation and ::reference that were measured, in their
+/// order.
+std::vector<Metric> collect_metrics(const Evaluation& evaluation);
 
 }  // namespace vlp

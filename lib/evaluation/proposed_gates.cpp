@@ -10,7 +10,7 @@
 #include <numbers>
 #include <optional>
 
-#include "evaluation/evaluation_metrics.h"
+#include "evaluation/evaluation.h"
 
 namespace vlp {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "evaluation/sample_size_warnings.h"
 #include "geometry/angles.h"
-#include "report/plots/round_numbers.h"
+#include "report/plots/plot_parts.h"
 
 namespace vlp {
 namespace {

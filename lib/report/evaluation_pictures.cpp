@@ -9,11 +9,8 @@
 
 #include "positioning/floor_summary.h"
 #include "positioning/unit_errors.h"
-#include "report/plots/budget_plot.h"
-#include "report/plots/cdf_plot.h"
-#include "report/plots/error_plot.h"
-#include "report/plots/round_numbers.h"
-#include "report/plots/track_plot.h"
+#include "report/plots/evaluation_plots.h"
+#include "report/plots/plot_parts.h"
 
 namespace vlp {
 namespace {

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <sys/stat.h>
 #include <cstddef>
 #include <filesystem>
 #include <string>
@@ -73,5 +74,10 @@ class AtomicFileWriter {
 /// Replaces `path` by `content` atomically (AtomicFileWriter). Throws InputError.
 [[gnu::visibility("hidden")]] void write_file(const std::filesystem::path& path,
                                               std::string_view content);
+
+/// Sets the permissions (read, write, execute), owner and group of an open file to those of the
+/// file that it replaces; owner and group as far as this process may set them. If the group
+/// differs, it gets no permissions. Returns false, and sets errno, if they cannot be read or set.
+[[gnu::visibility("hidden")]] bool keep_mode_and_owner(int descriptor, const struct stat& former);
 
 }  // namespace vlp

@@ -6,7 +6,7 @@
 
 #include <algorithm>
 
-#include "evaluation/evaluation_metrics.h"
+#include "evaluation/evaluation.h"
 #include "evaluation/sample_size_warnings.h"
 #include "report/evaluation_figures.h"
 #include "report/evaluation_pictures.h"

@@ -7,8 +7,8 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "evaluation/evaluation.h"
 #include "evaluation/evaluation_files.h"
-#include "evaluation/evaluation_metrics.h"
 #include "evaluation/junit.h"
 #include "support/random.h"
 #include "support/rejection_message.h"

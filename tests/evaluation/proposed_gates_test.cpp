@@ -6,7 +6,7 @@
 
 #include <random>
 
-#include "evaluation/evaluation_metrics.h"
+#include "evaluation/evaluation.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {

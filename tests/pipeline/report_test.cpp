@@ -4,8 +4,8 @@
 
 #include <gmock/gmock.h>
 
-#include "report/plots/cdf_plot.h"
-#include "report/plots/intrinsics_plot.h"
+#include "report/plots/calibration_plots.h"
+#include "report/plots/evaluation_plots.h"
 #include "support/datasets.h"
 #include "support/program.h"
 #include "support/temporary_folder.h"

@@ -4,8 +4,7 @@
 
 #include <gmock/gmock.h>
 
-#include "report/plots/dispersion_plot.h"
-#include "report/plots/rotation_plot.h"
+#include "report/plots/calibration_plots.h"
 #include "support/rejection_message.h"
 #include "support/temporary_folder.h"
 

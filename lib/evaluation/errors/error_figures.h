@@ -2,10 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <Eigen/Core>
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
+
+#include "evaluation/errors/fix_errors.h"
 
 namespace vlp {
 
@@ -35,5 +39,34 @@ SignedErrorStatistics compute_signed_error_statistics(std::vector<double> errors
 /// Returns the cumulative distribution as pairs of fraction and quantile, at 1 %, 2 %, ..., 100 %.
 /// @pre not empty
 std::vector<std::pair<double, double>> compute_distribution(std::vector<double> errors);
+
+/// Bias and repeatability over the reference points with two fixes or more.
+struct BiasAndScatter {
+  /// Reference point and the statistics of its fixes.
+  struct Station {
+    /// True position of its first capture.
+    Eigen::Vector2d xy_m;
+    std::size_t fixes;
+    /// Mean of its horizontal errors e.
+    Eigen::Vector2d bias_m;
+    /// Horizontal standard deviation of x and y together, sqrt(sum |e - bias|^2 / (fixes - 1)).
+    double sd_m;
+  };
+  /// Reference points in the order of the ground truth.
+  std::vector<Station> stations;
+  std::size_t fixes;
+  /// Repeatability within reference points, sqrt(sum |e - bias of its station|^2 / (fixes -
+  /// stations)).
+  double scatter_m;
+  /// RMS bias of the reference points, weighted by fixes and corrected for the scatter of the
+  /// means: sqrt((sum |bias|^2 - stations scatter^2) / fixes), where the sum is over the fixes. Not
+  /// below zero.
+  double bias_m;
+};
+
+/// Computes bias and scatter from the errors of errors_against_truth(). Returns std::nullopt if no
+/// reference point has two fixes.
+std::optional<BiasAndScatter> compute_bias_and_scatter(const std::vector<FixError>& errors,
+                                                       const std::vector<TruthRow>& truth);
 
 }  // namespace vlp

@@ -31,10 +31,7 @@ void draw_floor_plot(const std::filesystem::path& picture, const FloorPlot& plot
   const std::string half = significant(plot.step_m / 2, kPlotDigits);
   const std::string commands =
       data_block("places", places) + data_block("lamps", on_floor) + plot_settings() +
-      "set title " + gnuplot_quoted(plot.title) +
-      " noenhanced\n"
-      "set cblabel " +
-      gnuplot_quoted(plot.label) +
+      set_title(plot.title) + "set cblabel " + gnuplot_quoted(plot.label) +
       " noenhanced\n"
       "set xlabel 'x (m)'\n"
       "set ylabel 'y (m)'\n"

@@ -1,10 +1,51 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
+
 #include "report/plots/plot_parts.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <numeric>
 
 #include "captures/number_text.h"
 
 namespace vlp {
+namespace {
+
+/// Returns "2nd", "11th".
+std::string ordinal(std::size_t number) {
+  const bool teen = number / 10 % 10 == 1;
+  const std::size_t last = teen ? 0 : number % 10;
+  return std::to_string(number) + (last == 1 ? "st" : last == 2 ? "nd" : last == 3 ? "rd" : "th");
+}
+
+}  // namespace
+
+double round_below(double value) {
+  const double power = std::pow(10, std::floor(std::log10(value) + 1e-9));
+  for (const double digit : {5, 2}) {
+    if (digit * power <= value * (1 + 1e-9)) return digit * power;
+  }
+  return power;
+}
+
+std::vector<double> round_numbers(double lowest, double highest) {
+  std::vector<double> numbers{round_below(lowest)};
+  while (numbers.back() < highest * (1 - 1e-9)) {
+    numbers.push_back(round_below(numbers.back() * 2.5));
+  }
+  if (numbers.size() == 1) numbers.push_back(round_below(numbers.back() * 2.5));
+  return numbers;
+}
+
+std::string readable(double value, int digits) {
+  return std::abs(value) >= std::pow(10, digits) ? fixed(value, 0) : significant(value, digits);
+}
+
+std::string format_mm(double length_m) { return readable(1e3 * length_m, 3); }
+
+std::string format_mm_with_unit(double length_m) { return significant(1e3 * length_m, 3) + " mm"; }
 
 std::string gnuplot_quoted(const std::string& text) {
   std::string quoted = "'";
@@ -39,8 +80,39 @@ std::string plot_settings() {
          "set palette defined (0 '#440154', 1 '#3b528b', 2 '#21918c', 3 '#5ec962', 4 '#fde725')\n";
 }
 
+std::string set_title(const std::string& title) {
+  return "set title " + gnuplot_quoted(title) + " noenhanced\n";
+}
+
+std::string line_color(const std::string& color) { return " linecolor rgb '" + color + "' "; }
+
 std::string plot_range(double from, double to) {
   return "[" + significant(from, kPlotDigits) + ":" + significant(to, kPlotDigits) + "]";
+}
+
+std::size_t thinning_step(std::size_t count, std::size_t max_count) {
+  assert(max_count > 0);
+  return count <= max_count ? 1 : (count + max_count - 1) / max_count;
+}
+
+std::string thinning_note(std::size_t count, std::size_t step) {
+  if (step == 1) return "";
+  return "every " + ordinal(step) + " of " + std::to_string(count) + " drawn";
+}
+
+std::vector<std::size_t> select_every_nth_and_largest(std::span<const double> values,
+                                                      std::size_t step, std::size_t largest) {
+  std::vector<std::size_t> all(values.size()), chosen;
+  std::iota(all.begin(), all.end(), 0);
+  for (std::size_t i = 0; i < values.size(); i += step) chosen.push_back(i);
+  const auto end = all.begin() + static_cast<std::ptrdiff_t>(std::min(largest, all.size()));
+  std::partial_sort(all.begin(), end, all.end(), [&](std::size_t a, std::size_t b) {
+    return values[a] != values[b] ? values[a] > values[b] : a < b;
+  });
+  chosen.insert(chosen.end(), all.begin(), end);
+  std::sort(chosen.begin(), chosen.end());
+  chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
+  return chosen;
 }
 
 }  // namespace vlp

@@ -2,10 +2,33 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <initializer_list>
+#include <span>
 #include <string>
+#include <vector>
 
 namespace vlp {
+
+/// Returns the largest of ..., 0.1, 0.2, 0.5, 1, 2, 5, ... that does not exceed `value`, except for
+/// rounding.
+/// @pre value > 0
+double round_below(double value);
+
+/// Returns consecutive numbers of that series, at least two. The first is the last one that does
+/// not exceed `lowest`, the last is the first one that is not below `highest`.
+/// @pre 0 < least <= most
+std::vector<double> round_numbers(double lowest, double highest);
+
+/// Formats a number for humans with `digits` significant digits. Integer digits are all kept, so
+/// that large numbers have no exponent.
+std::string readable(double value, int digits);
+
+/// Format a length in millimeters with three significant digits. format_mm() has no unit and
+/// keeps all integer digits, as readable(). format_mm_with_unit() appends the unit and is for
+/// columns.
+std::string format_mm(double length_m);
+std::string format_mm_with_unit(double length_m);
 
 /// Color-blind safe palette of Okabe and Ito. Items that differ in color also differ in marker or
 /// dashes.
@@ -33,7 +56,25 @@ std::string data_block(const std::string& name, const std::string& rows);
 /// palette viridis. Viridis is even in lightness, and readable in gray and for the color-blind.
 std::string plot_settings();
 
+/// Returns the command that sets the title, without interpretation of its content.
+std::string set_title(const std::string& title);
+
+/// Returns the clause of a color, with a space before and after.
+std::string line_color(const std::string& color);
+
 /// Returns the range `[from:to]`.
 std::string plot_range(double from, double to);
+
+/// Returns the step, at least 1, for which every step-th of `count` items are no more than
+/// `max_count` items.
+/// @pre max_count > 0
+std::size_t thinning_step(std::size_t count, std::size_t max_count);
+
+/// Returns "every 3rd of 250 drawn"; empty for a step of 1.
+std::string thinning_note(std::size_t count, std::size_t step);
+
+/// Returns the ascending indices of every step-th value and of the `largest` largest values.
+std::vector<std::size_t> select_every_nth_and_largest(std::span<const double> values,
+                                                      std::size_t step, std::size_t largest);
 
 }  // namespace vlp

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "evaluation/errors/bias_and_scatter.h"
+#include "evaluation/errors/error_figures.h"
 
 #include <gmock/gmock.h>
 

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "report/plots/budget_plot.h"
+#include "report/plots/evaluation_plots.h"
 
 #include <gmock/gmock.h>
 

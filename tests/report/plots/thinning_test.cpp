@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "report/plots/thinning.h"
+#include "report/plots/plot_parts.h"
 
 #include <gmock/gmock.h>
 
