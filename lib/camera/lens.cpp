@@ -25,24 +25,7 @@ Matrix23 division_jacobian(const Eigen::Vector2d& z, double inverse_depth) {
   return jacobian;
 }
 
-class Pinhole : public LensFamily {
- public:
-  std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& x) const override {
-    if (!(x.z() > 0)) return std::nullopt;
-    return x.head<2>() / x.z();
-  }
-  Jacobians jacobians(const Eigen::Vector3d& x) const override {
-    const double inverse_depth = 1 / x.z();
-    return {division_jacobian(x.head<2>() * inverse_depth, inverse_depth), {}};
-  }
-  std::optional<Ray> unproject(const Eigen::Vector2d& plane) const override {
-    Ray ray;
-    ray.direction << plane, 1;
-    ray.d_direction_d_plane << Eigen::Matrix2d::Identity(), 0, 0;
-    return ray;
-  }
-};
-
+/// OPENCVn; also PINHOLE, which is OPENCV0.
 class Opencv : public LensFamily {
  public:
   explicit Opencv(std::span<const double> distortions)
@@ -270,8 +253,6 @@ std::shared_ptr<const LensFamily> make_lens_family(LensModel model,
                                                    std::span<const double> distortions) {
   if (is_splined(model)) return std::make_shared<Splined>(grid_of(model), distortions);
   switch (model) {
-    case LensModel::pinhole:
-      return std::make_shared<Pinhole>();
     case LensModel::stereographic:
       return std::make_shared<Stereographic>();
     case LensModel::fisheye:

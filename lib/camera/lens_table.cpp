@@ -9,19 +9,18 @@
 namespace vlp {
 namespace {
 
-constexpr double kTiny = 1e-6;
-constexpr std::array<LensDistortion, 12> kOpencv{{{"k1", kTiny},
-                                                  {"k2", kTiny},
-                                                  {"p1", kTiny},
-                                                  {"p2", kTiny},
-                                                  {"k3", kTiny},
-                                                  {"k4", kTiny},
-                                                  {"k5", kTiny},
-                                                  {"k6", kTiny},
-                                                  {"s1", kTiny},
-                                                  {"s2", kTiny},
-                                                  {"s3", kTiny},
-                                                  {"s4", kTiny}}};
+constexpr std::array<LensDistortion, 12> kOpencv{{{"k1"},
+                                                  {"k2"},
+                                                  {"p1"},
+                                                  {"p2"},
+                                                  {"k3"},
+                                                  {"k4"},
+                                                  {"k5"},
+                                                  {"k6"},
+                                                  {"s1"},
+                                                  {"s2"},
+                                                  {"s3"},
+                                                  {"s4"}}};
 // 2 tan(a / 2) = a (1 + a^2 / 12 + ...)
 constexpr std::array<LensDistortion, 4> kFisheye{
     {{"k1", 1 / 12.0}, {"k2", 1 / 120.0}, {"k3", 17 / 20160.0}, {"k4", 31 / 362880.0}}};

@@ -14,7 +14,7 @@ struct LensDistortion {
   std::string_view name;
   /// Initial value for a solve. With the initial values the lens is nearly STEREOGRAPHIC. The value
   /// is not 0 if 0 is a stationary point.
-  double start;
+  double start = 1e-6;
 };
 
 /// Name and parameters of a lens model. Its equations are in camera/lens.cpp.

@@ -4,6 +4,7 @@
 #include "evaluation/evaluation.h"
 
 #include <algorithm>
+#include <functional>
 
 #include "geometry/angles.h"
 
@@ -16,14 +17,8 @@ Path make_reference_path(const EvaluationInput& input) {
 }
 
 void add_horizontal(Evaluation& evaluation, const std::vector<FixError>& errors, int threads) {
-  std::vector<double> sizes_m;
-  std::vector<std::size_t> clusters;
-  sizes_m.reserve(errors.size());
-  clusters.reserve(errors.size());
-  for (const FixError& error : errors) {
-    sizes_m.push_back(error.horizontal_m.norm());
-    clusters.push_back(error.cluster);
-  }
+  auto [sizes_m, clusters] =
+      collect_component(errors, [](const FixError& error) { return error.horizontal_m.norm(); });
   evaluation.intervals_m = compute_error_intervals(sizes_m, clusters, threads);
   evaluation.horizontal_m = compute_error_statistics(sizes_m);
   evaluation.distribution_m = compute_distribution(std::move(sizes_m));
@@ -31,11 +26,7 @@ void add_horizontal(Evaluation& evaluation, const std::vector<FixError>& errors,
 
 std::optional<SignedErrorStatistics> compute_signed_statistics(
     const std::vector<FixError>& errors, std::optional<double> FixError::*part) {
-  std::vector<double> values;
-  values.reserve(errors.size());
-  for (const FixError& error : errors) {
-    if (error.*part) values.push_back(*(error.*part));
-  }
+  auto values = collect_component(errors, std::mem_fn(part)).values;
   if (values.empty()) return std::nullopt;
   return compute_signed_error_statistics(std::move(values));
 }

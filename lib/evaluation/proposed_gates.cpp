@@ -37,22 +37,12 @@ double compute_limit(double value, const Interval& interval) {
   return round_up(value + margin);
 }
 
-/// Computes the intervals of |size_of(error)|, without errors for which `size_of` returns
-/// std::nullopt.
-std::optional<ErrorIntervals> compute_intervals(
-    const std::vector<FixError>& errors,
-    const std::function<std::optional<double>(const FixError&)>& size_of, int threads) {
-  std::vector<double> sizes;
-  std::vector<std::size_t> clusters;
-  sizes.reserve(errors.size());
-  clusters.reserve(errors.size());
-  for (const FixError& error : errors) {
-    if (const auto size = size_of(error)) {
-      sizes.push_back(std::abs(*size));
-      clusters.push_back(error.cluster);
-    }
-  }
-  if (sizes.empty()) return std::nullopt;
+/// Computes the intervals of the absolute values of a part, without errors that lack it.
+std::optional<ErrorIntervals> compute_intervals(const std::vector<FixError>& errors,
+                                                std::optional<double> FixError::*part,
+                                                int threads) {
+  auto [sizes, clusters] = collect_component(errors, std::mem_fn(part));
+  for (double& size : sizes) size = std::abs(size);
   return compute_error_intervals(sizes, clusters, threads);
 }
 
@@ -72,11 +62,9 @@ std::vector<Gate> propose_gates(const EvaluationInput& input, const Evaluation& 
     add("p90_mm", evaluation.horizontal_m.p90, *p90_m, millimeters);
   }
   const std::vector<FixError> errors = compute_errors(input, input.fixes).errors;
-  const auto height_m = compute_intervals(
-      errors, [](const FixError& error) { return error.height_m; }, input.threads);
+  const auto height_m = compute_intervals(errors, &FixError::height_m, input.threads);
   if (height_m) add("height_rms_mm", evaluation.height_m->sizes.rms, height_m->rms, millimeters);
-  const auto yaw_rad = compute_intervals(
-      errors, [](const FixError& error) { return error.yaw_rad; }, input.threads);
+  const auto yaw_rad = compute_intervals(errors, &FixError::yaw_rad, input.threads);
   if (yaw_rad) add("yaw_rms_deg", evaluation.yaw_rad->sizes.rms, yaw_rad->rms, degrees);
   constexpr double millionth = 1e-6;  // resolution of the written limit
   gates.push_back(

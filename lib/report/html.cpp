@@ -5,6 +5,7 @@
 #include <openssl/evp.h>
 
 #include <algorithm>
+#include <map>
 
 #include "report/report_style.h"
 
@@ -25,33 +26,20 @@ std::string base64(const std::string& bytes) {
 }  // namespace
 
 std::string html_text(std::string_view text) {
+  static const std::map<char, std::string_view> escapes{
+      {'&', "&amp;"},  {'<', "&lt;"}, {'>', "&gt;"}, {'"', "&quot;"},
+      {'\'', "&#39;"}, {'\n', " "},   {'\t', " "}};
   constexpr unsigned char first_printable = 0x20, del = 0x7f;
   std::string escaped;
   escaped.reserve(text.size());
   for (const char c : text) {
     const auto byte = static_cast<unsigned char>(c);
-    switch (c) {
-      case '&':
-        escaped += "&amp;";
-        break;
-      case '<':
-        escaped += "&lt;";
-        break;
-      case '>':
-        escaped += "&gt;";
-        break;
-      case '"':
-        escaped += "&quot;";
-        break;
-      case '\'':
-        escaped += "&#39;";
-        break;
-      case '\n':
-      case '\t':
-        escaped += ' ';
-        break;
-      default:
-        escaped += byte < first_printable || byte == del ? "\xef\xbf\xbd" : std::string(1, c);
+    if (const auto escape = escapes.find(c); escape != escapes.end()) {
+      escaped += escape->second;
+    } else if (byte < first_printable || byte == del) {
+      escaped += "\xef\xbf\xbd";
+    } else {
+      escaped += c;
     }
   }
   return escaped;

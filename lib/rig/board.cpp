@@ -30,24 +30,27 @@ constexpr int kMaxId = 1'000'000;  // families have fewer
 constexpr double kMinTag_m = 1e-4, kMaxTag_m = 2;
 constexpr double kMaxPrintSd = 0.02;  // check_board() detects larger errors
 
-IdOrder read_id_order(const YamlValue& value) {
-  std::string names;
-  for (const bool column_major : {false, true}) {
-    for (std::size_t corner = 0; corner < kCorners.size(); ++corner) {
-      const IdOrder order{column_major, static_cast<BoardCorner>(corner)};
-      if (value.text() == to_string(order)) return order;
-      names += (names.empty() ? "" : ", ") + to_string(order);
-    }
+/// Returns the index of a word among `names`. For other words, the message lists the names after
+/// `introduction`.
+std::size_t find_word(const YamlValue& value, const auto& names, const std::string& introduction) {
+  std::string list;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (value.text() == names[i]) return i;
+    list += (i == 0 ? "" : ", ") + std::string(names[i]);
   }
-  throw value.unknown("the orders are: " + names);
+  throw value.unknown(introduction + list);
 }
 
-std::string read_family(const YamlValue& value) {
-  std::string family = value.text();
-  if (std::find(kFamilies.begin(), kFamilies.end(), family) != kFamilies.end()) return family;
-  std::string names;
-  for (const char* name : kFamilies) names += (names.empty() ? "" : ", ") + std::string(name);
-  throw value.unknown("the families are: " + names);
+IdOrder read_id_order(const YamlValue& value) {
+  std::vector<IdOrder> orders;
+  std::vector<std::string> names;
+  for (const bool column_major : {false, true}) {
+    for (std::size_t corner = 0; corner < kCorners.size(); ++corner) {
+      orders.push_back({column_major, static_cast<BoardCorner>(corner)});
+      names.push_back(to_string(orders.back()));
+    }
+  }
+  return orders[find_word(value, names, "the orders are: ")];
 }
 
 /// Returns a board of squares without tags.
@@ -55,15 +58,6 @@ Board make_board_of_squares(BoardKind kind) {
   Board board{"", 0, 0, 0, 1, 1, false, 0, {false, BoardCorner::top_left}};
   board.kind = kind;
   return board;
-}
-
-BoardKind read_kind(const YamlValue& value) {
-  std::string names;
-  for (std::size_t kind = 0; kind < kKinds.size(); ++kind) {
-    if (value.text() == kKinds[kind]) return static_cast<BoardKind>(kind);
-    names += (names.empty() ? "" : ", ") + std::string(kKinds[kind]);
-  }
-  throw value.unknown("the kinds of boards are: " + names);
 }
 
 Board read_squares(YamlMap& map, BoardKind kind) {
@@ -128,10 +122,6 @@ Board read_kalibr_target(YamlMap& map) {
   return board;
 }
 
-void emit_print(YAML::Emitter& out, const Board& board) {
-  if (board.print_sd > 0) emit_number(out, "print_sd", board.print_sd);
-}
-
 }  // namespace
 
 std::string to_string(const IdOrder& order) {
@@ -141,10 +131,12 @@ std::string to_string(const IdOrder& order) {
 
 Board read_board(YamlMap& map) {
   const auto named = map.optional("kind");
-  const BoardKind kind = named ? read_kind(*named) : BoardKind::apriltags;
+  const BoardKind kind =
+      named ? static_cast<BoardKind>(find_word(*named, kKinds, "the kinds of boards are: "))
+            : BoardKind::apriltags;
   if (kind != BoardKind::apriltags) return read_squares(map, kind);
   Board board;
-  board.family = read_family(map.required("family"));
+  board.family = kFamilies[find_word(map.required("family"), kFamilies, "the families are: ")];
   board.cols = map.required("cols").integer_within(1, kMaxTags);
   board.rows = map.required("rows").integer_within(1, kMaxTags);
   board.tag_size_m = map.required("tag_size_m").number_within(kMinTag_m, kMaxTag_m, "m");
@@ -174,29 +166,28 @@ void write_board(const std::filesystem::path& file, const Board& board) {
   emit_word(out, "format", kBoardFormat);
   if (board.has_squares()) {
     emit_word(out, "kind", kKinds[static_cast<std::size_t>(board.kind)]);
-    emit_integer(out, "cols", board.cols);
-    emit_integer(out, "rows", board.rows);
-    emit_number(out, "square_size_m", board.square_size_m);
-    if (board.kind == BoardKind::charuco) {
-      emit_number(out, "marker_size_m", board.tag_size_m);
-      emit_word(out, "dictionary", board.family);
-      emit_integer(out, "first_id", board.first_id);
-      emit_word(out, "top_left", board.top_left_white ? "white" : "black");
-    }
-    emit_print(out, board);
-    out << YAML::EndMap << YAML::Newline;
-    return write_file(file, out.c_str());
+  } else {
+    emit_word(out, "family", board.family);
   }
-  emit_word(out, "family", board.family);
   emit_integer(out, "cols", board.cols);
   emit_integer(out, "rows", board.rows);
-  emit_number(out, "tag_size_m", board.tag_size_m);
-  emit_number(out, "tag_spacing", board.tag_spacing);
-  emit_integer(out, "border_bits", board.border_bits);
-  emit_word(out, "corner_squares", board.corner_squares ? "true" : "false");
-  emit_integer(out, "first_id", board.first_id);
-  emit_word(out, "id_order", to_string(board.id_order));
-  emit_print(out, board);
+  if (board.has_squares()) {
+    emit_number(out, "square_size_m", board.square_size_m);
+  } else {
+    emit_number(out, "tag_size_m", board.tag_size_m);
+    emit_number(out, "tag_spacing", board.tag_spacing);
+    emit_integer(out, "border_bits", board.border_bits);
+    emit_word(out, "corner_squares", board.corner_squares ? "true" : "false");
+    emit_integer(out, "first_id", board.first_id);
+    emit_word(out, "id_order", to_string(board.id_order));
+  }
+  if (board.kind == BoardKind::charuco) {
+    emit_number(out, "marker_size_m", board.tag_size_m);
+    emit_word(out, "dictionary", board.family);
+    emit_integer(out, "first_id", board.first_id);
+    emit_word(out, "top_left", board.top_left_white ? "white" : "black");
+  }
+  if (board.print_sd > 0) emit_number(out, "print_sd", board.print_sd);
   out << YAML::EndMap << YAML::Newline;
   write_file(file, out.c_str());
 }

@@ -18,7 +18,7 @@
 #include "captures/parallel_for.h"
 #include "geometry/angles.h"
 #include "rig/input_error.h"
-#include "simulation/seeded_random.h"
+#include "simulation/scene.h"
 
 namespace vlp {
 namespace {

@@ -4,10 +4,13 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <opencv2/core.hpp>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -18,6 +21,13 @@
 #include "rig/lamp_map.h"
 
 namespace vlp {
+
+/// Returns a random generator seeded by a seed, a name and an index alone; the same on every
+/// machine.
+cv::RNG make_random(std::uint64_t seed, std::string_view name, std::size_t index);
+
+/// Draws a seed of 64 bits.
+std::uint64_t draw_seed_from(cv::RNG& random);
 
 /// Square wave that switches a lamp: lit while frac(frequency t + phase) < duty.
 struct SquareWave {

@@ -11,7 +11,7 @@
 #include "geometry/frames.h"
 #include "rig/board_layout.h"
 #include "simulation/exposure.h"
-#include "simulation/seeded_random.h"
+#include "simulation/scene.h"
 
 namespace vlp {
 namespace {
@@ -82,12 +82,9 @@ Eigen::Vector2d BaseMotion::camera_velocity_m_per_s() const {
 Eigen::Isometry3d BaseMotion::world_from_camera(double time_s) const {
   const Pose level = pose(time_s);
   Eigen::Isometry3d world_from_camera;
-  world_from_camera.linear() = rotation_about_z(level.yaw_rad) * mount.level_from_camera;
-  if (!is_level()) {
-    world_from_camera.linear() = rotation_about_z(level.yaw_rad) *
-                                 level_from_inclination(inclination(time_s)) *
-                                 mount.level_from_camera;
-  }
+  world_from_camera.linear() = rotation_about_z(level.yaw_rad) *
+                               level_from_inclination(inclination(time_s)) *
+                               mount.level_from_camera;
   world_from_camera.translation() = level.position_m;
   return world_from_camera;
 }
@@ -132,19 +129,20 @@ LampShot make_lamp_shot(const Scene& scene, const CaptureSet& set, std::size_t i
   shot.motion.vibration = captures.vibration;
   shot.motion.phase_rad = std::remainder(
       2 * std::numbers::pi * captures.vibration.frequency_hz * shot.time_s, 2 * std::numbers::pi);
-  for (const SceneLamp& lamp : scene.lamps) {
+  const auto draw_phase = [&](const std::optional<double>& phase, double frequency_hz) {
     const double free_phase = random.uniform(0.0, 1.0);
-    const double periods = lamp.phase ? *lamp.phase + lamp.frequency_hz * shot.time_s : free_phase;
-    shot.waves.push_back({lamp.frequency_hz, lamp.duty, periods - std::floor(periods)});
+    const double periods = phase ? *phase + frequency_hz * shot.time_s : free_phase;
+    return periods - std::floor(periods);
+  };
+  for (const SceneLamp& lamp : scene.lamps) {
+    shot.waves.push_back({lamp.frequency_hz, lamp.duty, draw_phase(lamp.phase, lamp.frequency_hz)});
   }
   shot.noise_seed = draw_seed_from(random);
   // Drawn last, so that the other random values equal those of a scene without such lights.
   for (const ForeignLight& light : scene.clutter.foreign_lights) {
-    const double free_phase = random.uniform(0.0, 1.0);
     const double frequency_hz =
         std::visit([](const auto& wave) { return wave.frequency_hz; }, light.wave);
-    const double periods = light.phase ? *light.phase + frequency_hz * shot.time_s : free_phase;
-    shot.foreign_waves.push_back(with_phase(light.wave, periods - std::floor(periods)));
+    shot.foreign_waves.push_back(with_phase(light.wave, draw_phase(light.phase, frequency_hz)));
   }
   if (scene.clutter.ambient_flicker) shot.ambient_phase = random.uniform(0.0, 1.0);
   return shot;

@@ -33,7 +33,7 @@
 #include "simulation/exposure.h"
 #include "simulation/frame_renderer.h"
 #include "simulation/pixel_window.h"
-#include "simulation/seeded_random.h"
+#include "simulation/scene.h"
 #include "simulation/truth.h"
 
 namespace vlp {

@@ -29,6 +29,25 @@ struct FixError {
   std::size_t truth = 0;
 };
 
+/// One component of errors, with the cluster of each error.
+struct ErrorComponent {
+  std::vector<double> values;
+  std::vector<std::size_t> clusters;
+};
+
+/// Collects `value_of(error)`, without the errors for which it returns std::nullopt.
+template <typename Value>
+ErrorComponent collect_component(const std::vector<FixError>& errors, const Value& value_of) {
+  ErrorComponent component;
+  for (const FixError& error : errors) {
+    const std::optional<double> value = value_of(error);
+    if (!value) continue;
+    component.values.push_back(*value);
+    component.clusters.push_back(error.cluster);
+  }
+  return component;
+}
+
 /// Errors of all fixes and the captures without a fix.
 struct FixErrors {
   /// Number of captures that should have a fix.

@@ -5,33 +5,21 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "captures/path_table.h"
 
 namespace vlp {
 namespace {
 
-struct Scatter {
-  std::size_t count = 0;
-  Eigen::Vector2d mean_m{0, 0};
-  Eigen::Matrix2d matrix_m2 = Eigen::Matrix2d::Zero();
-};
-
-Scatter compute_scatter(const std::vector<FixRow>& fixes) {
-  Scatter scatter;
+/// Returns x and y of the fixes, a column each.
+Eigen::Matrix2Xd collect_points_m(const std::vector<FixRow>& fixes) {
+  std::vector<double> values_m;
   for (const FixRow& row : fixes) {
     if (!row.fix) continue;
-    ++scatter.count;
-    scatter.mean_m += row.fix->pose.position_m.head<2>();
+    const Eigen::Vector3d& place_m = row.fix->pose.position_m;
+    values_m.insert(values_m.end(), {place_m.x(), place_m.y()});
   }
-  if (scatter.count > 0) scatter.mean_m /= static_cast<double>(scatter.count);
-  for (const FixRow& row : fixes) {
-    if (!row.fix) continue;
-    const Eigen::Vector2d from_mean_m = row.fix->pose.position_m.head<2>() - scatter.mean_m;
-    scatter.matrix_m2 += from_mean_m * from_mean_m.transpose();
-  }
-  return scatter;
+  return Eigen::Matrix2Xd::Map(values_m.data(), 2, std::ssize(values_m) / 2);
 }
 
 double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
@@ -42,25 +30,21 @@ double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
 
 std::optional<LineFit> fit_line(const std::vector<FixRow>& fixes,
                                 const CommandedLine& commanded_m) {
-  const Scatter scatter = compute_scatter(fixes);
-  if (scatter.count < 2) return std::nullopt;
+  const Eigen::Matrix2Xd points_m = collect_points_m(fixes);
+  if (points_m.cols() < 2) return std::nullopt;
+  const Eigen::Vector2d mean_m = points_m.rowwise().mean();
+  const Eigen::Matrix2Xd from_mean_m = points_m.colwise() - mean_m;
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes;
-  axes.computeDirect(scatter.matrix_m2);
+  axes.computeDirect(from_mean_m * from_mean_m.transpose());
   const double across_m2 = std::max(0.0, axes.eigenvalues()[0]), along_m2 = axes.eigenvalues()[1];
   if (!(along_m2 > 0) || along_m2 < 2 * across_m2) return std::nullopt;
 
   const Eigen::Vector2d commanded = commanded_m[1] - commanded_m[0];
   Eigen::Vector2d direction = axes.eigenvectors().col(1);
   if (direction.dot(commanded) < 0) direction = -direction;
-  double first_m = std::numeric_limits<double>::infinity(), last_m = -first_m;
-  for (const FixRow& row : fixes) {
-    if (!row.fix) continue;
-    const double along_m = direction.dot(row.fix->pose.position_m.head<2>() - scatter.mean_m);
-    first_m = std::min(first_m, along_m);
-    last_m = std::max(last_m, along_m);
-  }
-  const CommandedLine line_m{scatter.mean_m + first_m * direction,
-                             scatter.mean_m + last_m * direction};
+  const Eigen::RowVectorXd along_m = direction.transpose() * from_mean_m;
+  const CommandedLine line_m{mean_m + along_m.minCoeff() * direction,
+                             mean_m + along_m.maxCoeff() * direction};
   const Path path{{commanded_m[0], commanded_m[1]}, {}};
   std::vector<double> distances_m;
   distances_m.reserve(kLineSamples);
@@ -70,7 +54,7 @@ std::optional<LineFit> fit_line(const std::vector<FixRow>& fixes,
     distances_m.push_back((point_m - find_nearest_on_path(path, point_m).xy_m).norm());
   }
   return LineFit{line_m, std::atan2(cross(commanded, direction), commanded.dot(direction)),
-                 std::sqrt(across_m2 / static_cast<double>(scatter.count)),
+                 std::sqrt(across_m2 / static_cast<double>(points_m.cols())),
                  compute_error_statistics(distances_m), compute_distribution(distances_m)};
 }
 
