@@ -200,7 +200,7 @@ class Score {
       const double distance_px = (other.pixel - pixel).norm();
       if (distance_px > min_px) continue;
       min_px = distance_px;
-      name = "at " + std::string(vlp::to_string(other.kind));
+      name = "at " + other.kind;
     }
     return name;
   }
