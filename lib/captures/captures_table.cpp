@@ -22,8 +22,7 @@ struct Pair {
 
   std::optional<Eigen::Vector2d> read(const CsvTable& csv, std::size_t row,
                                       CsvTable::Column image) const {
-    const auto a = first ? csv.optional_number(row, *first) : std::nullopt;
-    const auto b = second ? csv.optional_number(row, *second) : std::nullopt;
+    const auto a = csv.optional_number(row, first), b = csv.optional_number(row, second);
     if (a.has_value() != b.has_value()) {
       std::string problem("has one of ");
       problem.append(first_name).append(" and ").append(second_name);
@@ -46,7 +45,7 @@ CapturesTable read_captures(const std::filesystem::path& file) {
   CapturesTable table;
   for (std::size_t row = 0; row < csv.rows(); ++row) {
     const auto field = [&](std::optional<CsvTable::Column> column) {
-      return column ? csv.optional_number(row, *column) : std::nullopt;
+      return csv.optional_number(row, column);
     };
     Capture capture;
     capture.time_s = field(csv.optional("time_s"));

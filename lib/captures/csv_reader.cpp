@@ -9,7 +9,7 @@
 #include <cmath>
 #include <unordered_set>
 
-#include "captures/csv_formula.h"
+#include "captures/csv_writer.h"
 #include "rig/file.h"
 #include "rig/renamed.h"
 #include "rig/yaml_text.h"
@@ -160,9 +160,10 @@ int CsvTable::integer(std::size_t row, Column column) const {
   return *value;
 }
 
-std::optional<double> CsvTable::optional_number(std::size_t row, Column column) const {
-  if (text(row, column).empty()) return std::nullopt;
-  return number(row, column);
+std::optional<double> CsvTable::optional_number(std::size_t row,
+                                                std::optional<Column> column) const {
+  if (!column || text(row, *column).empty()) return std::nullopt;
+  return number(row, *column);
 }
 
 InputError CsvTable::error(std::size_t row, Column column, const std::string& problem) const {

@@ -40,8 +40,8 @@ class CsvTable {
   int integer(std::size_t row, Column column) const;
   /// Returns a coordinate in meters. Throws InputError also if it exceeds kMaxCoordinate_m.
   double coordinate_m(std::size_t row, Column column) const;
-  /// Returns a number; std::nullopt if the field is empty.
-  std::optional<double> optional_number(std::size_t row, Column column) const;
+  /// Returns a number; std::nullopt if the column is missing or the field is empty.
+  std::optional<double> optional_number(std::size_t row, std::optional<Column> column) const;
 
   /// Returns the line in the file at which a row begins, from 1.
   std::size_t line(std::size_t row) const { return lines_[row]; }

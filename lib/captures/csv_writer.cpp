@@ -6,8 +6,6 @@
 
 #include <charconv>
 
-#include "captures/csv_formula.h"
-
 namespace vlp {
 namespace {
 

@@ -23,8 +23,9 @@ std::vector<Frame> read_detections(const std::filesystem::path& file) {
     const auto [entry, is_new] = frame_of_image.try_emplace(name, frames.size());
     if (is_new) frames.push_back({name, {}});
     auto& detections = frames[entry->second].detections;
-    Detection detection{csv.integer(row, lamp), {csv.number(row, u_px), csv.number(row, v_px)}, {}};
-    if (sigma_px) detection.sigma_px = csv.optional_number(row, *sigma_px);
+    const Detection detection{csv.integer(row, lamp),
+                              {csv.number(row, u_px), csv.number(row, v_px)},
+                              csv.optional_number(row, sigma_px)};
     const double sigma = detection.sigma_px.value_or(1);
     if (sigma < kMinSigma_px || sigma > kMaxSigma_px) {
       throw csv.error(row, *sigma_px, "should be within 0.0001 and 1000 px");

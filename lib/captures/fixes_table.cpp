@@ -42,9 +42,7 @@ struct FixColumns {
 std::optional<Eigen::Vector2d> read_pair(
     const CsvTable& csv, std::size_t row,
     const std::array<std::optional<CsvTable::Column>, 2>& columns) {
-  const auto& [first, second] = columns;
-  const auto a = first ? csv.optional_number(row, *first) : std::nullopt;
-  const auto b = second ? csv.optional_number(row, *second) : std::nullopt;
+  const auto a = csv.optional_number(row, columns[0]), b = csv.optional_number(row, columns[1]);
   if (!a || !b) return std::nullopt;
   return Eigen::Vector2d(*a, *b);
 }
@@ -55,7 +53,7 @@ std::optional<Eigen::Vector4d> read_sds(
   Eigen::Vector4d sd;
   for (int i = 0; i < 4; ++i) {
     const auto column = columns[static_cast<std::size_t>(i)];
-    const auto value = column ? csv.optional_number(row, *column) : std::nullopt;
+    const auto value = csv.optional_number(row, column);
     if (!value) return std::nullopt;
     if (*value < 0) throw csv.error(row, *column, "should not be negative");
     sd[i] = *value;
@@ -69,11 +67,8 @@ FixRow::Fix read_fix(const CsvTable& csv, std::size_t row, const FixColumns& col
       {{csv.coordinate_m(row, x_m), csv.coordinate_m(row, y_m), csv.coordinate_m(row, z_m)},
        csv.number(row, yaw_rad)},
       read_sds(csv, row, columns.sd),
-      0,
+      csv.optional_number(row, columns.residual_px).value_or(0),
       read_sds(csv, row, columns.noise_sd)};
-  if (columns.residual_px) {
-    fix.residual_px = csv.optional_number(row, *columns.residual_px).value_or(0);
-  }
   fix.velocity_m_per_s = read_pair(csv, row, columns.velocity);
   if (const auto lean = read_pair(csv, row, columns.lean)) fix.inclination = {lean->x(), lean->y()};
   return fix;
@@ -209,7 +204,7 @@ std::vector<FixRow> read_fixes(const std::filesystem::path& file) {
     if (read.status == "ok") read.fix = read_fix(csv, row, columns);
     if (columns.rejected) read.rejected = read_ids(csv, row, *columns.rejected);
     if (columns.outside_region) read.outside_region = read_ids(csv, row, *columns.outside_region);
-    if (columns.time_s) read.time_s = csv.optional_number(row, *columns.time_s);
+    read.time_s = csv.optional_number(row, columns.time_s);
   }
   if (rows.empty()) throw InputError(file, "holds no fix");
   return rows;

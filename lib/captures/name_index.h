@@ -3,37 +3,30 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
 #include <optional>
 #include <string_view>
-#include <vector>
+#include <unordered_map>
 
 #include "captures/csv_reader.h"
 
 namespace vlp {
 
-/// Index of each name: a hash table with open addressing, for tables of millions of rows. It holds
-/// views: the names must outlive it.
+/// Index of each name. It holds views: the names must outlive it.
 class NameIndex {
  public:
-  /// Reserves memory for `max_names` names, fewer than 2^32.
-  explicit NameIndex(std::size_t max_names);
+  /// Reserves memory for `max_names` names.
+  explicit NameIndex(std::size_t max_names) { indices_.reserve(max_names); }
 
   /// Adds a name with the next index, from 0. Returns false, without a change, if the name exists.
-  bool insert(std::string_view name);
+  bool insert(std::string_view name) { return indices_.try_emplace(name, indices_.size()).second; }
   /// Returns the index of a name; std::nullopt if it does not exist.
-  std::optional<std::size_t> find(std::string_view name) const;
+  std::optional<std::size_t> find(std::string_view name) const {
+    const auto found = indices_.find(name);
+    return found == indices_.end() ? std::nullopt : std::optional(found->second);
+  }
 
  private:
-  struct Slot {
-    std::uint32_t hash = 0;
-    std::uint32_t next_index = 0;  // 0: free
-  };
-  /// Returns the slot of the name, or the free slot for it.
-  std::size_t find_slot(std::string_view name, std::uint64_t hash) const;
-
-  std::vector<Slot> slots_;
-  std::vector<std::string_view> names_;
+  std::unordered_map<std::string_view, std::size_t> indices_;
 };
 
 /// Returns the name in a cell and adds it to `names`. Throws InputError if it is empty or occurs in

@@ -3,44 +3,11 @@
 #include "captures/printable.h"
 
 #include <cstddef>
-#include <utility>
+
+#include "rig/yaml_text.h"
 
 namespace vlp {
 namespace {
-
-/// Range of the second byte of a character, by its first (RFC 3629, section 4).
-std::pair<unsigned char, unsigned char> second_byte_range(unsigned char first) {
-  switch (first) {
-    case 0xe0:
-      return {0xa0, 0xbf};
-    case 0xed:
-      return {0x80, 0x9f};  // no surrogates
-    case 0xf0:
-      return {0x90, 0xbf};
-    case 0xf4:
-      return {0x80, 0x8f};
-    default:
-      return {0x80, 0xbf};
-  }
-}
-
-/// Returns the bytes of the character that begins here; 0 if none does (RFC 3629).
-std::size_t length_of_character(std::string_view text) {
-  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
-  const unsigned char first = byte(0);
-  const std::size_t length = first < 0x80                    ? 1
-                             : first >= 0xc2 && first < 0xe0 ? 2
-                             : first >= 0xe0 && first < 0xf0 ? 3
-                             : first >= 0xf0 && first < 0xf5 ? 4
-                                                             : 0;
-  if (length > text.size()) return 0;
-  const auto [min_second, max_second] = second_byte_range(first);
-  if (length > 1 && (byte(1) < min_second || byte(1) > max_second)) return 0;
-  for (std::size_t i = 1; i < length; ++i) {
-    if (byte(i) < 0x80 || byte(i) >= 0xc0) return 0;
-  }
-  return length;
-}
 
 /// Returns true for line separators and marks that change the direction of the text around
 /// them (Unicode Standard Annex 9, section 2): U+061C, U+200E, U+200F, U+2028 to U+202E, U+2066 to
@@ -75,7 +42,7 @@ std::string escape(std::string_view text, std::string_view kept) {
   constexpr std::string_view digits = "0123456789abcdef";
   std::string result;
   while (!text.empty()) {
-    const std::size_t length = length_of_character(text);
+    const std::size_t length = character_length(text);
     const std::string_view character = text.substr(0, length);
     if (length > 0 && (!is_control(character) || kept.find(character) != kept.npos)) {
       result += character;

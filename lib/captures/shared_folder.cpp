@@ -6,8 +6,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <algorithm>
-#include <array>
 #include <cerrno>
 #include <system_error>
 #include <utility>
@@ -31,71 +29,12 @@ constexpr const char* kLink =
   throw InputError(file, what + ": " + std::generic_category().message(errno));
 }
 
-/// Descriptor that is closed when it goes out of scope.
-class OpenFile {
- public:
-  explicit OpenFile(int descriptor) : descriptor_(descriptor) {}
-  ~OpenFile() {
-    if (descriptor_ >= 0) ::close(descriptor_);
-  }
-  OpenFile(const OpenFile&) = delete;
-  OpenFile& operator=(const OpenFile&) = delete;
-
-  int get() const { return descriptor_; }
-
- private:
-  int descriptor_;
-};
-
 /// Returns the status of a file, or of a link itself; std::nullopt if it does not exist.
 std::optional<struct stat> read_status(int folder, const std::string& name) {
   struct stat status {};
   if (::fstatat(folder, name.c_str(), &status, AT_SYMLINK_NOFOLLOW) != 0) return std::nullopt;
   return status;
 }
-
-void write_all(int descriptor, std::string_view content, const fs::path& file) {
-  while (!content.empty()) {
-    const ssize_t written = ::write(descriptor, content.data(), content.size());
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0) fail(file, "cannot be written");
-    content.remove_prefix(static_cast<std::size_t>(written));
-  }
-}
-
-/// Temporary file in the folder of the replaced one; removed unless it was renamed.
-class TemporaryFile {
- public:
-  TemporaryFile(int folder, const std::string& name) : folder_(folder) {
-    constexpr std::size_t max_bytes = 200;  // of the 255 of a file name
-    const std::string begin =
-        "." + name.substr(0, max_bytes) + ".tmp-" + std::to_string(::getpid()) + "-";
-    constexpr int flags = O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC;
-    for (int number = 0;; ++number) {
-      name_ = begin + std::to_string(number);
-      descriptor_ = ::openat(folder, name_.c_str(), flags, 0666);
-      if (descriptor_ >= 0 || errno != EEXIST) return;
-    }
-  }
-  ~TemporaryFile() {
-    if (descriptor_ < 0) return;
-    ::close(descriptor_);
-    if (!is_renamed_) ::unlinkat(folder_, name_.c_str(), 0);
-  }
-  TemporaryFile(const TemporaryFile&) = delete;
-  TemporaryFile& operator=(const TemporaryFile&) = delete;
-
-  int descriptor() const { return descriptor_; }
-  bool rename_to(const std::string& name) {
-    is_renamed_ = ::renameat(folder_, name_.c_str(), folder_, name.c_str()) == 0;
-    return is_renamed_;
-  }
-
- private:
-  int folder_, descriptor_;
-  std::string name_;
-  bool is_renamed_ = false;
-};
 
 }  // namespace
 
@@ -122,6 +61,10 @@ void SharedFolder::check_place() const {
     return;
   }
   throw InputError(path_, "was moved or replaced while it was in use: restore it, then run again");
+}
+
+fs::path SharedFolder::opened_path() const {
+  return "/proc/self/fd/" + std::to_string(descriptor_);
 }
 
 fs::path SharedFolder::checked(const std::string& name) const {
@@ -182,45 +125,19 @@ int SharedFolder::open(const std::string& name, int flags) const {
 std::optional<std::string> SharedFolder::read(const std::string& name,
                                               std::size_t max_bytes) const {
   const fs::path path = checked(name);
-  const OpenFile file(open(name, O_RDONLY));
-  if (file.get() < 0) {
+  const int descriptor = open(name, O_RDONLY);
+  if (descriptor < 0) {
     if (errno == ENOENT) return std::nullopt;
     fail(path, "cannot be opened");
   }
-  std::string content;
-  struct stat status {};
-  if (::fstat(file.get(), &status) == 0) {
-    content.reserve(std::min(static_cast<std::size_t>(status.st_size), max_bytes) + 1);
-  }
-  constexpr std::size_t block_bytes = 1 << 16;
-  for (std::array<char, block_bytes> block{};;) {
-    const ssize_t count = ::read(file.get(), block.data(), block.size());
-    if (count < 0 && errno == EINTR) continue;
-    if (count < 0) fail(path, "cannot be read");
-    if (count == 0) return content;
-    content.append(block.data(), static_cast<std::size_t>(count));
-    if (content.size() > max_bytes) {
-      constexpr int mebibyte_bits = 20;
-      const std::size_t mebibytes = max_bytes >> mebibyte_bits;
-      const std::string limit =
-          mebibytes > 0 ? std::to_string(mebibytes) + " MiB" : std::to_string(max_bytes) + " bytes";
-      throw InputError(path, "is longer than " + limit + ": is it the right file?");
-    }
-  }
+  InputFile file(path, descriptor, max_bytes);
+  return read_file(file);
 }
 
 void SharedFolder::replace(const std::string& name, std::string_view content) const {
-  const fs::path path = checked(name);
-  const auto former = read_status(descriptor_, name);
-  TemporaryFile file(descriptor_, name);
-  if (file.descriptor() < 0) fail(path, "cannot be written");
-  if (former && S_ISREG(former->st_mode) && !keep_mode_and_owner(file.descriptor(), *former)) {
-    fail(path, "cannot be written");
-  }
-  write_all(file.descriptor(), content, path);
-  if (::fsync(file.descriptor()) != 0) fail(path, "cannot be written");
-  if (!file.rename_to(name)) fail(path, "cannot be written");
-  ::fsync(descriptor_);  // not every file system supports it; the file is complete in any case
+  AtomicFileWriter file(opened_path(), name, checked(name));
+  file.write(content);
+  file.save();
 }
 
 bool SharedFolder::rename(const std::string& from, const std::string& to) const {
@@ -245,12 +162,10 @@ void SharedFolder::remove_folder(const Id& name) const {
 }
 
 void SharedFolder::remove_content() const {
-  // Uses the open folder, whose name may refer to another one by now.
-  const fs::path open = "/proc/self/fd/" + std::to_string(descriptor_);
   std::error_code error;
   std::vector<fs::path> entries;
-  for (fs::directory_iterator entry(open, error); !error && entry != fs::directory_iterator();
-       entry.increment(error)) {
+  for (fs::directory_iterator entry(opened_path(), error);
+       !error && entry != fs::directory_iterator(); entry.increment(error)) {
     entries.push_back(entry->path());
   }
   for (auto entry = entries.begin(); !error && entry != entries.end(); ++entry) {

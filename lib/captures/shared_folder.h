@@ -57,6 +57,8 @@ class SharedFolder {
  private:
   SharedFolder(std::filesystem::path path, int descriptor);
   std::filesystem::path checked(const std::string& name) const;
+  /// Returns a path of the open folder, whose name may refer to another one by now.
+  std::filesystem::path opened_path() const;
 
   std::filesystem::path path_;
   int descriptor_;

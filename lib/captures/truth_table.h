@@ -26,4 +26,26 @@ struct TruthRow {
 /// empty or occurs twice; if there are no rows
 std::vector<TruthRow> read_truth(const std::filesystem::path& file);
 
+/// A polyline in the world with at least two waypoints.
+struct Path {
+  std::vector<Eigen::Vector2d> waypoints_m;
+  /// Heights of the waypoints; empty if unknown.
+  std::vector<double> z_m;
+};
+
+/// Point of a path closest to a position, horizontally.
+struct NearestOnPath {
+  Eigen::Vector2d xy_m;
+  /// Height interpolated between the waypoints; std::nullopt if the path has no heights.
+  std::optional<double> z_m;
+};
+
+/// Returns the point of a path closest to a position.
+NearestOnPath find_nearest_on_path(const Path& path, const Eigen::Vector2d& position_m);
+
+/// Reads a path. Columns: x_m, y_m and, optionally, z_m.
+/// @throws InputError as CsvTable; if a coordinate exceeds kMaxCoordinate_m; if there are fewer
+/// than two waypoints, or all coincide
+Path read_path(const std::filesystem::path& file);
+
 }  // namespace vlp

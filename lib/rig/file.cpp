@@ -112,12 +112,32 @@ int create_beside(const fs::path& target, mode_t mode, fs::path& temporary) {
   }
 }
 
+/// Sets the permissions (read, write, execute), owner and group of an open file to those of the
+/// file that it replaces; owner and group as far as this process may set them. If the group
+/// differs, it gets no permissions. Returns false, and sets errno, if they cannot be read or set.
+bool keep_mode_and_owner(int descriptor, const struct stat& former) {
+  constexpr auto same_owner = static_cast<uid_t>(-1);
+  constexpr mode_t permissions = 0777, group_permissions = 0070;
+  if (::fchown(descriptor, former.st_uid, former.st_gid) != 0) {
+    [[maybe_unused]] const int kept = ::fchown(descriptor, same_owner, former.st_gid);
+  }
+  struct stat present {};
+  if (::fstat(descriptor, &present) != 0) return false;
+  // Another group must not get the permissions of the former one.
+  const bool has_group = present.st_gid == former.st_gid;
+  const mode_t mode = former.st_mode & permissions & (has_group ? permissions : ~group_permissions);
+  // A file system without modes, such as FAT, refuses to set them.
+  return (present.st_mode & permissions) == mode || ::fchmod(descriptor, mode) == 0;
+}
+
 /// Creates the file that will replace `target`, with its permissions, and its owner and group as
 /// far as the system allows. Until then only the owner can read it.
 int create_replacement(const fs::path& target, fs::path& temporary) {
   constexpr mode_t as_user_set = 0666, private_to_owner = 0600;
   struct stat old {};
-  if (::stat(target.c_str(), &old) != 0) return create_beside(target, as_user_set, temporary);
+  if (::lstat(target.c_str(), &old) != 0 || !S_ISREG(old.st_mode)) {
+    return create_beside(target, as_user_set, temporary);
+  }
   const int descriptor = create_beside(target, private_to_owner, temporary);
   if (descriptor < 0) return descriptor;
   if (keep_mode_and_owner(descriptor, old)) return descriptor;
@@ -159,9 +179,11 @@ bool has_control_characters(const std::string& text) {
 
 // Opening a pipe would wait for its writer without O_NONBLOCK; a stream's data are waited for.
 InputFile::InputFile(const fs::path& path, std::size_t max_bytes)
-    : path_(path),
-      max_bytes_(max_bytes),
-      descriptor_(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC)) {
+    : InputFile(path, ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC),
+                max_bytes) {}
+
+InputFile::InputFile(const fs::path& path, int descriptor, std::size_t max_bytes)
+    : path_(path), max_bytes_(max_bytes), descriptor_(descriptor) {
   if (descriptor_ < 0) {
     throw InputError(path, std::string("cannot be opened: ") + std::strerror(errno));
   }
@@ -188,8 +210,12 @@ std::size_t InputFile::read(char* data, std::size_t bytes) {
 }
 
 std::string read_file(const fs::path& path, std::size_t max_bytes) {
-  constexpr std::size_t block_bytes = 1 << 16;
   InputFile file(path, max_bytes);
+  return read_file(file);
+}
+
+std::string read_file(InputFile& file) {
+  constexpr std::size_t block_bytes = 1 << 16;
   std::string content;
   content.reserve(file.bytes() + block_bytes);
   for (;;) {
@@ -234,6 +260,12 @@ AtomicFileWriter::AtomicFileWriter(const fs::path& path) : path_(path) {
     temporary_.clear();
     fail(path_);
   }
+}
+
+AtomicFileWriter::AtomicFileWriter(const fs::path& folder, const std::string& name,
+                                   const fs::path& shown)
+    : path_(shown), target_(folder / name), descriptor_(create_replacement(target_, temporary_)) {
+  if (descriptor_ < 0) fail(path_);
 }
 
 void AtomicFileWriter::write(std::string_view content) {

@@ -17,6 +17,9 @@ class InputFile {
   /// @throws InputError if it cannot be opened, is a folder, another pipe or a device, or has more
   /// than `max_bytes`
   [[gnu::visibility("hidden")]] InputFile(const std::filesystem::path& path, std::size_t max_bytes);
+  /// Reads an open regular file, whose descriptor it closes. `path` is its name in messages.
+  [[gnu::visibility("hidden")]] InputFile(const std::filesystem::path& path, int descriptor,
+                                          std::size_t max_bytes);
   [[gnu::visibility("hidden")]] ~InputFile();
   InputFile(const InputFile&) = delete;
   InputFile& operator=(const InputFile&) = delete;
@@ -37,6 +40,9 @@ class InputFile {
 [[gnu::visibility("hidden")]] std::string read_file(const std::filesystem::path& path,
                                                     std::size_t max_bytes);
 
+/// Reads the rest of an open file.
+[[gnu::visibility("hidden")]] std::string read_file(InputFile& file);
+
 /// Reads a text file by read_file(). Throws InputError also if it is empty or has control
 /// characters (a binary file), or if the last line has no end (a truncated file).
 [[gnu::visibility("hidden")]] std::string read_text_file(const std::filesystem::path& path,
@@ -54,6 +60,11 @@ class AtomicFileWriter {
   /// Creates the temporary file. This and the next functions throw InputError if the file cannot be
   /// written.
   [[gnu::visibility("hidden")]] explicit AtomicFileWriter(const std::filesystem::path& path);
+  /// Creates the temporary file in a folder that others can write to. A link of the name is
+  /// replaced and not followed. `shown` is the path in messages.
+  [[gnu::visibility("hidden")]] AtomicFileWriter(const std::filesystem::path& folder,
+                                                 const std::string& name,
+                                                 const std::filesystem::path& shown);
   [[gnu::visibility("hidden")]] void write(std::string_view content);
   /// Flushes the content to disk and renames the file to `path`.
   [[gnu::visibility("hidden")]] void save();

@@ -7,9 +7,7 @@
 #include <cstdint>
 
 namespace vlp {
-namespace {
 
-/// Returns the length of the first character of `text`; 0 if it is not UTF-8.
 std::size_t character_length(std::string_view text) {
   const auto first = static_cast<unsigned char>(text.front());
   if (first < 0x80) return 1;
@@ -25,8 +23,6 @@ std::size_t character_length(std::string_view text) {
   const bool surrogate = code >= 0xd800 && code < 0xe000;
   return code < min_code[length] || code > 0x10ffff || surrogate ? 0 : length;
 }
-
-}  // namespace
 
 std::string shortest(double value) {
   char text[32];

@@ -24,6 +24,9 @@ std::string in_quotes(std::string_view text);
 /// Returns the line of a mark, from 1; 0 if unknown.
 std::size_t line_of(const YAML::Mark& mark);
 
+/// Returns the length in bytes of the first character of `text`; 0 if it is not UTF-8 (RFC 3629).
+/// @pre `text` is not empty
+std::size_t character_length(std::string_view text);
 /// Returns the length of the longest prefix of `text` that is UTF-8.
 std::size_t utf8_length(std::string_view text);
 

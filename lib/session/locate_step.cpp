@@ -11,7 +11,6 @@
 
 #include "calibration/map/map_errors.h"
 #include "camera/lens.h"
-#include "captures/outside_image.h"
 #include "geometry/polygon.h"
 #include "positioning/known_motion.h"
 #include "positioning/residual_noise.h"
@@ -44,6 +43,20 @@ Sensors make_sensors(const std::string& image, const LocateInput& input) {
     sensors.height = KnownHeight{*capture.z_m - above_m, *input.height_sd_m};
   }
   return sensors;
+}
+
+std::size_t count_far_outside(std::span<const Frame> frames, const std::array<int, 2>& imager_px) {
+  constexpr double fraction = 0.1;
+  const Eigen::Array2d size(imager_px[0], imager_px[1]);
+  std::size_t outside = 0;
+  for (const Frame& frame : frames) {
+    for (const Detection& detection : frame.detections) {
+      const Eigen::Array2d pixel = detection.pixel.array();
+      const bool near = (pixel >= -fraction * size).all() && (pixel <= (1 + fraction) * size).all();
+      outside += near ? 0 : 1;
+    }
+  }
+  return outside;
 }
 
 namespace {

@@ -2,7 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -51,6 +53,10 @@ struct LocateInput {
 
 /// Returns the sensor data of a capture: motion, time, inclination, height and yaw.
 Sensors make_sensors(const std::string& image, const LocateInput& input);
+
+/// Counts the detections outside the image by more than 10 % of its width or height. The center of
+/// a lamp at the image's edge may be slightly outside.
+std::size_t count_far_outside(std::span<const Frame> frames, const std::array<int, 2>& imager_px);
 
 /// Result of locate_frames().
 struct LocateResult : StepResult {

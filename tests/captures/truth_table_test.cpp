@@ -4,6 +4,7 @@
 
 #include <gmock/gmock.h>
 
+#include "support/random.h"
 #include "support/rejection_message.h"
 #include "support/temporary_folder.h"
 
@@ -38,6 +39,68 @@ TEST(ReadTruth, ReportsLineOfInvalidRow) {
   EXPECT_THAT(refusal("a,0,0,1e7\n"), HasSubstr("t.csv:2: z_m"));
   EXPECT_THAT(refusal("a,,0,\n"), HasSubstr("t.csv:2: x_m"));
   EXPECT_THAT(refusal(""), HasSubstr("t.csv: holds no place"));
+}
+
+TEST(ReadPath, ReadsOptionalHeights) {
+  const TemporaryFolder folder;
+  const Path flat = read_path(folder.file("p.csv", "y_m,x_m\n1,2\n3,4\n"));
+  ASSERT_EQ(flat.waypoints_m.size(), 2);
+  EXPECT_EQ(flat.waypoints_m[1], Eigen::Vector2d(4, 3));
+  EXPECT_TRUE(flat.z_m.empty());
+  EXPECT_EQ(read_path(folder.file("p.csv", "x_m,y_m,z_m\n1,2,3\n4,5,6\n")).z_m,
+            (std::vector<double>{3, 6}));
+}
+
+TEST(ReadPath, RejectsPathWithoutLength) {
+  const TemporaryFolder folder;
+  for (const char* text : {"x_m,y_m\n", "x_m,y_m\n1,2\n", "x_m,y_m\n1,2\n1,2\n"}) {
+    EXPECT_THAT(rejection_message([&] { read_path(folder.file("p.csv", text)); }),
+                HasSubstr("two waypoints or more at different places"));
+  }
+  EXPECT_THAT(rejection_message([&] { read_path(folder.file("p.csv", "x_m,y_m\n1,nan\n1,2\n")); }),
+              HasSubstr("p.csv:2: y_m"));
+}
+
+TEST(FindNearestOnPath, ReturnsNearestPoint) {
+  Random random(1);
+  Path path;
+  for (int i = 0; i < 30; ++i) {
+    path.waypoints_m.emplace_back(random.uniform(-1, 1), random.uniform(-1, 1));
+    if (i % 10 == 0) path.waypoints_m.push_back(path.waypoints_m.back());  // a stop
+  }
+  for (int i = 0; i < 100; ++i) {
+    const Eigen::Vector2d place(random.uniform(-2, 2), random.uniform(-2, 2));
+    double min_squared_distance = 1e9;  // brute force: a thousand points for each segment
+    for (std::size_t leg = 1; leg < path.waypoints_m.size(); ++leg) {
+      for (int step = 0; step <= 1000; ++step) {
+        const Eigen::Vector2d point =
+            path.waypoints_m[leg - 1] +
+            step / 1000.0 * (path.waypoints_m[leg] - path.waypoints_m[leg - 1]);
+        min_squared_distance = std::min(min_squared_distance, (point - place).norm());
+      }
+    }
+    EXPECT_NEAR((find_nearest_on_path(path, place).xy_m - place).norm(), min_squared_distance,
+                2e-3);
+  }
+}
+
+TEST(ReadPath, RejectsDistantWaypoint) {
+  const TemporaryFolder folder;
+  const auto refusal = [&](const std::string& row) {
+    return rejection_message(
+        [&] { read_path(folder.file("p.csv", "x_m,y_m,z_m\n1,2,3\n" + row)); });
+  };
+  EXPECT_EQ(refusal("1e6,-1e6,0\n"), "");
+  EXPECT_THAT(refusal("1e308,0,0\n"), HasSubstr("p.csv:3: x_m: should be within 1,000 km"));
+  EXPECT_THAT(refusal("0,-1e7,0\n"), HasSubstr("p.csv:3: y_m"));
+  EXPECT_THAT(refusal("0,0,1e7\n"), HasSubstr("p.csv:3: z_m"));
+}
+
+TEST(FindNearestOnPath, InterpolatesHeight) {
+  const Path path{{{0, 0}, {2, 0}, {2, 2}}, {0, 1, 5}};
+  EXPECT_DOUBLE_EQ(find_nearest_on_path(path, {1, 1e-3}).z_m.value(), 0.5);
+  EXPECT_DOUBLE_EQ(find_nearest_on_path(path, {3, 1.5}).z_m.value(), 4);
+  EXPECT_DOUBLE_EQ(find_nearest_on_path(path, {9, 9}).z_m.value(), 5);
 }
 
 }  // namespace

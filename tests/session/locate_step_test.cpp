@@ -272,5 +272,20 @@ TEST(LocateFrames, EstimatesTiltWithoutSensor) {
   EXPECT_NEAR(found.rows[0].fix->inclination->pitch_rad, -0.08, 1e-5);
 }
 
+std::size_t far_outside(double u_px, double v_px) {
+  const Detection detection{1, {u_px, v_px}, {}};
+  return count_far_outside(std::array{Frame{"a", {detection, detection}}, Frame{"b", {}}},
+                           {800, 600});
+}
+
+TEST(CountFarOutside, CountsDetectionsBeyondTenPercent) {
+  for (const auto& [u_px, v_px] : {std::pair(400, 300), {-79, 300}, {879, 300}, {400, -59}}) {
+    EXPECT_EQ(far_outside(u_px, v_px), 0) << u_px << " " << v_px;
+  }
+  for (const auto& [u_px, v_px] : {std::pair(-81, 300), {881, 300}, {400, -61}, {400, 661}}) {
+    EXPECT_EQ(far_outside(u_px, v_px), 2) << u_px << " " << v_px;
+  }
+}
+
 }  // namespace
 }  // namespace vlp

@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "captures/fixes_table.h"
-#include "captures/path_table.h"
 #include "captures/truth_table.h"
 
 namespace vlp {

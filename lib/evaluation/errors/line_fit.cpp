@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "captures/path_table.h"
+#include "captures/truth_table.h"
 
 namespace vlp {
 namespace {
