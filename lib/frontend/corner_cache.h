@@ -6,7 +6,7 @@
 #include <functional>
 #include <optional>
 
-#include "detection/boards/board_view.h"
+#include "detection/boards/board_detector.h"
 #include "frontend/image_source.h"
 #include "rig/board.h"
 

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "captures/detections_table.h"
-#include "detection/boards/board_view.h"
+#include "detection/boards/board_detector.h"
 #include "frontend/image_source.h"
 #include "frontend/options.h"
 #include "lamps/shape/light.h"

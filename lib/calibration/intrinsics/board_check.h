@@ -7,7 +7,7 @@
 #include <string>
 
 #include "camera/lens.h"
-#include "detection/boards/board_view.h"
+#include "detection/boards/board_detector.h"
 
 namespace vlp {
 

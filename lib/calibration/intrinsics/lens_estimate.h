@@ -10,7 +10,7 @@
 #include "calibration/intrinsics/intrinsics.h"
 #include "calibration/intrinsics/lens_choice.h"
 #include "calibration/intrinsics/lens_sharpness.h"
-#include "detection/boards/board_view.h"
+#include "detection/boards/board_detector.h"
 #include "rig/board.h"
 
 namespace vlp {

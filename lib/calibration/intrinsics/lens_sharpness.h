@@ -10,7 +10,7 @@
 #include <span>
 #include <vector>
 
-#include "detection/boards/board_view.h"
+#include "detection/boards/board_detector.h"
 
 namespace vlp {
 

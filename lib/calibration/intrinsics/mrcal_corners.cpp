@@ -13,7 +13,6 @@
 #include "calibration/intrinsics/mrcal_files.h"
 #include "detection/boards/corner_table.h"
 #include "detection/boards/lattice_order.h"
-#include "detection/boards/lattice_rows.h"
 #include "rig/file.h"
 #include "rig/input_error.h"
 #include "rig/yaml_text.h"

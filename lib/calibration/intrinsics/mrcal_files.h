@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "calibration/intrinsics/intrinsics.h"
-#include "detection/boards/board_view.h"
+#include "detection/boards/board_detector.h"
 #include "rig/board.h"
 
 namespace vlp {

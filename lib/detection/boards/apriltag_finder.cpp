@@ -8,8 +8,8 @@
 #include <string>
 #include <utility>
 
-#include "detection/boards/tag_families.h"
 #include "detection/boards/tag_finder.h"
+#include "detection/boards/tag_pattern.h"
 
 namespace vlp {
 namespace {

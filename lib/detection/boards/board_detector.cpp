@@ -77,37 +77,6 @@ BoardDetector::BoardDetector(const Board& board) {
 
 BoardDetector::~BoardDetector() = default;
 
-std::optional<TagDetection> BoardDetector::exact(const TagDetection& tag,
-                                                 const GrayLevels& image) const {
-  return touching_->exact(tag, image);
-}
-
-BoardDetection BoardDetector::detect_squares(const cv::Mat1b& levels) const {
-  const GrayLevels gray{levels, smooth_image(levels)};
-  BoardDetection seen;
-  if (!finder_) {
-    seen.points = squares_->detect_chessboard(gray);
-    return seen;
-  }
-  std::map<int, std::vector<TagDetection>> found;
-  for (const TagDetection& marker : finder_->find(levels)) {
-    if (ids_.contains(marker.id)) {
-      found[marker.id].push_back(marker);
-    } else {
-      seen.foreign.push_back(marker);
-    }
-  }
-  for (const auto& [id, same] : found) {
-    if (same.size() > 1) {
-      ++seen.unusable;
-    } else {
-      seen.tags.push_back(same.front());
-    }
-  }
-  seen.points = squares_->detect_corners_near_markers(seen.tags, gray);
-  return seen;
-}
-
 cv::Mat1b convert_to_8_bits(const cv::Mat& image) {
   if (image.depth() == CV_8U) return image;
   double brightest = 0;
@@ -122,30 +91,33 @@ BoardDetection BoardDetector::detect(const cv::Mat& image) const {
   constexpr int min_px = 10;
   if (std::min(image.cols, image.rows) < min_px) return {};
   const cv::Mat1b levels = convert_to_8_bits(image);
-  if (squares_) return detect_squares(levels);
-  std::map<int, std::vector<TagDetection>> found;
+  const GrayLevels gray{levels, print_ ? cv::Mat1f() : smooth_image(levels)};
   BoardDetection seen;
-  for (TagDetection& tag : finder_->find(levels)) {
-    if (ids_.contains(tag.id)) {
-      found[tag.id].push_back(tag);
-    } else {
-      seen.foreign.push_back(tag);
-    }
+  if (!finder_) {
+    seen.points = squares_->detect_chessboard(gray);
+    return seen;
   }
-  const GrayLevels gray{levels, touching_ ? smooth_image(levels) : cv::Mat1f()};
+  std::map<int, std::vector<TagDetection>> found;
+  for (const TagDetection& tag : finder_->find(levels)) {
+    (ids_.contains(tag.id) ? found[tag.id] : seen.foreign).push_back(tag);
+  }
   std::vector<TagDetection> once;
   for (const auto& [id, same] : found) {
     if (same.size() == 1) once.push_back(same.front());
+  }
+  if (squares_) {
+    seen.unusable = static_cast<int>(found.size() - once.size());
+    seen.tags = once;
+    seen.points = squares_->detect_corners_near_markers(seen.tags, gray);
+    return seen;
   }
   if (print_) {
     seen.curve_costs = refine_tag_edges(once, levels, *print_);
     seen.tags = once;
   } else {
     for (const TagDetection& tag : once) {
-      if (const auto found_exact = exact(tag, gray)) seen.tags.push_back(*found_exact);
+      if (const auto exact = touching_->exact(tag, gray)) seen.tags.push_back(*exact);
     }
-  }
-  if (touching_) {
     for (const TagDetection& tag : touching_->find_missing(seen.tags, gray)) {
       if (found[tag.id].size() <= 1) seen.tags.push_back(tag);
     }

@@ -6,7 +6,6 @@
 #include <array>
 #include <memory>
 #include <opencv2/core.hpp>
-#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -19,7 +18,6 @@ class TagFinder;
 class TagGeometry;
 class TouchingTags;
 class SquareCorners;
-struct GrayLevels;
 
 /// Curvature of a tag's edge between its corners, measured from the pixels next to it. The outward
 /// distance of the edge from the straight line between the corners is
@@ -113,6 +111,14 @@ struct BoardDetection {
   bool any() const { return !tags.empty() || !points.empty(); }
 };
 
+/// Image with the detection of a board.
+struct BoardView {
+  /// File name of the image, without its folder.
+  std::string image;
+  std::array<int, 2> imager_px;
+  BoardDetection seen;
+};
+
 /// Returns the corners that a calibration uses: the points, or else the corners of the tags. Their
 /// indices ascend and are the same in every view.
 std::vector<PointDetection> collect_corners(const BoardDetection& seen);
@@ -149,11 +155,6 @@ class BoardDetector {
   BoardDetection detect(const cv::Mat& image) const;
 
  private:
-  /// Returns the tag with refined corners; std::nullopt if they cannot be measured.
-  std::optional<TagDetection> exact(const TagDetection& tag, const GrayLevels& image) const;
-
-  BoardDetection detect_squares(const cv::Mat1b& levels) const;
-
   /// Tag detector; nullptr for chessboards.
   std::unique_ptr<TagFinder> finder_;
   std::set<int> ids_;

@@ -6,60 +6,42 @@
 
 #include <algorithm>
 #include <array>
-#include <map>
+#include <limits>
 #include <optional>
 #include <set>
 #include <unordered_map>
+#include <utility>
 
 #include "captures/csv_reader.h"
 #include "captures/csv_writer.h"
 #include "detection/boards/lattice_order.h"
-#include "detection/boards/lattice_rows.h"
 #include "rig/board_layout.h"
 #include "rig/yaml_text.h"
 
 namespace vlp {
 namespace {
 
-/// Corners of an image. The tags are in the order of their first rows in the table.
-struct ImageCorners {
-  struct Corner {
-    Eigen::Vector2d pixel;
-    EdgeCurvature bow;
-    double sd_px;
-  };
+/// Returns a tag whose corners are still to be read.
+TagDetection make_empty_tag(int id) {
+  TagDetection tag{id, {}};
+  tag.corners_px.fill(Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN()));
+  return tag;
+}
 
-  std::string image;
-  std::vector<int> tags;
-  std::map<int, std::array<std::optional<Corner>, 4>> corners_by_tag;
-  std::vector<PointDetection> points;
-};
-
-BoardDetection make_board_detection(ImageCorners corners, const std::set<int>& ids) {
-  BoardDetection seen;
-  for (const int id : corners.tags) {
-    TagDetection tag{id, {}};
-    bool whole = true;
-    for (std::size_t k = 0; k < 4; ++k) {
-      const auto& corner = corners.corners_by_tag[id][k];
-      whole = whole && corner;
-      if (!corner) continue;
-      tag.corners_px[k] = corner->pixel;
-      tag.curvatures[k] = corner->bow;
-      tag.corner_sds_px[k] = corner->sd_px;
+/// Moves tags that the board does not have to `foreign`, removes tags without all corners, and
+/// sorts tags and points.
+void complete_detection(BoardDetection& seen, const std::set<int>& ids) {
+  for (TagDetection& tag : std::exchange(seen.tags, {})) {
+    const bool is_of_board = ids.contains(tag.id);
+    if (std::ranges::all_of(tag.corners_px,
+                            [](const auto& corner) { return corner.allFinite(); })) {
+      (is_of_board ? seen.tags : seen.foreign).push_back(tag);
+    } else if (is_of_board) {
+      ++seen.unusable;
     }
-    if (!whole) {
-      seen.unusable += ids.contains(id) ? 1 : 0;
-      continue;
-    }
-    (ids.contains(id) ? seen.tags : seen.foreign).push_back(tag);
   }
-  std::sort(seen.tags.begin(), seen.tags.end(),
-            [](const TagDetection& a, const TagDetection& b) { return a.id < b.id; });
-  seen.points = std::move(corners.points);
-  std::sort(seen.points.begin(), seen.points.end(),
-            [](const PointDetection& a, const PointDetection& b) { return a.index < b.index; });
-  return seen;
+  std::ranges::sort(seen.tags, {}, &TagDetection::id);
+  std::ranges::sort(seen.points, {}, &PointDetection::index);
 }
 
 constexpr std::array kBowColumns{"edge_quadratic_px", "edge_cubic_px", "edge_half_extent"};
@@ -92,13 +74,13 @@ double read_sd_px(const CsvTable& csv, std::size_t row) {
 }
 
 /// Describes a row length that contradicts board.yaml; empty if the points lie in rows as expected.
-std::string describe_wrong_rows(const Board& board, std::span<const ImageCorners> images) {
+std::string describe_wrong_rows(const Board& board, std::span<const BoardView> views) {
   const auto cols = static_cast<std::size_t>(board.cols - 1),
              rows = static_cast<std::size_t>(board.rows - 1);
   std::vector<LatticePixels> pixels;
-  for (const ImageCorners& corners : images) {
+  for (const BoardView& view : views) {
     pixels.emplace_back(cols * rows);
-    for (const PointDetection& point : corners.points) pixels.back()[point.index] = point.pixel;
+    for (const PointDetection& point : view.seen.points) pixels.back()[point.index] = point.pixel;
   }
   const std::size_t row_length = estimate_row_length(pixels, cols);
   if (row_length == cols) return "";
@@ -135,7 +117,8 @@ class CornerTableReader {
  public:
   CornerTableReader(const std::filesystem::path& file, const Board& board,
                     const std::array<int, 2>& imager_px)
-      : csv_(file),
+      : file_(file),
+        csv_(file),
         board_(board),
         imager_px_(imager_px),
         image_(csv_.required("image")),
@@ -144,22 +127,21 @@ class CornerTableReader {
         v_px_(csv_.required("v_px")),
         tag_id_(board.has_squares() ? number_ : csv_.required("tag")) {}
 
-  std::vector<ImageCorners> read() {
+  /// Returns the corners of all images. Throws InputError if there are none, or if too many of them
+  /// are outside the image.
+  std::vector<BoardView> read() {
     for (std::size_t row = 0; row < csv_.rows(); ++row) read_row(row);
-    return std::move(images_);
-  }
-
-  /// Throws InputError if too many corners are outside the image.
-  void check_outside() const {
+    if (views_.empty()) throw InputError(file_, "holds no corner");
     if (too_many_outside(outside_, corners_)) throw InputError(*first_outside_);
+    return std::move(views_);
   }
 
  private:
   void read_row(std::size_t row) {
     const std::string name(csv_.text(row, image_));
     if (name.empty()) throw csv_.error(row, image_, "is empty");
-    const auto [entry, is_new] = index_by_name_.try_emplace(name, images_.size());
-    if (is_new) images_.push_back({name, {}, {}, {}});
+    const auto [entry, is_new] = index_by_name_.try_emplace(name, views_.size());
+    if (is_new) views_.push_back({name, imager_px_, {}});
     const auto cells = {tag_id_, number_, u_px_, v_px_};
     if (std::all_of(cells.begin(), cells.end(),
                     [&](auto cell) { return csv_.text(row, cell).empty(); })) {
@@ -171,7 +153,7 @@ class CornerTableReader {
       if (outside_++ == 0) first_outside_ = csv_.error(row, u_px_, words);
     }
     const int corner = read_number(row);
-    if (!add(row, corner, pixel, images_[entry->second])) {
+    if (!add(row, corner, pixel, views_[entry->second].seen)) {
       throw csv_.error(row, number_, fmt::format("{} stands twice in image '{}'", corner, name));
     }
   }
@@ -190,28 +172,31 @@ class CornerTableReader {
   }
 
   /// Adds a corner to those of its image. Returns false if the image has it already.
-  bool add(std::size_t row, int corner, const Eigen::Vector2d& pixel, ImageCorners& corners) {
+  bool add(std::size_t row, int corner, const Eigen::Vector2d& pixel, BoardDetection& seen) {
     if (board_.has_squares()) {
       const auto index = static_cast<std::size_t>(corner);
-      const bool is_known = std::ranges::any_of(
-          corners.points, [&](const PointDetection& point) { return point.index == index; });
-      if (!is_known) corners.points.push_back({index, pixel});
-      return !is_known;
+      const bool is_new =
+          std::ranges::find(seen.points, index, &PointDetection::index) == seen.points.end();
+      if (is_new) seen.points.push_back({index, pixel});
+      return is_new;
     }
     const int id = csv_.integer(row, tag_id_);
-    const auto [tag, first] = corners.corners_by_tag.try_emplace(id);
-    if (first) corners.tags.push_back(id);
-    auto& place = tag->second[static_cast<std::size_t>(corner)];
-    if (place) return false;
-    place = {pixel, read_curvature(csv_, row), read_sd_px(csv_, row)};
+    auto tag = std::ranges::find(seen.tags, id, &TagDetection::id);
+    if (tag == seen.tags.end()) tag = seen.tags.insert(tag, make_empty_tag(id));
+    const auto k = static_cast<std::size_t>(corner);
+    if (tag->corners_px[k].allFinite()) return false;
+    tag->corners_px[k] = pixel;
+    tag->curvatures[k] = read_curvature(csv_, row);
+    tag->corner_sds_px[k] = read_sd_px(csv_, row);
     return true;
   }
 
+  std::filesystem::path file_;
   CsvTable csv_;
   const Board& board_;
   std::array<int, 2> imager_px_;
   CsvTable::Column image_, number_, u_px_, v_px_, tag_id_;
-  std::vector<ImageCorners> images_;
+  std::vector<BoardView> views_;
   std::unordered_map<std::string, std::size_t> index_by_name_;
   std::size_t corners_ = 0, outside_ = 0;
   std::optional<InputError> first_outside_;
@@ -221,22 +206,17 @@ class CornerTableReader {
 
 std::vector<BoardView> read_corner_table(const std::filesystem::path& file, const Board& board,
                                          const std::array<int, 2>& imager_px) {
-  CornerTableReader reader(file, board, imager_px);
-  std::vector<ImageCorners> images = reader.read();
-  if (images.empty()) throw InputError(file, "holds no corner");
-  reader.check_outside();
+  std::vector<BoardView> views = CornerTableReader(file, board, imager_px).read();
   if (board.has_squares()) {
-    if (const auto words = describe_wrong_rows(board, images); !words.empty())
+    if (const auto words = describe_wrong_rows(board, views); !words.empty())
       throw InputError(file, words);
   }
   std::set<int> ids;
   for (const BoardTag& tag : list_board_tags(board)) ids.insert(tag.id);
-  std::vector<BoardView> views;
-  for (ImageCorners& corners : images) {
-    const std::string name = corners.image;
-    views.push_back({name, imager_px, make_board_detection(std::move(corners), ids)});
+  for (BoardView& view : views) {
+    complete_detection(view.seen, ids);
     if (!board.has_squares()) continue;
-    order_lattice(views.back().seen.points, board.cols - 1, board.rows - 1,
+    order_lattice(view.seen.points, board.cols - 1, board.rows - 1,
                   board.kind == BoardKind::chessboard);
   }
   return views;

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "detection/boards/board_view.h"
+#include "detection/boards/board_detector.h"
 #include "rig/board.h"
 
 namespace vlp {

@@ -9,6 +9,31 @@
 
 namespace vlp {
 
+/// Image and its smoothed copy, which find_saddle_point() uses.
+struct GrayLevels {
+  cv::Mat1b sharp;
+  cv::Mat1f smoothed;
+};
+
+/// Finds the saddle point of the gray levels at a corner where two black squares touch.
+///
+/// @param smoothed   gray levels, smoothed by about 1 px, because pixel noise and the sharp edges
+/// of
+///                   the squares would disturb the fit
+/// @param guess_px   approximate position of the corner
+/// @param reach_px   radius of the search for the initial pixel
+/// @param radius_px  radius of the window of the fit
+/// @return           std::nullopt if the fit is no saddle, its center moves more than 2 px from the
+///                   initial pixel, or a window reaches beyond the image
+///
+/// The initial pixel has the most negative determinant of the Hessian. The saddle of
+///   a x^2 + b x y + c y^2 + d x + e y + f
+/// is fitted in a window around the nearest pixel. The window is moved to the fitted point until
+/// its center does not change (five iterations at most).
+std::optional<Eigen::Vector2d> find_saddle_point(const cv::Mat1f& smoothed,
+                                                 const Eigen::Vector2d& guess_px, int reach_px,
+                                                 int radius_px);
+
 /// Fits the intersection of the two edges at a corner where two black squares touch, by nonlinear
 /// least squares of the gray levels.
 ///

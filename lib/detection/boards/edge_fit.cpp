@@ -86,28 +86,20 @@ class Edge {
     constexpr double max_change = 0.3;
     if (p != at_) evaluate(p);
     constexpr int count = NUM_PARAMETERS + 1;
-    using Square = Eigen::Matrix<double, count, count>;
-    using Vector = Eigen::Matrix<double, count, 1>;
-    Square normal = Square::Zero();
-    Vector right = Vector::Zero();
-    normal.template topLeftCorner<count - 1, count - 1>() = jacobian_.transpose() * jacobian_;
-    normal.template topRightCorner<count - 1, 1>() =
-        jacobian_.transpose() * d_residuals_d_kurtosis_;
-    normal.template bottomLeftCorner<1, count - 1>() =
-        normal.template topRightCorner<count - 1, 1>().transpose();
+    Eigen::Matrix<double, Eigen::Dynamic, count> derivatives(rows(), count);
+    derivatives << jacobian_, d_residuals_d_kurtosis_;
+    Eigen::Matrix<double, count, count> normal = derivatives.transpose() * derivatives;
     const double variance =
         std::max(residuals_.squaredNorm() / static_cast<double>(rows()), min_noise * min_noise);
-    normal(count - 1, count - 1) =
-        d_residuals_d_kurtosis_.squaredNorm() + variance / (kurtosis_sd * kurtosis_sd);
-    right.template head<count - 1>() = -jacobian_.transpose() * residuals_;
-    right[count - 1] = -d_residuals_d_kurtosis_.dot(residuals_);
-    Vector change = normal.ldlt().solve(right);
+    normal(count - 1, count - 1) += variance / (kurtosis_sd * kurtosis_sd);
+    const Eigen::Matrix<double, count, 1> right = -derivatives.transpose() * residuals_;
+    Eigen::Matrix<double, count, 1> change = normal.ldlt().solve(right);
     const double kurtosis = std::clamp(change[count - 1], min_kurtosis, max_kurtosis);
     if (kurtosis != change[count - 1]) {
       const auto head = normal.template topLeftCorner<count - 1, count - 1>();
-      const auto d_value_d_kurtosis = normal.template topRightCorner<count - 1, 1>();
+      const auto by_kurtosis = normal.template topRightCorner<count - 1, 1>();
       change.template head<count - 1>() =
-          head.ldlt().solve(right.template head<count - 1>() - kurtosis * d_value_d_kurtosis);
+          head.ldlt().solve(right.template head<count - 1>() - kurtosis * by_kurtosis);
     }
     const double blur = p[0] + change[0];
     if (!(std::abs(change[0]) <= max_change * p[0])) return p[0];

@@ -2,6 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
+#include <optional>
+#include <span>
 #include <vector>
 
 #include "detection/boards/board_detector.h"
@@ -25,5 +28,13 @@ namespace vlp {
 /// The warp of a square board cannot be determined.
 void order_lattice(std::vector<PointDetection>& points, int cols, int rows,
                    bool has_180_degree_symmetry);
+
+/// Pixels of the points of a board's lattice, row by row; std::nullopt for a missing point.
+using LatticePixels = std::vector<std::optional<Eigen::Vector2d>>;
+
+/// Estimates the number of points in a row of the lattice. Returns `stated`, unless another number
+/// makes the points of all images lie along their rows twice as evenly.
+/// @pre All images show the same lattice.
+std::size_t estimate_row_length(std::span<const LatticePixels> images, std::size_t stated);
 
 }  // namespace vlp

@@ -7,8 +7,6 @@
 #include <cmath>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
-#include <optional>
-#include <utility>
 
 #include "detection/boards/edge_crossing.h"
 #include "detection/boards/lattice_order.h"
@@ -118,7 +116,6 @@ std::vector<PointDetection> SquareCorners::detect_chessboard(const GrayLevels& i
 
 std::vector<PointDetection> SquareCorners::detect_corners_near_markers(
     const std::vector<TagDetection>& markers, const GrayLevels& image) const {
-  constexpr std::size_t max_markers = 4;
   constexpr double adjacent = 0.8, near = 2.2;  // in squares
   constexpr double max_marker_error =
       0.25;  // of a square: one of the markers is clutter, read as another
@@ -126,26 +123,11 @@ std::vector<PointDetection> SquareCorners::detect_corners_near_markers(
   for (int row = 0; row < rows_; ++row) {
     for (int col = 0; col < cols_; ++col) {
       const Eigen::Vector2d here_m = square_size_m_ * Eigen::Vector2d(col, row);
-      std::vector<std::pair<double, const TagDetection*>> around;
-      for (const TagDetection& marker : markers) {
-        const auto place = std::find_if(layout_.begin(), layout_.end(),
-                                        [&](const auto& tag) { return tag.id == marker.id; });
-        const double distance_m = ((place->corners_m[0] + place->corners_m[2]) / 2 - here_m).norm();
-        if (distance_m < near * square_size_m_) around.emplace_back(distance_m, &marker);
-      }
-      std::sort(around.begin(), around.end(), [](const auto& a, const auto& b) {
-        return std::pair(a.first, a.second->id) < std::pair(b.first, b.second->id);
-      });
-      if (around.empty() || around.front().first > adjacent * square_size_m_) continue;
-      std::vector<PlanePair> pairs;
-      for (std::size_t i = 0; i < std::min(max_markers, around.size()); ++i) {
-        const TagDetection& marker = *around[i].second;
-        const auto place = std::find_if(layout_.begin(), layout_.end(),
-                                        [&](const auto& tag) { return tag.id == marker.id; });
-        for (std::size_t k = 0; k < 4; ++k) {
-          pairs.push_back({place->corners_m[k], marker.corners_px[k]});
-        }
-      }
+      const auto [pairs, nearest_m] =
+          find_nearest_corners(markers, layout_, near * square_size_m_, [&](const BoardTag& tag) {
+            return ((tag.corners_m[0] + tag.corners_m[2]) / 2 - here_m).norm();
+          });
+      if (nearest_m > adjacent * square_size_m_) continue;
       const Eigen::Matrix3d px_from_board = estimate_homography(pairs);
       const auto project = [&](const Eigen::Vector2d& at_m) -> Eigen::Vector2d {
         return (px_from_board * at_m.homogeneous()).hnormalized();

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "detection/boards/board_detector.h"
-#include "detection/boards/saddle_point.h"
+#include "detection/boards/edge_crossing.h"
 #include "rig/board_layout.h"
 
 namespace vlp {

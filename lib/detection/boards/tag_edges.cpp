@@ -89,8 +89,6 @@ class TagEdges {
   double width_px() const { return width_px_; }
   const std::array<EdgeCurve, 4>& edges() const { return edges_; }
   const std::array<EdgeFit, 4>& fits() const { return fits_; }
-  double squares() const;
-  double pixels() const;
 
   /// Fits all edges to the same pixels again, from the approximate edges.
   void fit(const std::function<EdgePrior(const EdgeCurve& edge)>& prior_of);
@@ -162,8 +160,6 @@ double difference_px(const std::array<EdgeCurve, 4>& a, const std::array<EdgeCur
   return max_px;
 }
 
-EdgePrior prior_without_curve(const EdgeCurve&) { return {}; }
-
 /// Starts from the straight sides between libapriltag's corners.
 TagEdges::TagEdges(const TagDetection& tag, const cv::Mat1b& image, const TagGeometry& print)
     : tag_(tag) {
@@ -190,8 +186,11 @@ TagEdges::TagEdges(const TagDetection& tag, const cv::Mat1b& image, const TagGeo
   const double bit_px = width_px_ / print.width();
   band_ = {std::clamp(print.inside() * bit_px - away_px, min_px, max_px),
            std::clamp(print.outside() * bit_px - away_px, min_px, max_px)};
-  collect_all_pixels(image, kRoughBlur_px);
-  fit(prior_without_curve);
+  const auto fit_without_curve = [&] {
+    collect_all_pixels(image, kRoughBlur_px);
+    fit([](const EdgeCurve&) { return EdgePrior(); });
+  };
+  fit_without_curve();
   // A wide lens bends an edge out of the band along the straight side, which misses the corners.
   for (int iteration = 0;
        iteration < max_iterations && found_ && max_curvature_px_ > refit_threshold_px;
@@ -201,8 +200,7 @@ TagEdges::TagEdges(const TagDetection& tag, const cv::Mat1b& image, const TagGeo
       edge.cubic = edge.cubic || std::abs(edge.coefficients[2]) > cubic_threshold_px;
     }
     approximate_ = edges_;
-    collect_all_pixels(image, kRoughBlur_px);
-    fit(prior_without_curve);
+    fit_without_curve();
   }
 }
 
@@ -295,27 +293,6 @@ TagDetection::Steps TagEdges::steps(const cv::Mat1b& image, double gamma) const 
   return steps;
 }
 
-double TagEdges::squares() const {
-  return fits_[0].squares + fits_[1].squares + fits_[2].squares + fits_[3].squares;
-}
-
-double TagEdges::pixels() const {
-  return static_cast<double>(fits_[0].pixels + fits_[1].pixels + fits_[2].pixels + fits_[3].pixels);
-}
-
-/// Returns the negative log-likelihood of the edges of some tags, up to a constant, with the noise
-/// eliminated; a very large value if the fit of a tag failed.
-double compute_cost(std::span<const TagEdges> tags, std::span<const std::size_t> selected) {
-  constexpr double min_rms = 0.1, failure_cost = 1e9;
-  double squares = 0, pixels = 0;
-  for (const std::size_t i : selected) {
-    if (!tags[i].found()) return failure_cost;
-    squares += tags[i].squares();
-    pixels += tags[i].pixels();
-  }
-  return pixels * std::log(std::max(std::sqrt(squares / pixels), min_rms));
-}
-
 /// Selection of an image's tags.
 struct TagSelection {
   std::span<const TagEdges> all;
@@ -329,12 +306,32 @@ struct TagSelection {
         edge(all[i].edges()[k], all[i].fits()[k]);
     }
   }
+  /// Returns the sum of the squared residuals of these edges, and the number of their pixels.
+  std::pair<double, double> sum_squares() const {
+    double squares = 0, pixels = 0;
+    for_each_edge([&](const EdgeCurve&, const EdgeFit& fit) {
+      squares += fit.squares;
+      pixels += static_cast<double>(fit.pixels);
+    });
+    return {squares, pixels};
+  }
   bool any_saturated() const {
     bool any = false;
     for_each_edge([&](const EdgeCurve&, const EdgeFit& fit) { any = any || fit.is_saturated; });
     return any;
   }
 };
+
+/// Returns the negative log-likelihood of the edges of some tags, up to a constant, with the noise
+/// eliminated; a very large value if the fit of a tag failed.
+double compute_cost(const TagSelection& tags) {
+  constexpr double min_rms = 0.1, failure_cost = 1e9;
+  if (!std::ranges::all_of(tags.which, [&](std::size_t i) { return tags.all[i].found(); })) {
+    return failure_cost;
+  }
+  const auto [squares, pixels] = tags.sum_squares();
+  return pixels * std::log(std::max(std::sqrt(squares / pixels), min_rms));
+}
 
 /// Smooth models of the blur and the light of all edges of an image, as priors for single edges.
 class EdgeModels {
@@ -344,9 +341,9 @@ class EdgeModels {
   /// Estimates the light from fits with a prior of the blur.
   void fit_light(const TagSelection& tags);
 
-  /// Return the prior of an edge for a tone curve, of its blur only or of its blur and light.
-  EdgePrior prior_with_blur(const EdgeCurve& edge, double gamma) const;
-  EdgePrior prior_with_light(const EdgeCurve& edge, double gamma) const;
+  /// Returns the prior of an edge for a tone curve: of its blur, and of its light after
+  /// fit_light().
+  EdgePrior make_prior(const EdgeCurve& edge, double gamma) const;
 
  private:
   /// Standard deviation of a gray level.
@@ -364,11 +361,7 @@ std::optional<EdgeField> fit_field(std::vector<EdgeSample> samples, EdgeField::T
 }
 
 EdgeModels::EdgeModels(const TagSelection& tags) {
-  double squares = 0, pixels = 0;
-  tags.for_each_edge([&](const EdgeCurve&, const EdgeFit& fit) {
-    squares += fit.squares;
-    pixels += static_cast<double>(fit.pixels);
-  });
+  const auto [squares, pixels] = tags.sum_squares();
   if (pixels == 0) return;
   noise_ = std::sqrt(squares / pixels);
   std::vector<EdgeSample> blurs;
@@ -388,19 +381,16 @@ void EdgeModels::fit_light(const TagSelection& tags) {
   light_ = fit_field(std::move(lights), EdgeField::Terms::place);
 }
 
-EdgePrior EdgeModels::prior_with_blur(const EdgeCurve& edge, double gamma) const {
+EdgePrior EdgeModels::make_prior(const EdgeCurve& edge, double gamma) const {
   EdgePrior prior{gamma};
-  if (!blur_) return prior;
-  prior.blur_px = blur_->value(edge.middle, edge.along);
-  prior.blur_weight = noise_ / (blur_->excess_sd() * prior.blur_px);
-  return prior;
-}
-
-EdgePrior EdgeModels::prior_with_light(const EdgeCurve& edge, double gamma) const {
-  EdgePrior prior = prior_with_blur(edge, gamma);
-  if (!light_) return prior;
-  prior.bright_light = light_->value(edge.middle, edge.along);
-  prior.bright_weight = noise_ / (light_->excess_sd() * prior.bright_light);
+  if (blur_) {
+    prior.blur_px = blur_->value(edge.middle, edge.along);
+    prior.blur_weight = noise_ / (blur_->excess_sd() * prior.blur_px);
+  }
+  if (light_) {
+    prior.bright_light = light_->value(edge.middle, edge.along);
+    prior.bright_weight = noise_ / (light_->excess_sd() * prior.bright_light);
+  }
   return prior;
 }
 
@@ -433,7 +423,7 @@ std::vector<double> refine_tag_edges(std::span<TagDetection> tags, const cv::Mat
   for (const double gamma : kGammas) {
     const auto prior_of_gamma = [&](const EdgeCurve&) { return EdgePrior{gamma}; };
     if (gamma != 1) fit(selected, prior_of_gamma);
-    costs.push_back(compute_cost(edges, selected));
+    costs.push_back(compute_cost({edges, selected}));
     if (costs.size() == 2 && costs[1] > costs[0] + min_log_likelihood_ratio) break;
     if (gamma != 1) fit(remaining, prior_of_gamma);
     const auto update_outlines = [&] {
@@ -450,13 +440,14 @@ std::vector<double> refine_tag_edges(std::span<TagDetection> tags, const cv::Mat
     const bool any_saturated = found.any_saturated();
     if (any_saturated || gamma != 1) {
       EdgeModels models(found);
-      fit(widest, [&](const EdgeCurve& edge) { return models.prior_with_blur(edge, gamma); });
-      if (any_saturated) {
-        update_outlines();
-        models.fit_light(found);
-        fit(widest, [&](const EdgeCurve& edge) { return models.prior_with_light(edge, gamma); });
-      }
+      const auto prior_of = [&](const EdgeCurve& edge) { return models.make_prior(edge, gamma); };
+      fit(widest, prior_of);
       update_outlines();
+      if (any_saturated) {
+        models.fit_light(found);
+        fit(widest, prior_of);
+        update_outlines();
+      }
     }
     if (gamma == 1) {
       linear_outlines = outlines;

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "detection/boards/board_detector.h"
-#include "detection/boards/tag_print.h"
+#include "detection/boards/tag_pattern.h"
 
 namespace vlp {
 

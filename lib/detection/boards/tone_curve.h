@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "detection/boards/board_view.h"
+#include "detection/boards/board_detector.h"
 
 namespace vlp {
 

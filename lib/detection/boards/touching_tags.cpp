@@ -5,11 +5,9 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 #include "detection/boards/edge_crossing.h"
-#include "detection/boards/saddle_point.h"
-#include "detection/boards/tag_bits.h"
+#include "detection/boards/tag_pattern.h"
 #include "geometry/homography.h"
 
 namespace vlp {
@@ -30,7 +28,7 @@ TouchingTags::TouchingTags(const Board& board)
       family_(make_tag_family(board.family)),
       border_bits_(board.border_bits),
       tag_size_m_(board.tag_size_m) {
-  const double width = family_->width_at_border + 2 * (border_bits_ - 1);
+  const double width = width_in_bits(*family_, border_bits_);
   free_fraction_ = std::min(board.tag_spacing, border_bits_ / width);
 }
 
@@ -59,28 +57,11 @@ std::optional<TagDetection> TouchingTags::exact(TagDetection tag, const GrayLeve
 
 std::optional<TagDetection> TouchingTags::predict(const BoardTag& missing,
                                                   const std::vector<TagDetection>& tags) const {
-  constexpr std::size_t max_neighbors = 4;
   constexpr double max_distance = 2.2;  // in tags: neighbors, including diagonal ones
-  std::vector<std::pair<double, const TagDetection*>> neighbors;
-  for (const TagDetection& tag : tags) {
-    const auto at = std::find_if(layout_.begin(), layout_.end(),
-                                 [&](const BoardTag& known) { return known.id == tag.id; });
-    const double distance_m = (at->corners_m[0] - missing.corners_m[0]).norm();
-    if (distance_m < max_distance * tag_size_m_) neighbors.emplace_back(distance_m, &tag);
-  }
-  if (neighbors.empty()) return {};
-  std::sort(neighbors.begin(), neighbors.end(), [](const auto& a, const auto& b) {
-    return std::pair(a.first, a.second->id) < std::pair(b.first, b.second->id);
-  });
-  std::vector<PlanePair> pairs;
-  for (std::size_t i = 0; i < std::min(max_neighbors, neighbors.size()); ++i) {
-    const auto at = std::find_if(layout_.begin(), layout_.end(), [&](const BoardTag& known) {
-      return known.id == neighbors[i].second->id;
-    });
-    for (std::size_t k = 0; k < 4; ++k) {
-      pairs.push_back({at->corners_m[k], neighbors[i].second->corners_px[k]});
-    }
-  }
+  const auto [pairs, nearest_m] = find_nearest_corners(
+      tags, layout_, max_distance * tag_size_m_,
+      [&](const BoardTag& tag) { return (tag.corners_m[0] - missing.corners_m[0]).norm(); });
+  if (pairs.empty()) return {};
   const Eigen::Matrix3d px_from_board = estimate_homography(pairs);
   TagDetection tag{missing.id, {}};
   for (std::size_t k = 0; k < 4; ++k) {

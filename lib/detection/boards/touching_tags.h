@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "detection/boards/board_detector.h"
-#include "detection/boards/saddle_point.h"
-#include "detection/boards/tag_families.h"
+#include "detection/boards/edge_crossing.h"
+#include "detection/boards/tag_pattern.h"
 #include "rig/board_layout.h"
 
 namespace vlp {

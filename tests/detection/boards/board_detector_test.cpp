@@ -12,7 +12,6 @@
 #include <stdexcept>
 
 #include "captures/csv_reader.h"
-#include "detection/boards/board_view.h"
 #include "frontend/image_file.h"
 #include "frontend/image_folder.h"
 #include "support/real_data.h"

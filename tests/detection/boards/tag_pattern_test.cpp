@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
 /// Comparison with libapriltag's images of tags.
-#include "detection/boards/tag_print.h"
+#include "detection/boards/tag_pattern.h"
 
 #include <gtest/gtest.h>
 
