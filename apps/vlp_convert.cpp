@@ -12,7 +12,7 @@
 #include "calibration/intrinsics/valid_region.h"
 #include "captures/printable.h"
 #include "program/app.h"
-#include "program/steps/history.h"
+#include "program/steps/step_outcome.h"
 #include "rig/calibration_builder.h"
 #include "rig/file.h"
 

@@ -13,9 +13,8 @@
 
 #include "program/app.h"
 #include "program/steps/capture_options.h"
-#include "program/steps/history.h"
-#include "program/steps/print_dispersion.h"
 #include "program/steps/step_outcome.h"
+#include "program/steps/print_calibration.h"
 #include "report/plots/gnuplot.h"
 #include "rig/input_error.h"
 #include "session/dispersion_step.h"

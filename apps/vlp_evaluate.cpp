@@ -25,9 +25,8 @@
 #include "evaluation/proposed_gates.h"
 #include "program/app.h"
 #include "program/steps/capture_options.h"
-#include "program/steps/history.h"
-#include "program/steps/print_evaluation.h"
 #include "program/steps/step_outcome.h"
+#include "program/steps/print_fixes.h"
 #include "rig/file.h"
 #include "session/evaluate_step.h"
 

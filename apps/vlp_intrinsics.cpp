@@ -25,9 +25,8 @@
 #include "program/app.h"
 #include "program/progress.h"
 #include "program/steps/capture_options.h"
-#include "program/steps/history.h"
-#include "program/steps/print_intrinsics.h"
 #include "program/steps/step_outcome.h"
+#include "program/steps/print_calibration.h"
 #include "rig/file.h"
 #include "session/lens_step.h"
 

@@ -17,10 +17,10 @@
 #include "positioning/floor_summary.h"
 #include "program/app.h"
 #include "program/steps/capture_options.h"
-#include "program/steps/print_limits.h"
+#include "program/steps/print_fixes.h"
 #include "report/plots/floor_plot.h"
 #include "rig/input_error.h"
-#include "session/capture_motion.h"
+#include "session/lamp_captures.h"
 #include "session/locate_step.h"
 
 namespace vlp {

@@ -113,7 +113,7 @@ LocateInput make_input(const Options& options, const CapturesTable& captures) {
 LocateResult locate_in_images(const Options& options, LocateInput input) {
   check_image_outputs(options.images);
   const LampImages images = make_lamp_images(options.images, input.lamps, input.calibration);
-  LocatedImages found;
+  LocateResult found;
   {
     Progress progress("images");
     found =
@@ -121,7 +121,7 @@ LocateResult locate_in_images(const Options& options, LocateInput input) {
                       [&](std::size_t done, std::size_t total) { progress.update(done, total); });
   }
   print_lights(found.seen);
-  return std::move(found.located);
+  return found;
 }
 
 void run(Options options) {

@@ -8,8 +8,7 @@
 
 #include "program/app.h"
 #include "program/steps/capture_options.h"
-#include "program/steps/rotation_by_lamps.h"
-#include "program/steps/rotation_in_place.h"
+#include "program/steps/rotation_methods.h"
 
 namespace vlp {
 namespace {

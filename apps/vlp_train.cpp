@@ -13,9 +13,8 @@
 #include "program/app.h"
 #include "program/progress.h"
 #include "program/steps/capture_options.h"
-#include "program/steps/history.h"
-#include "program/steps/print_training.h"
 #include "program/steps/step_outcome.h"
+#include "program/steps/print_training.h"
 #include "rig/input_error.h"
 #include "session/row_time_step.h"
 #include "session/train_step.h"
@@ -71,7 +70,7 @@ Inputs read_inputs(const Options& options) {
                       [&](std::size_t done, std::size_t total) { progress.update(done, total); });
   }
   StepResult remarks;
-  add_remarks(inputs.seen, remarks);
+  add_remarks(inputs.seen.seen, remarks);
   print_remarks(remarks);
   return inputs;
 }

@@ -34,7 +34,7 @@ const Light* find_light(const Observation& image, const Eigen::Vector2d& pixel) 
   return nearest;
 }
 
-void add_labeled_lights(const std::vector<Observation>& images, const std::vector<Frame>& labels,
+void add_labeled_lights(std::span<const Observation> images, const std::vector<Frame>& labels,
                         LabeledLights& labeled) {
   const auto frames = frames_by_image(labels);
   std::size_t number = labeled.lights.empty() ? 0 : labeled.lights.back().image + 1;
@@ -53,7 +53,7 @@ void add_labeled_lights(const std::vector<Observation>& images, const std::vecto
   }
 }
 
-std::vector<LightPeriod> collect_periods(const std::vector<Observation>& images,
+std::vector<LightPeriod> collect_periods(std::span<const Observation> images,
                                          const std::vector<Frame>& labels) {
   const auto frames = frames_by_image(labels);
   std::vector<LightPeriod> periods;

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <span>
 #include <vector>
 
 #include "captures/detections_table.h"
@@ -25,7 +26,7 @@ struct LabeledLights {
 };
 
 /// Adds the lights of one folder; `labels` refers to its images by name.
-void add_labeled_lights(const std::vector<Observation>& images, const std::vector<Frame>& labels,
+void add_labeled_lights(std::span<const Observation> images, const std::vector<Frame>& labels,
                         LabeledLights& labeled);
 
 /// Measured period of a light, with its position.
@@ -38,7 +39,7 @@ struct LightPeriod : MeasuredPeriod {
 
 /// Returns the periods of the lights that are completely in view and whose stripes are
 /// trustworthy(). If `labels` is not empty, only of labeled lights.
-std::vector<LightPeriod> collect_periods(const std::vector<Observation>& images,
+std::vector<LightPeriod> collect_periods(std::span<const Observation> images,
                                          const std::vector<Frame>& labels);
 
 }  // namespace vlp

@@ -294,10 +294,9 @@ LampIntake::LampIntake(LightDetector detector, ImageUse use, const FrontendOptio
       options_(options),
       imager_px_(imager_px) {}
 
-LampIntake::LampIntake(const LampImages& images, ImageUse use, const FrontendOptions& options,
-                       Observations& result)
+LampIntake::LampIntake(const LampImages& images, ImageUse use, const FrontendOptions& options)
     : levels_(read_levels(images)),
-      detector_(make_detector(images, options, result)),
+      detector_(make_detector(images, options, remarks_)),
       use_(use),
       options_(options),
       can_turn_(!options.readout && !images.calibration) {
@@ -366,6 +365,7 @@ Observations LampIntake::observe_all(const std::vector<fs::path>& files,
                                        result.images.size(),
                                        readout() == Readout::rows ? "columns" : "rows"));
   }
+  prepend_remarks(remarks_, result);
   return result;
 }
 
@@ -375,11 +375,8 @@ std::vector<fs::path> list_lamp_images(const fs::path& images) {
 
 Observations observe_lamps(const LampImages& images, ImageUse use, const FrontendOptions& options,
                            const IntakeProgress& progress) {
-  Observations remarks;
-  const LampIntake intake(images, use, options, remarks);
-  Observations result = intake.observe_all(list_lamp_images(images.images), progress);
-  result.notes.insert(result.notes.begin(), remarks.notes.begin(), remarks.notes.end());
-  result.warnings.insert(result.warnings.begin(), remarks.warnings.begin(), remarks.warnings.end());
+  Observations result =
+      LampIntake(images, use, options).observe_all(list_lamp_images(images.images), progress);
   check_lamps_seen(images, result);
   return result;
 }

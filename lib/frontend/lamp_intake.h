@@ -63,12 +63,11 @@ class LampIntake {
              const std::optional<std::array<int, 2>>& imager_px, LevelRotations levels = {});
 
   /// Creates the intake of a set of images: reads the classifier and estimates the readout
-  /// direction if it is not known. Adds notes and warnings to `result`.
+  /// direction if it is not known. observe_all() returns its notes and warnings, too.
   /// @throws InputError if the row time, the frequencies or images are missing, if the classifier
   /// is
   ///         for other lamps or another row time, or if captures.csv cannot be read
-  LampIntake(const LampImages& images, ImageUse use, const FrontendOptions& options,
-             Observations& result);
+  LampIntake(const LampImages& images, ImageUse use, const FrontendOptions& options);
 
   /// Detects the lamps of an image. Rejects the image if it is unreadable, of another size, too
   /// dark, overexposed, or shows fewer lamps than its use needs. Repeated images are not rejected
@@ -91,6 +90,8 @@ class LampIntake {
  private:
   std::optional<LightDetector> detector_for(const std::string& image) const;
 
+  /// Notes and warnings about the set of images.
+  Observations remarks_;
   LevelRotations levels_;
   LightDetector detector_;
   ImageUse use_;

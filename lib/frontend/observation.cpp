@@ -77,6 +77,11 @@ bool is_redundant(RejectionReason reason) {
          reason == RejectionReason::not_needed;
 }
 
+void prepend_remarks(const Observations& remarks, Observations& result) {
+  result.warnings.insert(result.warnings.begin(), remarks.warnings.begin(), remarks.warnings.end());
+  result.notes.insert(result.notes.begin(), remarks.notes.begin(), remarks.notes.end());
+}
+
 std::vector<Detection> collect_lamps(const Observation& image) {
   std::vector<Detection> lamps;
   for (const Light& light : image.lights) {

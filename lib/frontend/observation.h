@@ -97,6 +97,9 @@ struct Observations {
   std::optional<IntakeFailure> failure = {};
 };
 
+/// Inserts the messages of `remarks` before those of `result`.
+void prepend_remarks(const Observations& remarks, Observations& result);
+
 /// Returns the lamps among the lights, with their centers.
 std::vector<Detection> collect_lamps(const Observation& image);
 

@@ -17,7 +17,7 @@
 #include "rig/calibration_builder.h"
 #include "rig/calibration_error.h"
 #include "rig/input_error.h"
-#include "session/capture_motion.h"
+#include "session/lamp_captures.h"
 #include "session/rotation_step.h"
 
 namespace vlp {

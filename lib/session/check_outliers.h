@@ -11,10 +11,11 @@ namespace vlp {
 /// Smaller horizontal errors at known points are no fault of the captures: a camera may have them.
 inline constexpr double kMinOutlierError_m = 0.005;
 
-/// Horizontal error of a fix at a known point.
-struct CheckError {
+/// Error of the fix of a capture: horizontally at a known point, m, or the RMS distance of the
+/// lamps in the image from where the fix sees them, px.
+struct CaptureError {
   std::string image;
-  double horizontal_m;
+  double size;
   /// Index of the capture in the folder, which may have captures without an error.
   std::size_t capture = 0;
 };
@@ -23,21 +24,12 @@ struct CheckError {
 /// line: their errors are gross outliers of the others, more than 5 mm and 8 times the median.
 /// Returns an empty string if there are none, and for fewer than five errors. Outliers are fewer
 /// than half, because the median is typical of the others.
-std::string describe_check_outliers(const std::vector<CheckError>& errors);
-
-/// Residual of the fix of a capture.
-struct CaptureResidual {
-  std::string image;
-  /// RMS distance of the lamps in the image from where the fix sees them.
-  double residual_px;
-  /// Index of the capture in the folder, which may have captures without a residual.
-  std::size_t capture = 0;
-};
+std::string describe_check_outliers(const std::vector<CaptureError>& errors_m);
 
 /// Describes captures whose lamps do not fit the lens and tilt of the others, in one line: two
 /// captures or more have residuals above 0.2 px and 8 times the median. A single one may show a
 /// covered lamp or a reflection. Returns an empty string if there are none, for fewer than five
 /// residuals, and if they are half of the captures or more.
-std::string describe_residual_outliers(const std::vector<CaptureResidual>& residuals);
+std::string describe_residual_outliers(const std::vector<CaptureError>& residuals_px);
 
 }  // namespace vlp

@@ -3,10 +3,14 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
+#include <span>
 #include <vector>
 
+#include "captures/captures_table.h"
 #include "captures/detections_table.h"
 #include "positioning/known_motion.h"
+#include "positioning/positioner.h"
 #include "rig/calibration.h"
 #include "rig/lamp_map.h"
 
@@ -21,5 +25,24 @@ struct LampCaptures {
   /// Motion of the camera in each frame; empty: the camera stands.
   std::vector<KnownMotion> motions = {};
 };
+
+/// Returns the motion of the camera in a capture: velocity and yaw rate of captures.csv, each
+/// replaced by that of `otherwise` if the table lacks it.
+///
+/// @param otherwise              motion without a table; std::nullopt: the camera stands
+/// @param yaw_rate_sd_rad_per_s  standard deviation of the table's yaw rate; the standard deviation
+///                               of its velocity is in the table
+std::optional<KnownMotion> find_motion(const Capture& capture,
+                                       const std::optional<KnownMotion>& otherwise,
+                                       double yaw_rate_sd_rad_per_s);
+
+/// Returns find_motion() for each frame; an empty vector if the camera stands in all of them.
+std::vector<KnownMotion> find_motions(std::span<const Frame> frames, const CapturesTable& captures,
+                                      const std::optional<KnownMotion>& otherwise,
+                                      double yaw_rate_sd_rad_per_s);
+
+/// Throws std::invalid_argument if the camera lacks row_time_s or readout, which motion
+/// compensation requires.
+void check_row_time(const Camera& camera);
 
 }  // namespace vlp

@@ -13,7 +13,7 @@
 #include "geometry/angles.h"
 #include "report/plots/calibration_plots.h"
 #include "rig/calibration_builder.h"
-#include "session/skipped_images.h"
+#include "session/step_result.h"
 
 namespace vlp {
 namespace {

@@ -12,8 +12,7 @@
 
 #include "geometry/angles.h"
 #include "positioning/correction.h"
-#include "session/row_time_check.h"
-#include "session/skipped_images.h"
+#include "session/row_time_step.h"
 
 namespace vlp {
 namespace {
@@ -152,33 +151,14 @@ bool has_detections(const std::vector<Frame>& frames) {
                      [](const Frame& frame) { return !frame.detections.empty(); });
 }
 
-/// Adds a contradiction of the row time to a result: as its failure if it has one, as a warning
-/// otherwise, because the fixes of a camera at rest are valid.
-void add_row_time_error(const std::vector<Observation>& images, const LocateInput& input,
-                        const std::filesystem::path& calibration_file, LocateResult& located) {
-  std::string error = describe_row_time_error(images, input.lamps, input.calibration.camera,
-                                              calibration_file.filename().string(), located.ok());
-  if (error.empty()) return;
-  if (located.ok()) {
-    located.warnings.push_back(std::move(error));
-  } else {
-    located.fail(StepFailure::bad_input, std::move(error));
-  }
-}
-
 }  // namespace
 
-LocatedImages locate_images(const LampImages& images, ImageUse use, LocateInput input,
-                            const FrontendOptions& options, const IntakeProgress& progress) {
-  LocatedImages result;
-  Observations& seen = result.seen;
-  const LampIntake intake(images, use, options, seen);
+LocateResult locate_images(const LampImages& images, ImageUse use, LocateInput input,
+                           const FrontendOptions& options, const IntakeProgress& progress) {
+  const LampIntake intake(images, use, options);
   if (!input.calibration.camera.readout) input.calibration.camera.readout = intake.readout();
   const auto files = list_lamp_images(images.images);
-  Observations first = intake.observe_all(files, progress);
-  seen.images = std::move(first.images);
-  seen.notes.insert(seen.notes.end(), first.notes.begin(), first.notes.end());
-  seen.warnings.insert(seen.warnings.end(), first.warnings.begin(), first.warnings.end());
+  Observations seen = intake.observe_all(files, progress);
   check_lamps_seen(images, seen);
   input.frames = collect_kept_frames(seen.images);
   const LampIntake without_pictures = intake.with_annotate({});
@@ -195,15 +175,18 @@ LocatedImages locate_images(const LampImages& images, ImageUse use, LocateInput 
     if (levels.contains(image.name()) && repeated != latest.end()) image = repeated->second;
   }
   if (!options.annotate.empty()) observe_again(intake, files, levels);
+  LocateResult result;
   if (has_detections(input.frames)) {
     seen.failure.reset();
-    result.located = locate_frames(input);
+    result = locate_frames(input);
   }
-  add_remarks(seen, result.located);
+  add_remarks(seen, result);
   // A classifier identifies lamps without the row time: it is no reason why there is no result.
-  if (options.classifier.empty() || result.located.ok()) {
-    add_row_time_error(seen.images, input, images.calibration_file, result.located);
+  if (options.classifier.empty() || result.ok()) {
+    explain_by_row_time(seen.images, input.lamps, make_detector_camera(input.calibration),
+                        images.calibration_file.filename().string(), result);
   }
+  result.seen = std::move(seen);
   return result;
 }
 

@@ -11,13 +11,6 @@
 
 namespace vlp {
 
-/// Position fixes of the cameras of a set of images.
-struct LocatedImages {
-  /// Detections from which the fixes are estimated.
-  Observations seen;
-  LocateResult located;
-};
-
 /// Detects the lamps in images (observe_lamps()) and locates the camera of each image. `input`
 /// holds everything except the frames. If the tilt of a camera is estimated, its lamps are detected
 /// again in the plane that is level by its fix (redetect_tilted_captures()).
@@ -25,8 +18,8 @@ struct LocatedImages {
 /// Skipped images and remarks of the intake are part of the result. It fails as locate_frames()
 /// does, or if no lamp is identified.
 /// @throws as observe_lamps() and locate_frames()
-LocatedImages locate_images(const LampImages& images, ImageUse use, LocateInput input,
-                            const FrontendOptions& options, const IntakeProgress& progress = {});
+LocateResult locate_images(const LampImages& images, ImageUse use, LocateInput input,
+                           const FrontendOptions& options, const IntakeProgress& progress = {});
 
 /// Function that detects the lamps of the named images again, in their level planes. Returns a
 /// frame per image, by name.

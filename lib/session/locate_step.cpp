@@ -16,7 +16,7 @@
 #include "positioning/residual_noise.h"
 #include "positioning/row_clock.h"
 #include "rig/find_lamp.h"
-#include "session/capture_motion.h"
+#include "session/lamp_captures.h"
 
 namespace vlp {
 

@@ -12,6 +12,7 @@
 #include "captures/detections_table.h"
 #include "captures/fixes_table.h"
 #include "evaluation/fix_summary.h"
+#include "frontend/observation.h"
 #include "positioning/positioner.h"
 #include "session/step_result.h"
 
@@ -64,6 +65,8 @@ struct LocateResult : StepResult {
   std::vector<Fix> fixes;
   std::vector<FixRow> rows;
   FixSummary summary;
+  /// Observations of the images in which the lamps were detected (locate_images()).
+  Observations seen = {};
 };
 
 /// Estimates the fix of each frame.

@@ -17,21 +17,15 @@
 #include "report/plots/calibration_plots.h"
 #include "rig/calibration_builder.h"
 #include "rig/calibration_error.h"
-#include "session/capture_motion.h"
+#include "session/lamp_captures.h"
 
 namespace vlp {
 namespace {
 
-std::string to_string(RotationMethod method) {
-  switch (method) {
-    case RotationMethod::axis:
-      return "axis";
-    case RotationMethod::joint:
-      return "joint";
-    case RotationMethod::circle:
-      return "circle";
-  }
-  return "";
+std::string_view name_of(RotationMethod method) {
+  return std::ranges::find(kRotationMethods, method,
+                           &std::pair<std::string_view, RotationMethod>::second)
+      ->first;
 }
 
 RotationFit fit_rotation(const RotationCaptures& spot, const Camera& camera,
@@ -104,12 +98,6 @@ void propagate_lens_errors(RotationResult& result, const LampCaptures& input,
   propagate_lens_errors(result.fit.center, input, center_for, result);
 }
 
-/// Formats a height in meters, without a sign if it rounds to zero.
-std::string format_height_m(double z_m) {
-  const std::string text = fmt::format("{:.3f}", z_m);
-  return text == "-0.000" ? "0.000" : text;
-}
-
 void add_warnings(RotationResult& result) {
   const auto& heights = result.spot.heights;
   if (!result.fit.center.lever_arm_m && heights.size() == 1) {
@@ -179,6 +167,11 @@ constexpr double kMinBlame_px = 2.5;
 
 }  // namespace
 
+std::string format_height_m(double z_m) {
+  const std::string text = fmt::format("{:.3f}", z_m);
+  return text == "-0.000" ? "0.000" : text;
+}
+
 Calibration extract_camera(const Calibration& calibration) {
   Calibration alone;
   alone.camera = calibration.camera;
@@ -230,20 +223,16 @@ RotationResult solve_rotation(const LampCaptures& input, RotationMethod method,
   }
   result.circles = fit_circle_centers(result.spot, camera);
   result.fit = fit_rotation(result.spot, camera, method);
-  if (method == RotationMethod::circle && !result.fit.converged &&
-      result.circles.undetermined > 0) {
+  if (!result.fit.converged) {
+    const bool is_noise = method == RotationMethod::circle && result.circles.undetermined > 0;
     result.fail(
         StepFailure::undetermined,
-        "the noise of the captures determines most circles, as captures at two yaws do: add "
-        "captures at other yaws, twelve over a full turn are good, or take --method joint");
-    explain_failure_by_map(input, extract_camera(input.calibration), result);
-    return result;
-  }
-  if (!result.fit.converged) {
-    result.fail(StepFailure::undetermined,
-                "no rotation center fits the captures: take them on one spot at each height, over "
-                "more of the turn, with more of the lamps in view, and see that lens and lamp map "
-                "are right");
+        is_noise
+            ? "the noise of the captures determines most circles, as captures at two yaws do: add "
+              "captures at other yaws, twelve over a full turn are good, or take --method joint"
+            : "no rotation center fits the captures: take them on one spot at each height, over "
+              "more of the turn, with more of the lamps in view, and see that lens and lamp map "
+              "are right");
     explain_failure_by_map(input, extract_camera(input.calibration), result);
     return result;
   }
@@ -251,7 +240,7 @@ RotationResult solve_rotation(const LampCaptures& input, RotationMethod method,
   add_metrics(result);
   add_warnings(result);
   result.calibration = with_rotation_center(input.calibration, result.fit.center, std::move(entry));
-  const std::string title = fmt::format("{}, method {}", camera.id, to_string(method));
+  const std::string title = fmt::format("{}, method {}", camera.id, name_of(method));
   result.drawing = [title, spot = result.spot, circles = result.circles, fit = result.fit, camera] {
     return make_drawing(make_plot(title, spot, circles, fit, camera));
   };

@@ -2,6 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
+#include <string>
+#include <string_view>
+#include <utility>
+
 #include "calibration/map/map_errors.h"
 #include "calibration/rotation/circle_center.h"
 #include "calibration/tilt/tilt_calibration.h"
@@ -29,6 +34,15 @@ enum class RotationMethod {
   joint,  // fit_joint_center()
   circle  // fit_circle_centers()
 };
+
+/// Names of the estimators on the command line and in plots.
+inline constexpr std::array<std::pair<std::string_view, RotationMethod>, 3> kRotationMethods{
+    {{"axis", RotationMethod::axis},
+     {"joint", RotationMethod::joint},
+     {"circle", RotationMethod::circle}}};
+
+/// Formats a height in meters, without a sign if it rounds to zero.
+std::string format_height_m(double z_m);
 
 /// Result of solve_rotation().
 struct RotationResult : StepResult {

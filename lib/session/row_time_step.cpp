@@ -5,14 +5,14 @@
 #include <fmt/core.h>
 
 #include <array>
+#include <cmath>
 #include <map>
 #include <utility>
 
 #include "frontend/image_folder.h"
 #include "frontend/lamp_intake.h"
+#include "lamps/signal/frequency_identification.h"
 #include "session/position_cost.h"
-#include "session/row_time_check.h"
-#include "session/skipped_images.h"
 
 namespace vlp {
 
@@ -26,14 +26,14 @@ struct PeriodsOfImages {
   std::vector<LightPeriod> lights;
   std::vector<std::array<int, 2>> sizes_px;
 
-  PeriodsOfImages(const std::vector<const std::vector<Observation>*>& folders,
+  PeriodsOfImages(std::span<const std::span<const Observation>> folders,
                   const std::vector<std::vector<Frame>>& labels) {
     for (std::size_t i = 0; i < folders.size(); ++i) {
-      for (LightPeriod light : collect_periods(*folders[i], labels[i])) {
+      for (LightPeriod light : collect_periods(folders[i], labels[i])) {
         light.image += sizes_px.size();
         lights.push_back(std::move(light));
       }
-      for (const Observation& image : *folders[i]) sizes_px.push_back(image.size_px);
+      for (const Observation& image : folders[i]) sizes_px.push_back(image.size_px);
     }
   }
 
@@ -55,21 +55,39 @@ struct PeriodsOfImages {
   }
 };
 
-/// Collects the images of all folders, without their lights.
-std::vector<Observation> collect_images(const DetectedLights& seen) {
-  std::vector<Observation> images;
-  for (const Observations& folder : seen.folders) {
-    for (const Observation& image : folder.images) {
-      images.push_back({image.file});
-      images.back().rejection = image.rejection;
+/// Fewer lamps may be wrong in the map instead.
+constexpr int kMinRowTimeLamps = 3;
+constexpr double kMicrosecondsPerSecond = 1e6;
+
+/// Collects the periods of identified lamps. A period found by modulation is excluded: its search
+/// begins at the given row time.
+std::vector<MeasuredPeriod> collect_lamp_periods(const std::vector<Observation>& images) {
+  std::vector<MeasuredPeriod> periods;
+  for (const Observation& image : images) {
+    if (!image.is_kept()) continue;  // excludes copies and images of another camera
+    for (const Light& light : image.lights) {
+      const bool is_measured = light.kind == LightKind::lamp && light.lamp &&
+                               !light.by_modulation && is_reliable(light.stripes);
+      if (!is_measured) continue;
+      periods.push_back({light.stripes.period_lines, light.lamp});
     }
   }
-  return images;
+  return periods;
 }
 
 }  // namespace
 
-RowTimeResult choose_row_time_by_places(const std::vector<const std::vector<Observation>*>& folders,
+std::vector<std::span<const Observation>> DetectedLights::folders() const {
+  std::vector<std::span<const Observation>> folders;
+  std::span<const Observation> remaining = seen.images;
+  for (const std::size_t size : folder_sizes) {
+    folders.push_back(remaining.first(size));
+    remaining = remaining.subspan(size);
+  }
+  return folders;
+}
+
+RowTimeResult choose_row_time_by_places(std::span<const std::span<const Observation>> folders,
                                         const std::vector<std::vector<Frame>>& labels,
                                         const LampMap& lamps, const std::optional<Lens>& lens) {
   const PeriodsOfImages periods(folders, labels);
@@ -83,47 +101,79 @@ RowTimeResult choose_row_time_by_places(const std::vector<const std::vector<Obse
 DetectedLights detect_lights(const std::vector<fs::path>& folders, const LampMap& lamps,
                              const std::optional<Calibration>& calibration, bool with_row_time,
                              const FrontendOptions& options, const IntakeProgress& progress) {
-  DetectedLights seen;
+  DetectedLights lights;
   std::optional<std::array<int, 2>> imager_px;
   std::optional<Readout> readout = options.readout;
   if (calibration) {
-    seen.camera = make_detector_camera(*calibration);
+    lights.camera = make_detector_camera(*calibration);
     imager_px = calibration->camera.imager_px;
     if (!readout) readout = calibration->camera.readout;
   }
   // The estimate must not depend on the given row time.
-  if (!with_row_time) seen.camera.row_time_s.reset();
-  std::vector<std::vector<fs::path>> images;
-  std::vector<fs::path> all;
+  if (!with_row_time) lights.camera.row_time_s.reset();
+  std::vector<fs::path> images;
   for (const fs::path& folder : folders) {
-    images.push_back(list_images(folder));
-    all.insert(all.end(), images.back().begin(), images.back().end());
+    const auto in_folder = list_images(folder);
+    lights.folder_sizes.push_back(in_folder.size());
+    images.insert(images.end(), in_folder.begin(), in_folder.end());
   }
   Observations remarks;
-  seen.camera.readout = find_readout(all, readout, options, imager_px, remarks);
-  const LampIntake intake(LightDetector(lamps, seen.camera), ImageUse::fixes, options, imager_px);
-  std::size_t before = 0;
-  for (const auto& files : images) {
-    seen.folders.push_back(intake.observe_all(files, [&](std::size_t done, std::size_t) {
-      if (progress) progress(before + done, all.size());
-    }));
-    before += files.size();
-  }
-  auto& first = seen.folders.front();
-  first.notes.insert(first.notes.begin(), remarks.notes.begin(), remarks.notes.end());
-  first.warnings.insert(first.warnings.begin(), remarks.warnings.begin(), remarks.warnings.end());
-  check_any_readable(folders.front(), collect_images(seen));
-  return seen;
+  lights.camera.readout = find_readout(images, readout, options, imager_px, remarks);
+  const LampIntake intake(LightDetector(lamps, lights.camera), ImageUse::fixes, options, imager_px);
+  lights.seen = intake.observe_all(images, progress);
+  prepend_remarks(remarks, lights.seen);
+  check_any_readable(folders.front(), lights.seen.images);
+  return lights;
 }
 
-void add_remarks(const DetectedLights& seen, StepResult& result) {
-  Observations all;
-  all.images = collect_images(seen);
-  for (const Observations& folder : seen.folders) {
-    all.notes.insert(all.notes.end(), folder.notes.begin(), folder.notes.end());
-    all.warnings.insert(all.warnings.end(), folder.warnings.begin(), folder.warnings.end());
+std::string compare_row_times(const RowTime& measured, const GivenRowTime& given) {
+  constexpr double max_sds = 3;
+  const double max_deviation = kLampDrift + max_sds * measured.sd_s / measured.row_time_s;
+  const double deviation = std::abs(std::log(measured.row_time_s / given.row_time_s));
+  if (measured.lamps < kMinRowTimeLamps || deviation <= max_deviation) return "";
+  return fmt::format(
+      "row time is {:.6g} us in {}, but the stripes of {} lamps measure {:.2f} +- {:.2f} us; "
+      "correct it, or, if it is right, all frequencies of the lamp map by this ratio",
+      kMicrosecondsPerSecond * given.row_time_s, given.source, measured.lamps,
+      kMicrosecondsPerSecond * measured.row_time_s, kMicrosecondsPerSecond * measured.sd_s);
+}
+
+RowTimeCheck check_row_time(const std::vector<Observation>& images, const LampMap& lamps,
+                            const GivenRowTime& given) {
+  const auto found = estimate_row_time(collect_lamp_periods(images), lamps);
+  if (found.candidates.empty()) return {};
+  const RowTime& measured = found.candidates.front().row_time;
+  if (measured.lamps < kMinRowTimeLamps) return {};
+  return {measured, compare_row_times(measured, given)};
+}
+
+std::string find_row_time_error(const std::vector<Observation>& images, const LampMap& lamps,
+                                const std::optional<Lens>& lens, const GivenRowTime& given) {
+  const auto found =
+      choose_row_time_by_places(std::array{std::span(images)}, {{}}, lamps, lens).found;
+  return found ? compare_row_times(*found, given) : "";
+}
+
+void explain_by_row_time(const std::vector<Observation>& images, const LampMap& lamps,
+                         const DetectorCamera& camera, const std::string& source,
+                         StepResult& result) {
+  if (!camera.row_time_s) return;
+  const GivenRowTime given{*camera.row_time_s, source};
+  std::string error;
+  if (result.ok()) error = check_row_time(images, lamps, given).error;
+  if (error.empty()) error = find_row_time_error(images, lamps, camera.lens, given);
+  if (error.empty()) return;
+  if (result.ok()) {
+    result.warnings.push_back(std::move(error));
+  } else {
+    result.fail(StepFailure::bad_input, std::move(error));
   }
-  add_remarks(all, result);
+}
+
+std::vector<Metric> row_time_metrics(const RowTimeCheck& check) {
+  if (!check.measured) return {};
+  return {{"row_time_us", kMicrosecondsPerSecond * check.measured->row_time_s},
+          {"row_time_sd_us", kMicrosecondsPerSecond * check.measured->sd_s}};
 }
 
 RowTimeStepResult find_row_time(const DetectedLights& seen,
@@ -132,18 +182,14 @@ RowTimeStepResult find_row_time(const DetectedLights& seen,
                                 const std::optional<Calibration>& calibration, HistoryEntry entry) {
   check_frequencies(lamps, lamps_file);
   RowTimeStepResult result;
-  std::vector<const std::vector<Observation>*> folders;
-  folders.reserve(seen.folders.size());
-  for (const Observations& folder : seen.folders) folders.push_back(&folder.images);
   const RowTimeResult estimate =
-      choose_row_time_by_places(folders, labels, lamps, seen.camera.lens);
+      choose_row_time_by_places(seen.folders(), labels, lamps, seen.camera.lens);
   if (!estimate.found) {
     result.fail(StepFailure::undetermined, estimate.problem);
     return result;
   }
   result.found = *estimate.found;
-  result.metrics = {{"row_time_us", 1e6 * result.found.row_time_s},
-                    {"row_time_sd_us", 1e6 * result.found.sd_s}};
+  result.metrics = row_time_metrics({result.found});
   if (!calibration) return result;
   if (const auto& stated_s = calibration->camera.row_time_s) {
     std::string error = compare_row_times(result.found, {*stated_s, "the calibration"});

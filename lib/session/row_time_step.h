@@ -4,8 +4,12 @@
 
 #include <filesystem>
 #include <optional>
+#include <span>
+#include <string>
 #include <vector>
 
+#include "camera/lens.h"
+#include "evaluation/metric.h"
 #include "frontend/labeled_lights.h"
 #include "frontend/lamp_intake.h"
 #include "frontend/options.h"
@@ -18,9 +22,14 @@ namespace vlp {
 
 /// Lights in folders of images, not identified as lamps.
 struct DetectedLights {
-  /// Observations of each folder.
-  std::vector<Observations> folders;
+  /// Observations of the images of all folders.
+  Observations seen;
+  /// Number of images in each folder.
+  std::vector<std::size_t> folder_sizes;
   DetectorCamera camera;
+
+  /// Returns the observations of each folder.
+  std::vector<std::span<const Observation>> folders() const;
 };
 
 /// Detects the lights in the images of each folder without identifying lamps. `calibration`
@@ -31,14 +40,11 @@ DetectedLights detect_lights(const std::vector<std::filesystem::path>& folders,
                              bool with_row_time, const FrontendOptions& options,
                              const IntakeProgress& progress = {});
 
-/// Adds the remarks of all folders to the result of a step, see add_remarks().
-void add_remarks(const DetectedLights& seen, StepResult& result);
-
 /// Chooses a row time by periods and duty cycles of the lights in the images of each folder. Also
 /// uses their positions if several row times fit (compute_position_costs()).
 ///
 /// @param labels  lights of each folder that are lamps; empty: all lights
-RowTimeResult choose_row_time_by_places(const std::vector<const std::vector<Observation>*>& folders,
+RowTimeResult choose_row_time_by_places(std::span<const std::span<const Observation>> folders,
                                         const std::vector<std::vector<Frame>>& labels,
                                         const LampMap& lamps, const std::optional<Lens>& lens);
 
@@ -56,5 +62,60 @@ RowTimeStepResult find_row_time(const DetectedLights& seen,
                                 const std::vector<std::vector<Frame>>& labels, const LampMap& lamps,
                                 const std::filesystem::path& lamps_file,
                                 const std::optional<Calibration>& calibration, HistoryEntry entry);
+
+/// Row time given by a file or an option.
+struct GivenRowTime {
+  double row_time_s;
+  /// Name of the file or of the option.
+  std::string source;
+};
+
+/// Row time measured from identified lamps, compared with the given one.
+struct RowTimeCheck {
+  /// std::nullopt: fewer than three lamps show trustworthy stripes.
+  std::optional<RowTime> measured = {};
+  /// Contradiction in one line; empty if there is none.
+  std::string error = {};
+};
+
+/// Compares a measured row time with the stated one, as check_row_time() does.
+///
+/// @return  the contradiction in one line; empty if there is none or fewer than three lamps were
+///          measured
+std::string compare_row_times(const RowTime& measured, const GivenRowTime& given);
+
+/// Estimates the row time from the identified lamps of the kept images (estimate_row_time()) and
+/// compares it with the given one. They contradict each other if
+///
+///     |log(measured / stated)| > kLampDrift + 3 sd / measured.
+///
+/// A lamp may deviate from its frequency by kLampDrift (frequency_identification.h). The mean of
+/// several lamps then deviates by at most kLampDrift, whether their deviations are independent or
+/// common. The second term covers the measurement, and lamps that deviate by more.
+RowTimeCheck check_row_time(const std::vector<Observation>& images, const LampMap& lamps,
+                            const GivenRowTime& given);
+
+/// Finds another row time that makes the lights of the images lamps of the map, by their periods
+/// and positions, independently of their identification (choose_row_time()): a wrong row time
+/// leaves lights unknown or exchanges lamps.
+///
+/// @return  the contradiction in one line; empty unless at least three lamps contradict the given
+///          row time as in check_row_time()
+std::string find_row_time_error(const std::vector<Observation>& images, const LampMap& lamps,
+                                const std::optional<Lens>& lens, const GivenRowTime& given);
+
+/// Adds a contradiction of the row time of `camera` to the result of a step: in place of the reason
+/// if the step failed, as a warning otherwise, because fixes at rest are valid. The contradiction
+/// is that of check_row_time() if there is a result. Otherwise, and if identified lamps agree
+/// because each was taken for its neighbor, it is that of find_row_time_error(). Does nothing if
+/// the row time is unknown.
+///
+/// @param source  name of the file or of the option that gives the row time
+void explain_by_row_time(const std::vector<Observation>& images, const LampMap& lamps,
+                         const DetectorCamera& camera, const std::string& source,
+                         StepResult& result);
+
+/// Returns the metrics row_time_us and row_time_sd_us; none if the row time was not measured.
+std::vector<Metric> row_time_metrics(const RowTimeCheck& check);
 
 }  // namespace vlp

@@ -2,9 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "session/session.h"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <memory>
 #include <stdexcept>
@@ -23,13 +24,11 @@
 #include "session/evaluate_step.h"
 #include "session/lens_step.h"
 #include "session/locate_images.h"
-#include "session/locate_step.h"
 #include "session/rotation_step.h"
-#include "session/row_time_check.h"
 #include "session/row_time_step.h"
 #include "session/session_file.h"
 #include "session/session_results.h"
-#include "session/skipped_images.h"
+#include "session/step_result.h"
 
 namespace vlp {
 namespace {
@@ -60,22 +59,15 @@ std::string remove_folder(std::string text, const fs::path& named) {
   return text;
 }
 
-const char* find_step_name(MetricSource source) {
-  switch (source) {
-    case MetricSource::lens:
-      return "lens";
-    case MetricSource::rotation:
-      return "rotation";
-    case MetricSource::dispersion:
-      return "dispersion";
-    case MetricSource::evaluation:
-    case MetricSource::reference:
-      return "evaluate";
-    case MetricSource::station:
-      break;
-  }
-  return "";
-}
+/// Steps whose metrics can have gates.
+constexpr std::array<std::pair<MetricSource, std::string_view>, 5> kStepsOfMetrics{
+    {{MetricSource::lens, "lens"},
+     {MetricSource::rotation, "rotation"},
+     {MetricSource::dispersion, "dispersion"},
+     {MetricSource::evaluation, "evaluate"},
+     {MetricSource::reference, "evaluate"}}};
+
+constexpr std::array kPlots{"lens.svg", "rotation.svg", "dispersion.svg"};
 
 /// Returns the gates of the session: those of the lens, if it is estimated, and those of its file.
 std::vector<Gate> gates_for(const SessionFolder& session, const SessionOptions& options) {
@@ -123,22 +115,23 @@ class SessionRun {
 
  private:
   void check_redo() const {
-    const auto steps = outputs();
-    std::string names;
-    for (const auto& [step, files] : steps) names.append(names.empty() ? "" : ", ").append(step);
+    std::vector<std::string> names;
+    for (const auto& [step, files] : outputs()) names.push_back(step);
     for (const std::string& name : options_.redo) {
-      const auto is_known_step = [&](const StepOutputs& step) { return step.step == name; };
-      if (std::any_of(steps.begin(), steps.end(), is_known_step)) continue;
-      std::string reason = "there is no step " + name + " here; the steps are: ";
-      throw std::invalid_argument(reason.append(names));
+      if (std::ranges::find(names, name) != names.end()) continue;
+      throw std::invalid_argument(
+          fmt::format("there is no step {} here; the steps are: {}", name, fmt::join(names, ", ")));
     }
   }
 
   bool is_redo_requested(const std::string& step) const {
-    return std::find(options_.redo.begin(), options_.redo.end(), step) != options_.redo.end();
+    return std::ranges::find(options_.redo, step) != options_.redo.end();
   }
 
   fs::path out(const std::string& name) const { return results_.file(name); }
+  fs::path fixes_of(const fs::path& captures) const {
+    return out(captures.filename().string() + "-fixes.csv");
+  }
   fs::path lamps_file() const { return session_.lamps(); }
   LampMap read_lamps() const { return read_lamps_of_room(lamps_file(), options_.frontend.room); }
 
@@ -157,24 +150,21 @@ class SessionRun {
       if (options_.report) names.emplace_back(picture);
       return names;
     };
-    std::vector<StepOutputs> steps;
-    std::vector<std::string> lens{"lens.yaml"};
-    if (options_.choose_lens_model || has_mrcal(options_.lens_model)) {
-      lens.emplace_back("lens.cameramodel");
+    std::vector<std::string> lens;
+    if (!session_.camera()) lens = with_picture({"lens.yaml"}, "lens.svg");
+    if (!session_.camera() && (options_.choose_lens_model || has_mrcal(options_.lens_model))) {
+      lens.insert(lens.begin() + 1, "lens.cameramodel");
     }
-    steps.push_back(
-        {"lens", session_.camera() ? std::vector<std::string>() : with_picture(lens, "lens.svg")});
-    steps.push_back({"row-time", std::vector<std::string>{"camera.yaml"}});
-    steps.push_back({"rotation", with_picture({"rotated.yaml"}, "rotation.svg")});
-    steps.push_back({"dispersion", with_picture({"calibration.yaml"}, "dispersion.svg")});
-    if (session_.check()) steps.push_back({"check", std::vector<std::string>{"check-fixes.csv"}});
+    std::vector<StepOutputs> steps{
+        {"lens", lens},
+        {"row-time", {"camera.yaml"}},
+        {"rotation", with_picture({"rotated.yaml"}, "rotation.svg")},
+        {"dispersion", with_picture({"calibration.yaml"}, "dispersion.svg")}};
+    if (session_.check()) steps.push_back({"check", {"check-fixes.csv"}});
     for (const fs::path& line : lines()) {
-      const std::string name = line.filename().string();
-      steps.push_back({name, std::vector<std::string>{name + "-fixes.csv"}});
+      steps.push_back({line.filename().string(), {fixes_of(line).filename().string()}});
     }
-    std::vector<std::string> evaluation{"evaluation.json"};
-    if (options_.report) evaluation.emplace_back("report.html");
-    steps.push_back({"evaluate", evaluation});
+    steps.push_back({"evaluate", with_picture({"evaluation.json"}, "report.html")});
     return steps;
   }
 
@@ -221,9 +211,8 @@ class SessionRun {
   /// value.
   void add_gates_of_missing_steps() {
     for (const char* name : {"lens", "rotation", "dispersion"}) {
-      const bool exists = std::any_of(result_.steps.begin(), result_.steps.end(),
-                                      [&](const SessionStep& step) { return step.name == name; });
-      if (exists) continue;
+      if (std::ranges::find(result_.steps, name, &SessionStep::name) != result_.steps.end())
+        continue;
       const auto gates = check_gates(find_step_gates(name), {});
       result_.gates.insert(result_.gates.end(), gates.begin(), gates.end());
     }
@@ -233,7 +222,8 @@ class SessionRun {
   std::vector<Gate> find_step_gates(const std::string& step) const {
     std::vector<Gate> gates;
     for (const Gate& gate : gates_) {
-      if (find_step_name(metric_kind(gate.metric)->source) == step) gates.push_back(gate);
+      const std::pair gated(metric_kind(gate.metric)->source, std::string_view(step));
+      if (std::ranges::find(kStepsOfMetrics, gated) != kStepsOfMetrics.end()) gates.push_back(gate);
     }
     return gates;
   }
@@ -324,7 +314,7 @@ class SessionRun {
       RowTimeStepResult found =
           vlp::find_row_time(seen, {{}}, lamps, lamps_file(), camera,
                              history("--row-time", {session_.rotation(), lamps_file()}));
-      add_remarks(seen, found);
+      add_remarks(seen.seen, found);
       return Work{found,
                   [this, found] { write_calibration(out("camera.yaml"), found.calibration); }};
     });
@@ -337,39 +327,30 @@ class SessionRun {
     return options;
   }
 
-  /// Detects the lamps in the captures of a step. Returns false, with the failure in `result`, if
-  /// none can be used.
-  bool observe(const fs::path& folder, ImageUse use, LampCaptures& captures,
-               const fs::path& calibration_file, Observations& seen, StepResult& result,
-               const std::optional<CapturesTable>& table = std::nullopt) const {
-    LampImages images{folder, captures.lamps, captures.lamps_file, captures.calibration,
-                      calibration_file};
-    images.captures = table;
-    seen = observe_lamps(images, use, lamp_options(), observer_.progress);
-    captures.frames = collect_kept_frames(seen.images);
-    add_remarks(seen, result);
-    const Camera& camera = captures.calibration.camera;
-    explain_by_row_time(captures, seen.images, result);
-    if (use == ImageUse::turn && is_row_time_given() && camera.row_time_s) {
-      result.metrics = row_time_metrics(
-          check_row_time(seen.images, captures.lamps, {*camera.row_time_s, row_time_source()}));
+  /// Detects the lamps in the captures of a step. Returns the remarks, the metrics of the row time,
+  /// and the failure if no image can be used.
+  StepResult observe(const LampImages& images, ImageUse use, LampCaptures& captures,
+                     std::vector<Observation>& seen) const {
+    Observations observed = observe_lamps(images, use, lamp_options(), observer_.progress);
+    captures.frames = collect_kept_frames(observed.images);
+    StepResult result;
+    add_remarks(observed, result);
+    seen = std::move(observed.images);
+    explain_by_row_time(captures, seen, result);
+    const auto& row_time_s = captures.calibration.camera.row_time_s;
+    if (use == ImageUse::turn && is_row_time_given() && row_time_s) {
+      result.metrics =
+          row_time_metrics(check_row_time(seen, captures.lamps, {*row_time_s, row_time_source()}));
     }
-    return result.ok();
+    return result;
   }
 
-  /// Adds a contradiction of the row time (row_time_check.h) to the result of a step: in place of
-  /// the reason if the step failed, as a warning otherwise, because fixes at rest are valid.
+  /// Adds a contradiction of the row time to the result of a step (explain_by_row_time()).
   void explain_by_row_time(const LampCaptures& captures, const std::vector<Observation>& images,
                            StepResult& result) const {
     if (session_.classifier()) return;  // the lamps are not identified by frequency
-    std::string error = describe_row_time_error(images, captures.lamps, captures.calibration.camera,
-                                                row_time_source(), result.ok());
-    if (error.empty()) return;
-    if (result.ok()) {
-      result.warnings.push_back(std::move(error));
-    } else {
-      result.fail(StepFailure::bad_input, std::move(error));
-    }
+    vlp::explain_by_row_time(images, captures.lamps, make_detector_camera(captures.calibration),
+                             row_time_source(), result);
   }
 
   /// Returns false if the row time was estimated by the step row-time, or is not used.
@@ -384,13 +365,17 @@ class SessionRun {
   }
 
   /// Adds the remarks and metrics of the images to the result of a step.
-  template <typename Result>
-  static void add(const StepResult& remarks, Result& result) {
+  static void add(const StepResult& remarks, StepResult& result) {
     result.metrics.insert(result.metrics.end(), remarks.metrics.begin(), remarks.metrics.end());
     result.skipped = remarks.skipped;
     result.notes.insert(result.notes.begin(), remarks.notes.begin(), remarks.notes.end());
     result.warnings.insert(result.warnings.begin(), remarks.warnings.begin(),
                            remarks.warnings.end());
+  }
+
+  static LampImages lamp_images(const fs::path& folder, const LampCaptures& captures,
+                                const fs::path& calibration_file) {
+    return {folder, captures.lamps, captures.lamps_file, captures.calibration, calibration_file};
   }
 
   std::vector<fs::path> lamp_inputs(const fs::path& folder, const fs::path& calibration) const {
@@ -403,15 +388,13 @@ class SessionRun {
     const auto inputs = lamp_inputs(session_.rotation(), camera_file);
     return step("rotation", inputs, picture_setting(), [&] {
       LampCaptures captures{{}, read_lamps(), lamps_file(), read_calibration(camera_file)};
-      StepResult remarks;
-      Observations seen;
-      // Inclinations are ignored: the axis is level.
-      if (!observe(session_.rotation(), ImageUse::turn, captures, camera_file, seen, remarks,
-                   CapturesTable())) {
-        return Work{remarks};
-      }
+      LampImages images = lamp_images(session_.rotation(), captures, camera_file);
+      images.captures.emplace();  // inclinations are ignored: the axis is level
+      std::vector<Observation> seen;
+      const StepResult remarks = observe(images, ImageUse::turn, captures, seen);
+      if (!remarks.ok()) return Work{remarks};
       RotationResult found = solve_rotation(captures, RotationMethod::axis, history("", inputs));
-      if (!found.ok()) explain_by_row_time(captures, seen.images, found);
+      if (!found.ok()) explain_by_row_time(captures, seen, found);
       add(remarks, found);
       return Work{found, [this, found] {
                     write_picture(found, "rotation.svg");
@@ -425,10 +408,10 @@ class SessionRun {
     const auto inputs = lamp_inputs(folder, rotated);
     return step("dispersion", inputs, picture_setting(), [&] {
       LampCaptures captures{{}, read_lamps(), lamps_file(), read_calibration(rotated)};
-      StepResult remarks;
-      Observations seen;
-      if (!observe(folder, ImageUse::places, captures, rotated, seen, remarks))
-        return Work{remarks};
+      std::vector<Observation> seen;
+      const StepResult remarks =
+          observe(lamp_images(folder, captures, rotated), ImageUse::places, captures, seen);
+      if (!remarks.ok()) return Work{remarks};
       const KnownPlaces places =
           collect_known_places(captures.frames, read_captures_with_truth(folder));
       if (places.captures.empty()) {
@@ -439,7 +422,7 @@ class SessionRun {
       DispersionResult found =
           solve_dispersion(captures, places, DispersionMethod::camera, DispersionCircle::mean,
                            history("", with_tables(inputs, folder)));
-      if (!found.ok()) explain_by_row_time(captures, seen.images, found);
+      if (!found.ok()) explain_by_row_time(captures, seen, found);
       add(remarks, found);
       if (places.without > 0) {
         found.warnings.push_back(
@@ -534,19 +517,16 @@ class SessionRun {
   }
 
   bool locate(const fs::path& folder) {
-    const std::string name = folder.filename().string();
     const fs::path calibration = out("calibration.yaml");
-    return step(name, lamp_inputs(folder, calibration), "", [&] {
+    return step(folder.filename().string(), lamp_inputs(folder, calibration), "", [&] {
       LocateInput input{
           {}, read_lamps(), read_calibration(calibration), read_captures_of_folder(folder)};
       input.lamp_offsets = session_.check() == folder;
       const LampImages images{folder, input.lamps, lamps_file(), input.calibration, calibration};
+      const ImageUse use = session_.check() == folder ? ImageUse::places : ImageUse::fixes;
       LocateResult found =
-          locate_images(images, session_.check() == folder ? ImageUse::places : ImageUse::fixes,
-                        std::move(input), lamp_options(), observer_.progress)
-              .located;
-      return Work{found,
-                  [this, name, found] { write_fixes(out(name + "-fixes.csv"), found.rows); }};
+          locate_images(images, use, std::move(input), lamp_options(), observer_.progress);
+      return Work{found, [this, folder, found] { write_fixes(fixes_of(folder), found.rows); }};
     });
   }
 
@@ -556,11 +536,11 @@ class SessionRun {
     if (const auto check = session_.check()) {
       for (const fs::path& table : with_tables({}, *check)) inputs.push_back(table);
     }
-    for (const char* picture : {"lens.svg", "rotation.svg", "dispersion.svg"}) {
-      if (options_.report && fs::exists(out(picture))) inputs.push_back(out(picture));
+    for (const char* plot : kPlots) {
+      if (options_.report && fs::exists(out(plot))) inputs.push_back(out(plot));
     }
     for (const fs::path& line : lines()) {
-      inputs.push_back(out(line.filename().string() + "-fixes.csv"));
+      inputs.push_back(fixes_of(line));
       for (const fs::path& table : with_tables({}, line)) inputs.push_back(table);
     }
     const std::vector<Gate> gates = find_step_gates("evaluate");
@@ -588,15 +568,14 @@ class SessionRun {
     EvaluateResult found = evaluate_fixes(*input, gates);
     std::vector<Drive> drives;
     for (const fs::path& line : lines()) {
-      const fs::path places = *find_truth_file(line),
-                     fixes = out(line.filename().string() + "-fixes.csv");
+      const fs::path places = *find_truth_file(line), fixes = fixes_of(line);
       drives.push_back(
           {{fixes, read_fixes(fixes)}, find_drive_ends(places, read_truth_places(line))});
       if (fit_line(drives.back().fixes.rows, drives.back().commanded_m)) continue;
       throw InputError(fixes, "no line can be fitted to its fixes: they have no direction");
     }
     if (!found.ok()) return {found};
-    std::vector<CheckError> errors;
+    std::vector<CaptureError> errors;
     for (const FixError& error : compute_errors(*input, input->fixes).errors) {
       const FixRow& row = input->fixes.rows[error.fix];
       constexpr int min_lamps =
@@ -614,19 +593,13 @@ class SessionRun {
               page.gates = result_.gates;
               page.gates.insert(page.gates.end(), found.gates.begin(), found.gates.end());
               page.calibration = result_.calibration;
-              page.pictures = pictures();
+              for (const char* plot : kPlots) {
+                if (fs::exists(out(plot))) page.pictures.push_back(read_report_plot(out(plot)));
+              }
               page.evaluation = history("", inputs);
               write_file(out("report.html"),
                          render_report_page({*input, found, read_lamps(), drives, page}));
             }};
-  }
-
-  std::vector<ReportPlot> pictures() const {
-    std::vector<ReportPlot> pictures;
-    for (const char* name : {"lens.svg", "rotation.svg", "dispersion.svg"}) {
-      if (fs::exists(out(name))) pictures.push_back(read_report_plot(out(name)));
-    }
-    return pictures;
   }
 
   /// Sets the verdict, removes outputs of later steps if the run failed, and writes the summaries.

@@ -19,7 +19,7 @@
 #include "captures/shared_folder.h"
 #include "rig/file.h"
 #include "rig/input_error.h"
-#include "session/step_file.h"
+#include "session/session_file.h"
 
 namespace vlp {
 namespace {
@@ -213,15 +213,15 @@ void SessionResults::store_result(const std::string& step, const std::string& ke
   write_step_record(record_file(step), {key, compute_outputs_digest(step), result});
 }
 
+std::vector<std::string> SessionResults::outputs_of(const std::string& step) const {
+  const auto found = std::ranges::find(steps_, step, &StepOutputs::step);
+  return found == steps_.end() ? std::vector<std::string>() : found->files;
+}
+
 std::string SessionResults::compute_outputs_digest(const std::string& step) const {
   std::string digests;
-  for (const auto& [name, files] : steps_) {
-    if (name != step) continue;
-    for (const std::string& output : files) {
-      const bool exists = fs::exists(file(output));
-      digests.append(output).append(" ");
-      digests.append(exists ? sha256_of_file(file(output)) : "").append("\n");
-    }
+  for (const std::string& output : outputs_of(step)) {
+    digests += output + " " + (fs::exists(file(output)) ? sha256_of_file(file(output)) : "") + "\n";
   }
   return sha256_of_text(digests);
 }
@@ -229,10 +229,7 @@ std::string SessionResults::compute_outputs_digest(const std::string& step) cons
 void SessionResults::remove_step(const std::string& step) const {
   std::error_code ignored;
   fs::remove(record_file(step), ignored);
-  for (const auto& [name, files] : steps_) {
-    if (name != step) continue;
-    for (const std::string& output : files) fs::remove(file(output), ignored);
-  }
+  for (const std::string& output : outputs_of(step)) fs::remove(file(output), ignored);
 }
 
 void SessionResults::remove_later_steps(const std::string& step) const {

@@ -69,6 +69,8 @@ class SessionResults {
  private:
   std::filesystem::path record_file(const std::string& step) const;
   std::set<std::string> outputs() const;
+  /// Returns the files of a step of this run; none for other steps.
+  std::vector<std::string> outputs_of(const std::string& step) const;
   /// Removes the outputs that are not wanted. Returns those that cannot be removed.
   std::set<std::string> remove_outputs(const std::set<std::string>& wanted) const;
   std::string compute_outputs_digest(const std::string& step) const;

@@ -11,6 +11,7 @@
 
 #include "calibration/map/lamp_displacements.h"
 #include "evaluation/gate.h"
+#include "frontend/observation.h"
 #include "report/plots/gnuplot.h"
 #include "rig/calibration.h"
 
@@ -73,6 +74,14 @@ struct StepResult {
 std::string_view to_string(StepFailure failure);
 /// Returns the failure with this name; std::nullopt if there is none.
 std::optional<StepFailure> step_failure_from_name(std::string_view name);
+
+/// Returns the rejected images with their reasons. Names include the folder if there are several
+/// folders. Rejected frames of a video are combined to one entry per reason, with their number.
+std::vector<SkippedImage> skipped_images(const std::vector<Observation>& images);
+
+/// Adds the remarks of an intake to the result of a step: skipped images, warnings, notes, details.
+/// Fails the step if no image can be used.
+void add_remarks(const Observations& seen, StepResult& result);
 
 /// Returns "FILE: message", or the message alone without a file.
 std::string message_of(const StepResult& result);

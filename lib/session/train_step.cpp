@@ -12,7 +12,6 @@
 #include <utility>
 
 #include "rig/input_error.h"
-#include "session/row_time_check.h"
 
 namespace vlp {
 namespace {
@@ -81,10 +80,8 @@ void warn_of_inseparable(const LampClassifier& classifier, TrainStepResult& resu
 void warn_of_row_time(const DetectedLights& seen, const std::vector<std::vector<Frame>>& labels,
                       const LampMap& lamps, TrainStepResult& result) {
   if (!seen.camera.row_time_s) return;
-  std::vector<const std::vector<Observation>*> folders;
-  folders.reserve(seen.folders.size());
-  for (const Observations& folder : seen.folders) folders.push_back(&folder.images);
-  const auto measured = choose_row_time_by_places(folders, labels, lamps, seen.camera.lens).found;
+  const auto measured =
+      choose_row_time_by_places(seen.folders(), labels, lamps, seen.camera.lens).found;
   if (!measured) return;
   std::string error = compare_row_times(*measured, {*seen.camera.row_time_s, "the calibration"});
   if (!error.empty()) result.warnings.push_back(std::move(error));
@@ -98,8 +95,9 @@ TrainStepResult train_lamp_classifier(const DetectedLights& seen,
                                       const std::filesystem::path& first_folder) {
   TrainStepResult result;
   LabeledLights& labeled = result.labeled;
+  const auto folders = seen.folders();
   for (std::size_t i = 0; i < labels.size(); ++i) {
-    add_labeled_lights(seen.folders[i].images, labels[i], labeled);
+    add_labeled_lights(folders[i], labels[i], labeled);
   }
   if (labeled.labels == 0) {
     throw InputError(first_folder,

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "program/reference.h"
-#include "program/steps/history.h"
+#include "program/steps/step_outcome.h"
 #include "support/program.h"
 #include "support/temporary_folder.h"
 

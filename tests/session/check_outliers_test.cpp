@@ -11,12 +11,12 @@ namespace vlp {
 namespace {
 
 /// 36 captures with errors of 0.05 mm, those of `indices` with 52 mm.
-std::vector<CheckError> errors_with(const std::vector<std::size_t>& indices) {
-  std::vector<CheckError> errors;
+std::vector<CaptureError> errors_with(const std::vector<std::size_t>& indices) {
+  std::vector<CaptureError> errors;
   for (int i = 0; i < 36; ++i) {
     errors.push_back({std::to_string(100 + i), 5e-5, static_cast<std::size_t>(i)});
   }
-  for (const std::size_t index : indices) errors[index].horizontal_m = 0.052;
+  for (const std::size_t index : indices) errors[index].size = 0.052;
   return errors;
 }
 
@@ -41,28 +41,28 @@ TEST(DescribeCheckOutliers, EndsRangeAtCaptureWithoutError) {
 TEST(DescribeCheckOutliers, ReturnsEmptyWithoutGrossOutliers) {
   EXPECT_EQ(describe_check_outliers(errors_with({})), "");
   auto errors = errors_with({});
-  errors[3].horizontal_m = 0.004;
+  errors[3].size = 0.004;
   EXPECT_EQ(describe_check_outliers(errors), "") << "a camera may have it";
-  for (CheckError& error : errors) error.horizontal_m = 0.05;
+  for (CaptureError& error : errors) error.size = 0.05;
   EXPECT_EQ(describe_check_outliers(errors), "") << "all of them";
   EXPECT_EQ(describe_check_outliers({{"a", 1e-5}, {"b", 1}, {"c", 1e-5}}), "") << "too few";
 }
 
 TEST(DescribeResidualOutliers, RequiresTwoCaptures) {
-  std::vector<CaptureResidual> residuals;
+  std::vector<CaptureError> residuals;
   residuals.reserve(24);
   for (std::size_t i = 0; i < 24; ++i) residuals.push_back({std::to_string(100 + i), 0.02, i});
   EXPECT_EQ(describe_residual_outliers(residuals), "");
-  residuals[3].residual_px = 0.5;
+  residuals[3].size = 0.5;
   EXPECT_EQ(describe_residual_outliers(residuals), "") << "a covered lamp";
-  residuals[4].residual_px = 0.19;
+  residuals[4].size = 0.19;
   EXPECT_EQ(describe_residual_outliers(residuals), "") << "one camera may have it";
-  residuals[4].residual_px = 0.3;
+  residuals[4].size = 0.3;
   EXPECT_EQ(describe_residual_outliers(residuals),
             "the lamps in captures 103, 104 do not fit lens and tilt of the others (residuals up "
             "to 0.50 px, typically 0.02 px): of another camera, or with covered lamps; take them "
             "again");
-  for (CaptureResidual& each : residuals) each.residual_px = 0.3;
+  for (CaptureError& each : residuals) each.size = 0.3;
   EXPECT_EQ(describe_residual_outliers(residuals), "") << "all of them";
 }
 

@@ -24,7 +24,11 @@ struct Training {
     FrontendOptions options;
     options.readout = Readout::rows;
     const DetectedLights one = detect_lights({kSample}, lamps, {}, false, options);
-    seen.folders.assign(folders, one.folders[0]);
+    for (std::size_t i = 0; i < folders; ++i) {
+      seen.seen.images.insert(seen.seen.images.end(), one.seen.images.begin(),
+                              one.seen.images.end());
+    }
+    seen.folder_sizes.assign(folders, one.folder_sizes[0]);
     labels.assign(folders, read_detections(kSample + "/true_detections.csv"));
   }
   TrainStepResult trained() const { return train_lamp_classifier(seen, labels, lamps, "sample"); }

@@ -20,8 +20,7 @@
 #include "geometry/angles.h"
 #include "program/progress.h"
 #include "program/steps/step_outcome.h"
-#include "session/row_time_check.h"
-#include "session/skipped_images.h"
+#include "session/row_time_step.h"
 
 namespace vlp {
 
@@ -167,36 +166,6 @@ void print_lights(const Observations& seen) {
   }
 }
 
-namespace {
-
-/// Adds a contradiction between the lamps and the stated row time: as a warning, or, if no lamp is
-/// identified, as the reason.
-void add_row_time_error(const CaptureOptions& options, const LampMap& lamps,
-                        const std::optional<Calibration>& calibration, const Observations& seen,
-                        StepResult& result) {
-  const FrontendOptions& frontend = options.frontend;
-  // A classifier identifies lamps without the row time.
-  if (!frontend.classifier.empty() && !result.ok()) return;
-  std::string error;
-  if (calibration) {
-    const auto file = std::filesystem::path(options.calibration).filename();
-    error = describe_row_time_error(seen.images, lamps, calibration->camera, file.string(),
-                                    result.ok());
-  } else if (frontend.row_time_s) {
-    const GivenRowTime stated{*frontend.row_time_s, "--row-time-s"};
-    error = check_row_time(seen.images, lamps, stated).error;
-    if (error.empty()) error = find_row_time_error(seen.images, lamps, std::nullopt, stated);
-  }
-  if (error.empty()) return;
-  if (result.ok()) {
-    result.warnings.push_back(std::move(error));
-  } else {
-    result.fail(StepFailure::bad_input, std::move(error));
-  }
-}
-
-}  // namespace
-
 Observations observe_captures(const CaptureOptions& options, ImageUse use, const LampMap& lamps,
                               const std::optional<Calibration>& calibration) {
   check_image_outputs(options);
@@ -209,7 +178,15 @@ Observations observe_captures(const CaptureOptions& options, ImageUse use, const
   }
   StepResult remarks;
   add_remarks(seen, remarks);
-  add_row_time_error(options, lamps, calibration, seen, remarks);
+  // A classifier identifies lamps without the row time.
+  if (options.frontend.classifier.empty() || remarks.ok()) {
+    const auto camera = calibration
+                            ? make_detector_camera(*calibration)
+                            : DetectorCamera{Readout::rows, options.frontend.row_time_s, {}};
+    const auto file = std::filesystem::path(options.calibration).filename();
+    explain_by_row_time(seen.images, lamps, camera, calibration ? file.string() : "--row-time-s",
+                        remarks);
+  }
   print_remarks(remarks);
   print_lights(seen);
   if (!options.lights.empty()) write_lights(options.lights, seen.images);

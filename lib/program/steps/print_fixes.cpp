@@ -4,9 +4,140 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
+#include <cmath>
+#include <string_view>
+#include <tuple>
+
 #include "geometry/angles.h"
 
 namespace vlp {
+
+namespace {
+
+double mm(double value_m) { return 1e3 * value_m; }
+
+void print_figure(const char* name, double value_m, const Interval* interval_m) {
+  fmt::print("{:10} {:>10.3f} mm", name, mm(value_m));
+  if (interval_m != nullptr) {
+    fmt::print("   {:.3f} to {:.3f}", mm(interval_m->low), mm(interval_m->high));
+  }
+  fmt::print("\n");
+}
+
+void print_horizontal(const Evaluation& evaluation) {
+  const ErrorStatistics& statistics = evaluation.horizontal_m;
+  const auto& intervals = evaluation.intervals_m;
+  fmt::print("\nhorizontal {:>13}", "");
+  if (intervals) {
+    fmt::print("   95 % interval, of {} {}\n", intervals->clusters, evaluation.resampling_unit);
+  } else {
+    fmt::print("   too few {} for an interval\n", evaluation.resampling_unit);
+  }
+  print_figure("mean", statistics.mean, intervals ? &intervals->mean : nullptr);
+  print_figure("median", statistics.median, intervals ? &intervals->median : nullptr);
+  print_figure("p90", statistics.p90, intervals && intervals->p90 ? &*intervals->p90 : nullptr);
+  print_figure("rms", statistics.rms, intervals ? &intervals->rms : nullptr);
+  print_figure("max", statistics.max, nullptr);
+  fmt::print("\nshare of the fixes, and the error in mm that it does not exceed\n");
+  const auto& distribution_m = evaluation.distribution_m;
+  const std::initializer_list<std::size_t> percents{10, 25, 50, 68, 75, 90, 95, 99, 100};
+  for (const std::size_t percent : percents) fmt::print("{:>8} %", percent);
+  fmt::print("\n");
+  for (const std::size_t percent : percents) {
+    fmt::print("{:>10.3f}", mm(distribution_m[percent - 1].second));
+  }
+  fmt::print("\n\n");
+}
+
+void print_height_and_yaw(const Evaluation& evaluation) {
+  if (const auto& height_m = evaluation.height_m) {
+    fmt::print("height      rms {:.3f} mm, max {:.3f} mm, bias {:+.3f} mm\n",
+               mm(height_m->sizes.rms), mm(height_m->sizes.max), mm(height_m->bias));
+  }
+  if (const auto& yaw_rad = evaluation.yaw_rad) {
+    fmt::print("yaw         rms {:.4f} deg, max {:.4f} deg, bias {:+.4f} deg\n",
+               deg_from_rad(yaw_rad->sizes.rms), deg_from_rad(yaw_rad->sizes.max),
+               deg_from_rad(yaw_rad->bias));
+  }
+}
+
+void print_stations(const BiasAndScatter& statistics) {
+  const auto& stations = statistics.stations;
+  const auto worst_bias = std::max_element(
+      stations.begin(), stations.end(),
+      [](const auto& a, const auto& b) { return a.bias_m.norm() < b.bias_m.norm(); });
+  const auto worst_sd =
+      std::max_element(stations.begin(), stations.end(),
+                       [](const auto& a, const auto& b) { return a.sd_m < b.sd_m; });
+  fmt::print("stations    {} with {} fixes: bias {:.3f} mm rms, scatter {:.3f} mm\n",
+             stations.size(), statistics.fixes, mm(statistics.bias_m), mm(statistics.scatter_m));
+  fmt::print(
+      "  worst     bias {:.3f} mm at ({:.3f}, {:.3f}) m; sd {:.3f} mm at ({:.3f}, {:.3f}) m\n",
+      mm(worst_bias->bias_m.norm()), worst_bias->xy_m.x(), worst_bias->xy_m.y(), mm(worst_sd->sd_m),
+      worst_sd->xy_m.x(), worst_sd->xy_m.y());
+}
+
+void print_fit(const LineFit& fit) {
+  const ErrorStatistics& statistics = fit.distances_m;
+  fmt::print(
+      "line fit    mean {:.3f} mm, median {:.3f}, p90 {:.3f}, rms {:.3f}, max {:.3f}\n"
+      "  hides     jitter of {:.3f} mm rms across the fitted line, which is turned by {:+.4f} "
+      "deg\n",
+      mm(statistics.mean), mm(statistics.median), mm(statistics.p90), mm(statistics.rms),
+      mm(statistics.max), mm(fit.jitter_m), deg_from_rad(fit.angle_rad));
+}
+
+void print_ratios(const Evaluation& evaluation) {
+  if (const auto& normalized_errors = evaluation.normalized_errors) {
+    fmt::print("error / sd  horizontal {:.3f}", normalized_errors->horizontal);
+    if (normalized_errors->height) fmt::print(", height {:.3f}", *normalized_errors->height);
+    if (normalized_errors->yaw) fmt::print(", yaw {:.3f}", *normalized_errors->yaw);
+    fmt::print(" (rms; 1: the stated sd are right)\n");
+    constexpr double percent = 100;
+    fmt::print("within 95 % horizontal {:.1f} %", percent * normalized_errors->within_95);
+    if (const auto& fraction = normalized_errors->height_within_95) {
+      fmt::print(", height {:.1f} %", percent * *fraction);
+    }
+    if (const auto& fraction = normalized_errors->yaw_within_95)
+      fmt::print(", yaw {:.1f} %", percent * *fraction);
+    fmt::print(" (errors within 1.96 sd; those of one calibration go together)\n");
+  }
+  if (const auto& limit = evaluation.limit) {
+    fmt::print(
+        "limit       {:.3f} mm rms, error / limit {:.3f} ({})\n", mm(limit->limit_m),
+        limit->horizontal,
+        limit->is_below_limit() ? "beaten: see the warning" : "1: the best of one level image");
+  }
+}
+
+void print_comparison(const Comparison& comparison) {
+  fmt::print("compared    {}", comparison.words());
+  if (comparison.pairs > 0) {
+    fmt::print(": mean error differs by {:+.3f} mm", mm(comparison.mean_difference_m));
+  }
+  if (const auto& interval_m = comparison.interval_m) {
+    fmt::print(" (95 %: {:+.3f} to {:+.3f})", mm(interval_m->low), mm(interval_m->high));
+  }
+  fmt::print(
+      "\n  captures  {} in both: {} with a smaller error, {} with a larger; {} only here, {} "
+      "only there\n",
+      comparison.pairs, comparison.smaller, comparison.larger, comparison.only_these,
+      comparison.only_others);
+}
+
+/// Returns the remedy that reduces an error source.
+std::string_view find_remedy(std::string_view key) {
+  if (key == "motion") return "odometry, or a faster read-out";
+  if (key == "lean") return "an inclination sensor, or a camera that is held level";
+  if (key == "lens") return "more views of the board, or vlp-adjust, which corrects the lens";
+  if (key == "zenith") return "more captures of the turn, or vlp-adjust with known places";
+  if (key == "offset") return "more captures at the known place, or vlp-adjust instead";
+  if (key == "lamp_map") return "a better survey, or vlp-adjust --refine-map with known places";
+  return "more lamps in view, larger in the image, or the mean of several captures";
+}
+
+}  // namespace
 
 void print_fixes(const FixSummary& summary) {
   fmt::print("frames      {}\nfixes       {}\n", summary.frames, summary.fixes);
@@ -24,6 +155,53 @@ void print_fixes(const FixSummary& summary) {
     fmt::print("sd          {:.2f} mm horizontal, {:.2f} mm height, {:.3f} deg yaw (median)\n",
                1e3 * sd->horizontal_m, 1e3 * sd->height_m, deg_from_rad(sd->yaw_rad));
   }
+}
+
+void print_evaluation(const Evaluation& evaluation, const std::vector<CheckedMetric>& gates) {
+  fmt::print("captures    {}\nfixes       {}\nmissing     {:.3g} %\n", evaluation.captures,
+             evaluation.fixes, 100 * evaluation.missing_fraction());
+  for (const auto& [status, count] : evaluation.missing) {
+    fmt::print("  no fix    {} {}\n", count, status);
+  }
+  print_horizontal(evaluation);
+  print_height_and_yaw(evaluation);
+  if (evaluation.stations) print_stations(*evaluation.stations);
+  if (evaluation.fit) print_fit(*evaluation.fit);
+  print_ratios(evaluation);
+  if (evaluation.comparison) print_comparison(*evaluation.comparison);
+  if (!gates.empty()) fmt::print("\n");
+  for (const CheckedMetric& gate : gates) {
+    fmt::print("{:6} gate {:20} {:>10.4g} {:3} {} {:.4g}\n", gate.passed() ? "met" : "NOT MET",
+               gate.name, gate.value.value(), gate.unit, describe(gate.direction),
+               gate.limit.value());
+  }
+}
+
+void print_limits(const FloorSummary& summary, const FloorLimits& limits, bool is_free) {
+  const auto in_view =
+      std::count_if(limits.places.begin(), limits.places.end(),
+                    [](const FloorLimits::Place& place) { return place.lamps > 1; });
+  fmt::print("places      {}, two lamps or more in view at {}{}\n\n", limits.places.size(), in_view,
+             is_free ? fmt::format(", a fix at {}", summary.places_with_fix) : "");
+  fmt::print("{:11} {:>21} {:>21} {:>21}\n", "one sigma", "horizontal (mm)", "height (mm)",
+             "yaw (deg)");
+  fmt::print("{:11}", "source");
+  for (int i = 0; i < 3; ++i) fmt::print(" {:>10} {:>10}", "median", "worst");
+  fmt::print("\n");
+  const auto print = [](const FloorSummary::Row& row) {
+    const auto& [median, worst] = std::tie(row.median, row.worst);
+    fmt::print("{:11} {:10.3f} {:10.3f} {:10.3f} {:10.3f} {:10.4f} {:10.4f}\n", row.source.name,
+               1e3 * median.horizontal_m, 1e3 * worst.horizontal_m, 1e3 * median.height_m,
+               1e3 * worst.height_m, deg_from_rad(median.yaw_rad), deg_from_rad(worst.yaw_rad));
+  };
+  for (const FloorSummary::Row& row : summary.sources) print(row);
+  print(summary.together);
+}
+
+void print_advice(const FloorSummary& summary) {
+  const auto& [name, key] = summary.largest().source;
+  fmt::print("\nimprove     {} first, {:.0f} % of the horizontal variance: {}\n", name,
+             100 * summary.largest().fraction, find_remedy(key));
 }
 
 }  // namespace vlp

@@ -4,11 +4,43 @@
 
 #include <spdlog/spdlog.h>
 
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
 #include <stdexcept>
+#include <string_view>
 
 #include "program/app.h"
+#include "session/step_history.h"
 
 namespace vlp {
+
+namespace {
+
+bool affects_result(const CLI::Option& option) {
+  const auto excluded = options_without_history();
+  return std::find(excluded.begin(), excluded.end(), option.get_name()) == excluded.end();
+}
+
+/// Returns true if the value of the option is the name of an output file.
+bool names_output(const CLI::Option& option) { return option.get_name() == "--refine-map"; }
+
+std::string format_options(const CLI::App& app, const std::vector<std::string>& inputs) {
+  std::string text;
+  for (const CLI::Option* option : app.get_options()) {
+    if (option->count() == 0 || option->get_positional() || !affects_result(*option)) continue;
+    text += (text.empty() ? "" : " ") + option->get_name();
+    if (option->get_items_expected_max() == 0) continue;  // a flag
+    for (const std::string& value : option->results()) {
+      const bool file =
+          names_output(*option) || std::find(inputs.begin(), inputs.end(), value) != inputs.end();
+      text += " " + (file ? last_path_component(value) : value);
+    }
+  }
+  return text;
+}
+
+}  // namespace
 
 void print_remarks(const StepResult& result) {
   for (const std::string& note : result.notes) spdlog::info("{}", note);
@@ -23,6 +55,21 @@ void throw_if_failed(const StepResult& result) {
   if (result.ok()) return;
   if (result.failure == StepFailure::undetermined) throw Undetermined(message_of(result));
   throw std::invalid_argument(message_of(result));
+}
+
+std::span<const std::string_view> options_without_history() {
+  static constexpr std::array<std::string_view, 15> excluded = {
+      "--output",  "--plot",   "--annotate", "--threads", "--quiet",
+      "--verbose", "--cache",  "--ros",      "--corners", "--kalibr",
+      "--opencv",  "--report", "--json",     "--junit",   "--propose-gates"};
+  return excluded;
+}
+
+HistoryEntry make_program_history_entry(const CLI::App& app,
+                                        const std::vector<std::string>& inputs) {
+  InputDigests digests;
+  return make_history_entry({app.get_name(), VLP_VERSION}, format_options(app, inputs),
+                            {inputs.begin(), inputs.end()}, digests);
 }
 
 }  // namespace vlp

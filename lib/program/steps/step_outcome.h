@@ -2,7 +2,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "rig/calibration.h"
 #include "session/step_result.h"
+
+namespace CLI {
+class App;
+}
 
 namespace vlp {
 
@@ -12,5 +22,22 @@ void print_remarks(const StepResult& result);
 /// Throws if the step failed: Undetermined for StepFailure::undetermined, std::invalid_argument for
 /// all other failures.
 void throw_if_failed(const StepResult& result);
+
+/// Returns the options that do not affect the recorded result: --output, other outputs, a cache,
+/// and options of the display.
+std::span<const std::string_view> options_without_history();
+
+/// Makes the history entry of a part of a calibration, without the name of the part
+/// (rig/calibration_builder.h). Holds program and version, the given options in the order of
+/// --help, and a digest of each input.
+///
+/// The entry is the same on every machine: paths are reduced to their last component, and
+/// options_without_history() are omitted.
+///
+/// @param inputs  files and folders of images; an empty name is an input that was not given
+/// @throws InputError if an input cannot be read
+/// @pre `app` has parsed the command line
+HistoryEntry make_program_history_entry(const CLI::App& app,
+                                        const std::vector<std::string>& inputs);
 
 }  // namespace vlp

@@ -159,7 +159,7 @@ std::vector<std::string> describe_missing_lamps(std::span<const Frame> frames, c
 
 std::string describe_place_fault(std::span<const Frame> frames, const LampMap& map,
                                  const Calibration& calibration, const CapturesTable& places) {
-  std::vector<CheckError> errors;
+  std::vector<CaptureError> errors;
   for (const PlaceError& error : place_errors(frames, map, calibration, places)) {
     errors.push_back({error.image, error.horizontal_m.norm(), error.frame});
   }
@@ -168,7 +168,7 @@ std::string describe_place_fault(std::span<const Frame> frames, const LampMap& m
 
 std::string describe_capture_fault(std::span<const Frame> frames, const LampMap& map,
                                    const Calibration& calibration) {
-  std::vector<CaptureResidual> residuals;
+  std::vector<CaptureError> residuals;
   for (const auto& [i, fix] : locate_by_three_lamps(frames, map, calibration)) {
     residuals.push_back({frames[i].image, fix.residual_px, i});
   }

@@ -13,7 +13,7 @@
 #include "evaluation/gate.h"
 #include "frontend/board_intake.h"
 #include "frontend/lamp_intake.h"
-#include "session/row_time_check.h"
+#include "session/row_time_step.h"
 #include "session/step_history.h"
 #include "station/records/run_record.h"
 #include "station/unit/unit_step.h"

@@ -14,7 +14,7 @@
 
 #include "captures/digest.h"
 #include "rig/calibration_text.h"
-#include "session/row_time_check.h"
+#include "session/row_time_step.h"
 #include "session/session_folder.h"
 #include "station/unit/guidance.h"
 #include "station/unit/station_faults.h"

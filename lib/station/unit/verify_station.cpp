@@ -14,7 +14,7 @@
 #include "frontend/lamp_intake.h"
 #include "frontend/selection.h"
 #include "rig/input_error.h"
-#include "session/row_time_check.h"
+#include "session/row_time_step.h"
 #include "session/session_folder.h"
 #include "station/unit/station_faults.h"
 #include "station/unit/station_steps.h"

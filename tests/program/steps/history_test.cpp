@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "program/steps/history.h"
+#include "program/steps/step_outcome.h"
 
 #include <gmock/gmock.h>
 

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "session/skipped_images.h"
+#include "session/step_result.h"
 
 #include <gmock/gmock.h>
 

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "session/step_file.h"
+#include "session/session_file.h"
 
 #include <gmock/gmock.h>
 

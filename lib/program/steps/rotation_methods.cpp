@@ -1,22 +1,24 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "program/steps/rotation_by_lamps.h"
+#include "program/steps/rotation_methods.h"
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "captures/captures_table.h"
 #include "geometry/angles.h"
 #include "program/app.h"
 #include "program/steps/capture_options.h"
-#include "program/steps/history.h"
-#include "program/steps/print_rotation.h"
+#include "program/steps/print_calibration.h"
 #include "program/steps/step_outcome.h"
-#include "session/capture_motion.h"
+#include "report/plots/gnuplot.h"
+#include "session/lamp_captures.h"
 #include "session/rotation_step.h"
 
 namespace vlp {
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -28,15 +30,6 @@ fs::path captures_file(const CaptureOptions& images, const TiltOptions& options)
   return fs::is_directory(images.images) && fs::exists(beside) ? beside : fs::path();
 }
 
-void print_corrections(const TiltCalibration& result) {
-  fmt::print("\n{:>10} {:>28} {:>28}\n", "lamp", "moved by x y z (mm)", "sd (mm)");
-  for (const auto& [id, correction_m, sd_m] : result.corrections) {
-    fmt::print("{:10} {:10.3f}{:9.3f}{:9.3f} {:10.3f}{:9.3f}{:9.3f}\n", id, 1e3 * correction_m.x(),
-               1e3 * correction_m.y(), 1e3 * correction_m.z(), 1e3 * sd_m.x(), 1e3 * sd_m.y(),
-               1e3 * sd_m.z());
-  }
-}
-
 void report(const TiltCalibration& result, const Camera& camera) {
   fmt::print("captures    {} used, {} of fewer than three lamps, {} left out\n", result.captures,
              result.captures_of_few_lamps, result.captures_rejected);
@@ -46,7 +39,11 @@ void report(const TiltCalibration& result, const Camera& camera) {
       "residual    {:.4f} px per axis; for a level camera{} {:.4f} px in the undistorted image\n",
       result.residual_px, result.corrections.empty() ? "" : " and the map as it was",
       result.residual_before_px);
-  if (!result.corrections.empty()) print_corrections(result);
+  if (result.corrections.empty()) return;
+  print_corrections_header();
+  for (const auto& [id, correction_m, sd_m] : result.corrections) {
+    print_correction(id, correction_m, sd_m);
+  }
 }
 
 }  // namespace
@@ -74,6 +71,23 @@ void run_rotation_by_lamps(const CLI::App& app, CaptureOptions images, const Til
   }
   write_calibration(images.output, result.calibration);
   report(result.leveling, input.calibration.camera);
+}
+
+void run_rotation_in_place(const CLI::App& app, CaptureOptions images, const std::string& method,
+                           const std::string& plot) {
+  const std::vector<std::string> inputs = list_inputs(images);
+  check_outputs({{"--output", images.output}, {"--plot", plot}}, inputs);
+  images.captures.emplace();  // inclinations are ignored: the axis defines the level direction
+  const LampCaptures input = read_lamp_captures(images, ImageUse::turn);
+  const auto* const named = std::ranges::find(kRotationMethods, method,
+                                              &std::pair<std::string_view, RotationMethod>::first);
+  const RotationResult found =
+      solve_rotation(input, named->second, make_program_history_entry(app, inputs));
+  print_remarks(found);
+  throw_if_failed(found);
+  if (!plot.empty()) draw(plot, found.drawing());
+  write_calibration(images.output, found.calibration);
+  print_summary(found.fit, found.spot, found.circles, input.calibration.camera);
 }
 
 }  // namespace vlp

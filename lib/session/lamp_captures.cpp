@@ -1,10 +1,8 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "session/capture_motion.h"
+#include "session/lamp_captures.h"
 
 #include <stdexcept>
-
-#include "positioning/known_motion.h"
 
 namespace vlp {
 

@@ -23,4 +23,10 @@ struct TiltOptions {
 /// vlp-rotation --method lamps.
 void run_rotation_by_lamps(const CLI::App& app, CaptureOptions images, const TiltOptions& options);
 
+/// Estimates the rotation center from captures of a rotation in place
+/// (calibration/rotation/find_rotation_captures.h), for vlp-rotation --method axis|joint|circle.
+/// `plot` is the file of the plot; empty: none.
+void run_rotation_in_place(const CLI::App& app, CaptureOptions images, const std::string& method,
+                           const std::string& plot);
+
 }  // namespace vlp

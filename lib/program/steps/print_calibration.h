@@ -1,0 +1,47 @@
+// SPDX-FileCopyrightText: The VLP calibration toolbox authors
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+
+#include "calibration/adjustment/adjustment.h"
+#include "calibration/dispersion/dispersion.h"
+#include "calibration/intrinsics/calibration_report.h"
+#include "calibration/rotation/circle_center.h"
+#include "rig/calibration.h"
+
+namespace vlp {
+
+/// Prints the solved lens and its uncertainty to stdout.
+void print_summary(const IntrinsicsSolution& solution, const CalibrationReport& report,
+                   const ViewCoverage& coverage, const HeldOut& held_out);
+
+/// Prints center, zenith and tilt with their standard deviations to stdout.
+void print_center(const RotationCenter& center, const Camera& camera);
+
+/// Prints the result of a rotation in place to stdout, and a note if the lever arm is not
+/// observable.
+void print_summary(const RotationFit& fit, const RotationCaptures& spot,
+                   const CircleCenters& circles, const Camera& camera);
+
+/// Prints the circles of the fixes before and after the correction, and the errors of camera and
+/// world, to stdout.
+///
+/// @param focal_px  focal lengths of the camera
+/// @param captures  number of captures at known places
+void print_dispersion(const DispersionFit& fit, const Eigen::Vector2d& focal_px,
+                      std::size_t captures);
+
+/// Print the table of the corrections of lamps: its header, and the row of a lamp.
+void print_corrections_header();
+void print_correction(int lamp, const Eigen::Vector3d& correction_m, const Eigen::Vector3d& sd_m,
+                      const char* note = "");
+
+/// Prints the result of a joint adjustment to stdout: tilt, lever arm, lens, known places, lamps.
+///
+/// @param before       initial calibration of the adjustment
+/// @param lens_stated  true if the covariance of its lens is known
+void print_adjustment(const AdjustmentResult& found, const Calibration& before, bool lens_stated);
+
+}  // namespace vlp
