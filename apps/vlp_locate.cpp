@@ -19,7 +19,6 @@
 #include "program/steps/print_fixes.h"
 #include "program/steps/step_outcome.h"
 #include "rig/detection.h"
-#include "session/locate_images.h"
 #include "session/locate_step.h"
 #include "session/session_folder.h"
 

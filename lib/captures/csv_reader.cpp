@@ -170,4 +170,14 @@ InputError CsvTable::error(std::size_t row, Column column, const std::string& pr
   return {file_, lines_[row], header_[column.index], problem};
 }
 
+std::string_view read_unique_name(const CsvTable& csv, std::size_t row, CsvTable::Column column,
+                                  NameIndex& names) {
+  const std::string_view name = csv.text(row, column);
+  if (name.empty()) throw csv.error(row, column, "is empty");
+  if (!names.insert(name)) {
+    throw csv.error(row, column, "'" + std::string(name) + "' stands twice");
+  }
+  return name;
+}
+
 }  // namespace vlp

@@ -10,7 +10,6 @@
 
 #include "captures/csv_reader.h"
 #include "captures/csv_writer.h"
-#include "captures/name_index.h"
 #include "captures/number_text.h"
 #include "rig/yaml_text.h"
 

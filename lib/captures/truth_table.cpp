@@ -6,7 +6,6 @@
 #include <limits>
 
 #include "captures/csv_reader.h"
-#include "captures/name_index.h"
 
 namespace vlp {
 

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <opencv2/imgproc.hpp>
 #include <utility>
@@ -17,7 +18,7 @@
 #include "detection/boards/other_tags.h"
 #include "detection/boards/square_corners.h"
 #include "frontend/image_quality.h"
-#include "frontend/selection.h"
+#include "frontend/observation.h"
 #include "rig/board_layout.h"
 #include "rig/input_error.h"
 
@@ -121,15 +122,15 @@ FrontendOptions make_sparse_options(const std::vector<fs::path>& images, Fronten
   return options;
 }
 
-/// Reads a few images that can be read, until `inspect` returns false.
-template <typename Inspect>
+/// Reads up to `num_samples` images that can be read, until `inspect` returns false.
 void inspect_samples(const std::vector<fs::path>& images, const FrontendOptions& options,
-                     const Inspect& inspect) {
+                     int num_samples,
+                     const std::function<bool(const fs::path& file, const cv::Mat&)>& inspect) {
   const FrontendOptions sparse = make_sparse_options(images, options);
   ImageSource source(images, sparse);
   while (const auto image = source.next()) {
     try {
-      if (!inspect(*image, image->read(sparse))) return;
+      if (!inspect(image->file, image->read(sparse)) || --num_samples == 0) return;
     } catch (const InputError&) {
       continue;  // rejected already
     }
@@ -140,13 +141,12 @@ void inspect_samples(const std::vector<fs::path>& images, const FrontendOptions&
 IntakeFailure explain_no_chessboard(const std::vector<fs::path>& images, const Board& board,
                                     const fs::path& board_file, const FrontendOptions& options,
                                     std::size_t num_views) {
-  constexpr std::size_t num_samples = 12;
+  constexpr int num_samples = 12;
   std::array<int, 2> largest{0, 0};
-  std::size_t inspected = 0;
-  inspect_samples(images, options, [&](const SourceImage&, const cv::Mat& image) {
-    const auto description = count_chessboard_squares(image);
-    if (description[0] * description[1] > largest[0] * largest[1]) largest = description;
-    return ++inspected < num_samples;
+  inspect_samples(images, options, num_samples, [&](const fs::path&, const cv::Mat& image) {
+    const auto squares = count_chessboard_squares(image);
+    if (squares[0] * squares[1] > largest[0] * largest[1]) largest = squares;
+    return true;
   });
   // The board may be rotated by 90 degrees.
   if ((largest[0] < largest[1]) != (board.cols < board.rows)) std::swap(largest[0], largest[1]);
@@ -182,13 +182,12 @@ IntakeFailure explain_no_board(const std::vector<fs::path>& images, const Board&
   double white = 0;
   std::string description;
   fs::path described_file;
-  int inspected = 0;
-  inspect_samples(images, options, [&](const SourceImage& source, const cv::Mat& image) {
-    constexpr int num_samples = 3;
+  constexpr int num_samples = 3;
+  inspect_samples(images, options, num_samples, [&](const fs::path& file, const cv::Mat& image) {
     white = std::max(white, white_fraction(image, cv::Rect({}, image.size())));
     description = describe_other_tags(board, image);
-    described_file = source.file;
-    return description.empty() && ++inspected < num_samples;
+    described_file = file;
+    return description.empty();
   });
   constexpr double max_white = 0.1;
   if (white > max_white || (overexposed > 0 && 2 * overexposed > unusable)) {
@@ -274,12 +273,11 @@ BoardIntake::BoardIntake(const Board& board, const FrontendOptions& options,
       detector_(board),
       options_(options),
       imager_px_(imager_px),
-      cache_(corner_cache(options.corner_cache, board)) {}
+      cache_(options.corner_cache, board) {}
 
 Observation BoardIntake::observe(const SourceImage& source) const {
   Observation result{source.file, source.time_s};
-  std::optional<CachedView> found;
-  if (cache_.find) found = cache_.find(source);
+  std::optional<CachedView> found = cache_.find(source);
   if (found && (!imager_px_ || found->view.imager_px == *imager_px_)) {
     result.size_px = found->view.imager_px;
   } else {
@@ -292,16 +290,16 @@ Observation BoardIntake::observe(const SourceImage& source) const {
                          blur.bright_fraction, white};
     });
     if (!result.is_kept()) return result;
-    if (cache_.keep) cache_.keep(source, *found);
+    cache_.keep(source, *found);
   }
   result.blur_px = found->blur_px;
   result.board = std::move(found->view);
-  reject_poor(result, found->bright_fraction, found->white_fraction);
+  reject_unusable(result, found->bright_fraction, found->white_fraction);
   return result;
 }
 
-void BoardIntake::reject_poor(Observation& image, double bright_fraction,
-                              double white_fraction) const {
+void BoardIntake::reject_unusable(Observation& image, double bright_fraction,
+                                  double white_fraction) const {
   const BoardDetection& seen = image.board->seen;
   if (white_fraction > options_.max_white_fraction) {
     return image.reject(

@@ -30,14 +30,15 @@ class BoardIntake {
   Observation observe(const SourceImage& source) const;
 
  private:
-  void reject_poor(Observation& image, double bright_fraction, double white_fraction) const;
+  /// Rejects an image that is overexposed, too dark, blurred, or shows too few corners.
+  void reject_unusable(Observation& image, double bright_fraction, double white_fraction) const;
 
   const Board board_;
   const BoardLattice lattice_;
   const BoardDetector detector_;
   const FrontendOptions options_;
   const std::optional<std::array<int, 2>> imager_px_;
-  const BoardCache cache_;
+  const CornerCache cache_;
 };
 
 /// Detects a board in images and videos (BoardIntake) and rejects repeated views (Selection).

@@ -3,8 +3,8 @@
 #pragma once
 
 #include <filesystem>
-#include <functional>
 #include <optional>
+#include <string>
 
 #include "detection/boards/board_detector.h"
 #include "frontend/image_source.h"
@@ -21,19 +21,27 @@ struct CachedView {
   double bright_fraction, white_fraction;
 };
 
-/// Functions to find and store earlier detections, safe to call from several threads. Both are
-/// empty if there is no cache.
-struct BoardCache {
-  std::function<std::optional<CachedView>(const SourceImage& image)> find;
-  std::function<void(const SourceImage& image, const CachedView& view)> keep;
-};
-
-/// Creates a cache with one file per image in `folder`, which is created if missing and may be
-/// deleted at any time. Without a folder name there is no cache.
+/// Cache of detections with one file per image in a folder, which may be deleted at any time. Safe
+/// to share between threads.
 ///
 /// A file is named by the SHA-256 of the image and of all that the detection depends on: the board
 /// and the version of the program. Corners are restored as the same doubles. Files that cannot be
 /// read or written are ignored.
-BoardCache corner_cache(const std::filesystem::path& folder, const Board& board);
+class CornerCache {
+ public:
+  /// Creates the folder if it is missing. Without a folder name there is no cache.
+  CornerCache(std::filesystem::path folder, const Board& board);
+
+  /// Returns an earlier detection; std::nullopt if there is none.
+  std::optional<CachedView> find(const SourceImage& image) const;
+  /// Stores a detection.
+  void keep(const SourceImage& image, CachedView view) const;
+
+ private:
+  std::filesystem::path make_path(const SourceImage& image) const;
+
+  std::filesystem::path folder_;
+  std::string settings_;
+};
 
 }  // namespace vlp

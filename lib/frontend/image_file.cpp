@@ -3,11 +3,13 @@
 #include "frontend/image_file.h"
 
 #include <algorithm>
+#include <cctype>
+#include <charconv>
+#include <cstddef>
 #include <opencv2/imgcodecs.hpp>
 #include <string_view>
 
 #include "codecs/codecs.h"
-#include "frontend/image_header.h"
 #include "rig/file.h"
 #include "rig/input_error.h"
 #include "rig/yaml_text.h"
@@ -43,7 +45,178 @@ std::size_t max_file_bytes(double max_mpx) {
       std::min(max_mpx * bytes_per_mpx + metadata_bytes, max_of_decoder));
 }
 
+using Size = std::optional<std::array<std::int64_t, 2>>;
+
+enum class ByteOrder { big, little };
+
+/// Reads an unsigned number of `count` bytes; std::nullopt beyond the end.
+std::optional<std::int64_t> number_at(std::string_view bytes, std::size_t at, std::size_t count,
+                                      ByteOrder order) {
+  if (at > bytes.size() || bytes.size() - at < count) return {};
+  std::int64_t value = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t place = order == ByteOrder::big ? at + i : at + count - 1 - i;
+    value = value << 8 | static_cast<unsigned char>(bytes[place]);
+  }
+  return value;
+}
+
+Size make_size(const std::optional<std::int64_t>& width,
+               const std::optional<std::int64_t>& height) {
+  if (!width || !height) return {};
+  return std::array{*width, *height};
+}
+
+/// Reads the size from the first chunk, IHDR. Its length and type follow the signature of 8 bytes.
+Size png_size(std::string_view bytes) {
+  return make_size(number_at(bytes, 16, 4, ByteOrder::big),
+                   number_at(bytes, 20, 4, ByteOrder::big));
+}
+
+/// Reads the size of a BMP. A negative height means that rows are stored from the top.
+Size bmp_size(std::string_view bytes) {
+  const auto header = number_at(bytes, 14, 4, ByteOrder::little);
+  constexpr std::int64_t oldest = 12;  // of OS/2, with sizes of two bytes
+  if (header == oldest) {
+    return make_size(number_at(bytes, 18, 2, ByteOrder::little),
+                     number_at(bytes, 20, 2, ByteOrder::little));
+  }
+  const auto signed_at = [&](std::size_t at) -> std::optional<std::int64_t> {
+    const auto value = number_at(bytes, at, 4, ByteOrder::little);
+    if (!value) return {};
+    const auto with_sign = static_cast<std::int32_t>(*value);
+    return with_sign < 0 ? -static_cast<std::int64_t>(with_sign) : with_sign;
+  };
+  return make_size(signed_at(18), signed_at(22));
+}
+
+/// Reads the frame header, SOF: FF C0 to FF CF but for C4, C8 and CC. The segments before it are
+/// skipped by their lengths, as libjpeg does.
+Size jpeg_size(std::string_view bytes) {
+  std::size_t at = 2;
+  while (at + 4 <= bytes.size()) {
+    if (bytes[at] != '\xff') {  // decoders look for the next marker, too
+      ++at;
+      continue;
+    }
+    const auto marker = static_cast<unsigned char>(bytes[at + 1]);
+    if (marker == 0xff || marker == 0) {  // filled up, or no marker
+      ++at;
+      continue;
+    }
+    if (marker == 0x01 || (marker >= 0xd0 && marker <= 0xd7)) {  // TEM, RST: without a length
+      at += 2;
+      continue;
+    }
+    if (marker == 0xd8 || marker == 0xd9) return {};  // another start, or the end
+    const auto length = number_at(bytes, at + 2, 2, ByteOrder::big);
+    const bool frame =
+        marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc;
+    if (frame) {
+      return make_size(number_at(bytes, at + 7, 2, ByteOrder::big),
+                       number_at(bytes, at + 5, 2, ByteOrder::big));
+    }
+    if (!length || *length < 2) return {};
+    at += 2 + static_cast<std::size_t>(*length);
+  }
+  return {};
+}
+
+/// Layout of TIFF and of BigTIFF, whose numbers have 8 bytes, as far as the size requires it.
+struct TiffLayout {
+  /// Position of the offset of the first directory; number of bytes of an offset and of a count of
+  /// entries.
+  std::size_t directory_at, place_bytes, count_bytes;
+  /// Bytes of an entry, and where in it the value stands.
+  std::size_t entry_bytes, value_at;
+};
+constexpr TiffLayout kTiff{4, 4, 2, 12, 8}, kBigTiff{8, 8, 8, 20, 12};
+
+/// Reads tags 256 and 257 of the first directory, each a SHORT (3), a LONG (4) or, in BigTIFF, a
+/// LONG8 (16). libtiff reads others, too, but no usual program writes them. Of a tag that occurs
+/// twice the first counts, as in libtiff.
+Size tiff_size(std::string_view bytes, const TiffLayout& layout) {
+  const ByteOrder order = bytes[0] == 'M' ? ByteOrder::big : ByteOrder::little;
+  const auto directory = number_at(bytes, layout.directory_at, layout.place_bytes, order);
+  if (!directory || *directory < 0) return {};
+  const auto start = static_cast<std::size_t>(*directory);
+  const auto entries = number_at(bytes, start, layout.count_bytes, order);
+  if (!entries || *entries < 0) return {};
+  std::optional<std::int64_t> width, height;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(*entries); ++i) {
+    const std::size_t entry = start + layout.count_bytes + i * layout.entry_bytes;
+    const auto tag = number_at(bytes, entry, 2, order),
+               type = number_at(bytes, entry + 2, 2, order);
+    if (!tag || !type) return {};
+    if (*tag != 256 && *tag != 257) continue;
+    const std::size_t value_bytes = *type == 3 ? 2 : *type == 4 ? 4 : *type == 16 ? 8 : 0;
+    if (value_bytes == 0 || value_bytes > layout.place_bytes) return {};
+    auto& size = *tag == 256 ? width : height;
+    if (!size) size = number_at(bytes, entry + layout.value_at, value_bytes, order);
+    if (!size) return {};
+  }
+  return make_size(width, height);
+}
+
+/// Reads the size of a PBM, PGM or PPM: "P5", width and height, separated by white space and
+/// comments.
+Size pnm_size(std::string_view bytes) {
+  std::size_t at = 2;
+  const auto is_space = [](char c) { return std::isspace(static_cast<unsigned char>(c)) != 0; };
+  const auto next = [&]() -> std::optional<std::int64_t> {
+    while (at < bytes.size() && (is_space(bytes[at]) || bytes[at] == '#')) {
+      at = bytes[at] == '#' ? std::min(bytes.find('\n', at), bytes.size()) : at + 1;
+    }
+    std::int64_t value = 0;
+    const std::string_view remaining = bytes.substr(at);
+    const auto [stop, failure] =
+        std::from_chars(remaining.data(), remaining.data() + remaining.size(), value);
+    // A number at the very end may be cut short.
+    if (failure != std::errc() || stop == remaining.data() + remaining.size()) return {};
+    at += static_cast<std::size_t>(stop - remaining.data());
+    return value;
+  };
+  const auto width = next();
+  return make_size(width, next());
+}
+
+/// Beginning of the files of an image format, and the reader of the size.
+struct ImageFormat {
+  std::string_view signature;
+  Size (*read_size)(std::string_view bytes);
+};
+
+/// Returns the format of a file; nullptr for other files.
+const ImageFormat* find_format(std::string_view bytes) {
+  using namespace std::string_view_literals;
+  constexpr auto tiff = [](std::string_view file) { return tiff_size(file, kTiff); };
+  constexpr auto big_tiff = [](std::string_view file) { return tiff_size(file, kBigTiff); };
+  static constexpr std::array formats{ImageFormat{"\x89PNG\r\n\x1a\n"sv, png_size},
+                                      ImageFormat{"\xff\xd8"sv, jpeg_size},
+                                      ImageFormat{"BM"sv, bmp_size},
+                                      ImageFormat{"II*\0"sv, tiff},
+                                      ImageFormat{"MM\0*"sv, tiff},
+                                      ImageFormat{"II+\0"sv, big_tiff},
+                                      ImageFormat{"MM\0+"sv, big_tiff},
+                                      ImageFormat{"P1"sv, pnm_size},
+                                      ImageFormat{"P2"sv, pnm_size},
+                                      ImageFormat{"P3"sv, pnm_size},
+                                      ImageFormat{"P4"sv, pnm_size},
+                                      ImageFormat{"P5"sv, pnm_size},
+                                      ImageFormat{"P6"sv, pnm_size}};
+  const auto* const found = std::ranges::find_if(
+      formats, [&](const ImageFormat& format) { return bytes.starts_with(format.signature); });
+  return found == formats.end() ? nullptr : found;
+}
+
 }  // namespace
+
+bool has_image_signature(std::string_view bytes) { return find_format(bytes) != nullptr; }
+
+Size read_header_size(std::string_view bytes) {
+  const ImageFormat* const format = find_format(bytes);
+  return format == nullptr ? Size() : format->read_size(bytes);
+}
 
 void check_size(const fs::path& file, std::int64_t width, std::int64_t height, double max_mpx) {
   constexpr double million = 1e6;

@@ -11,14 +11,15 @@ namespace vlp {
 
 namespace fs = std::filesystem;
 
-bool is_image_name(const fs::path& file) {
+bool has_extension(const fs::path& file, std::initializer_list<std::string_view> extensions) {
   std::string extension = file.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  for (const char* known : {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm"}) {
-    if (extension == known) return true;
-  }
-  return false;
+  std::ranges::transform(extension, extension.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return std::ranges::find(extensions, extension) != extensions.end();
+}
+
+bool is_image_name(const fs::path& file) {
+  return has_extension(file, {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm"});
 }
 
 std::vector<fs::path> list_images(const fs::path& folder) {

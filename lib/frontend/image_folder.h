@@ -3,10 +3,16 @@
 #pragma once
 
 #include <filesystem>
+#include <initializer_list>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace vlp {
+
+/// Returns true if the file has one of the extensions, which are in lower case, as ".png".
+bool has_extension(const std::filesystem::path& file,
+                   std::initializer_list<std::string_view> extensions);
 
 /// Returns true if the extension is that of an image: PNG, JPEG, BMP, TIFF or PGM.
 bool is_image_name(const std::filesystem::path& file);

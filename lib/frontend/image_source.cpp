@@ -6,9 +6,10 @@
 
 #include <algorithm>
 #include <atomic>
+#include <opencv2/core/utility.hpp>
 #include <utility>
 
-#include "frontend/images_in_parallel.h"
+#include "captures/parallel_for.h"
 #include "frontend/video.h"
 #include "rig/input_error.h"
 
@@ -70,6 +71,20 @@ std::optional<SourceImage> ImageSource::next() {
     return image;
   }
   return {};
+}
+
+void images_in_parallel(std::size_t count, int threads,
+                        const std::function<void(std::size_t)>& process,
+                        const std::function<void(std::size_t done)>& progress) {
+  cv::setNumThreads(1);
+  std::mutex counting;
+  std::size_t done = 0;
+  parallel_for(count, threads, [&](std::size_t i) {
+    process(i);
+    if (!progress) return;
+    const std::lock_guard lock(counting);
+    progress(++done);
+  });
 }
 
 void for_each_image(ImageSource& source, int threads,

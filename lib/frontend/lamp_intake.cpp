@@ -8,7 +8,6 @@
 #include <cmath>
 #include <utility>
 
-#include "frontend/annotate.h"
 #include "frontend/image_folder.h"
 #include "frontend/image_quality.h"
 #include "frontend/lights_table.h"
@@ -175,9 +174,7 @@ std::string list_shared_frequencies(const LampMap& map) {
   for (std::size_t i = 0; i < map.lamps.size(); ++i) {
     for (std::size_t j = i + 1; j < map.lamps.size(); ++j) {
       const Lamp &a = map.lamps[i], &b = map.lamps[j];
-      if (!share_frequency(a, b)) continue;
-      std::string pair = fmt::format("{} and {}", a.id, b.id);
-      pairs.push_back(std::move(pair));
+      if (share_frequency(a, b)) pairs.push_back(fmt::format("{} and {}", a.id, b.id));
     }
   }
   const std::size_t more = pairs.size() > kMaxLines ? pairs.size() - kMaxLines : 0;
@@ -244,14 +241,11 @@ LightDetector make_detector(const LampImages& images, const FrontendOptions& opt
     imager_px = images.calibration->camera.imager_px;
     if (!known_readout) known_readout = images.calibration->camera.readout;
   }
-  Observations remarks;
+  const std::size_t num_warnings = result.warnings.size();
   camera.readout =
-      find_readout(list_lamp_images(images.images), known_readout, options, imager_px, remarks);
-  result.notes.insert(result.notes.end(), remarks.notes.begin(), remarks.notes.end());
+      find_readout(list_lamp_images(images.images), known_readout, options, imager_px, result);
   // Without a calibration the readout direction is chosen per image.
-  if (known_readout || images.calibration) {
-    result.warnings.insert(result.warnings.end(), remarks.warnings.begin(), remarks.warnings.end());
-  }
+  if (!images.calibration) result.warnings.resize(num_warnings);
   if (!classifier) warn_of_map(images, camera, options.exposure_s, result.warnings);
   return LightDetector(images.lamps, camera, std::move(classifier));
 }
@@ -317,12 +311,6 @@ LampIntake LampIntake::with_annotate(const fs::path& folder) const {
   return other;
 }
 
-std::optional<LightDetector> LampIntake::detector_for(const std::string& image) const {
-  const auto level = levels_.find(image);
-  if (level == levels_.end()) return std::nullopt;
-  return detector_.with_tilt(level->second);
-}
-
 Observation LampIntake::observe(const SourceImage& source) const {
   Observation result{source.file, source.time_s};
   result.readout = detector_.readout();
@@ -331,8 +319,9 @@ Observation LampIntake::observe(const SourceImage& source) const {
     pixels = image;
     if (min_lamps(use_) > 0 && is_flat(image)) reject_without_signal(image, result);
     if (!result.is_kept()) return;
-    const auto tilted = detector_for(result.name());
-    const LightDetector& detector = tilted ? *tilted : detector_;
+    const auto level = levels_.find(result.name());
+    const LightDetector detector =
+        level == levels_.end() ? detector_ : detector_.with_tilt(level->second);
     if (can_turn_) {
       auto [readout, lights] = detect_with_either_readout(detector, image_view(image));
       result.readout = readout;

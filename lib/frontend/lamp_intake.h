@@ -14,7 +14,6 @@
 #include "captures/captures_table.h"
 #include "frontend/observation.h"
 #include "frontend/options.h"
-#include "frontend/selection.h"
 #include "geometry/frames.h"
 #include "lamps/light_detector.h"
 #include "rig/calibration.h"
@@ -88,8 +87,6 @@ class LampIntake {
   Readout readout() const { return detector_.readout(); }
 
  private:
-  std::optional<LightDetector> detector_for(const std::string& image) const;
-
   /// Notes and warnings about the set of images.
   Observations remarks_;
   LevelRotations levels_;

@@ -5,11 +5,16 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <map>
+#include <opencv2/imgproc.hpp>
 #include <utility>
 
 #include "captures/csv_writer.h"
 #include "captures/number_text.h"
+#include "codecs/codecs.h"
+#include "rig/file.h"
 
 namespace vlp {
 namespace {
@@ -19,6 +24,11 @@ std::string_view outline_name(const Light& light) {
   if (light.is_glow) return "glow";
   if (!is_disc(light)) return traits_of(light.shape).name;
   return light.is_uneven ? "rim" : "edge";
+}
+
+template <typename Names, typename Enumerator>
+std::string_view find_name(const Names& names, Enumerator enumerator) {
+  return std::ranges::find(names, enumerator, &Names::value_type::first)->second;
 }
 
 std::string lamp_name(const Light& light) { return light.lamp ? std::to_string(*light.lamp) : ""; }
@@ -54,43 +64,27 @@ std::vector<CountedReason> count_reasons(std::span<const Observation> images) {
 }
 
 std::string_view to_string(LightKind kind) {
-  switch (kind) {
-    case LightKind::lamp:
-      return "lamp";
-    case LightKind::cut:
-      return "cut";
-    case LightKind::unknown:
-      return "unknown";
-    case LightKind::steady:
-      return "steady";
-    case LightKind::formless:
-      return "no_outline";
-  }
-  return {};
+  constexpr std::array<std::pair<LightKind, std::string_view>, 5> names{
+      {{LightKind::lamp, "lamp"},
+       {LightKind::cut, "cut"},
+       {LightKind::unknown, "unknown"},
+       {LightKind::steady, "steady"},
+       {LightKind::formless, "no_outline"}}};
+  return find_name(names, kind);
 }
 
 std::string_view to_string(LightReason reason) {
-  switch (reason) {
-    case LightReason::identified:
-      return "identified";
-    case LightReason::overexposed:
-      return "overexposed";
-    case LightReason::steady:
-      return "steady";
-    case LightReason::too_few_periods:
-      return "too_few_periods";
-    case LightReason::no_clear_period:
-      return "no_clear_period";
-    case LightReason::unknown_period:
-      return "unknown_period";
-    case LightReason::reflection:
-      return "reflection";
-    case LightReason::wrong_shape:
-      return "wrong_shape";
-    case LightReason::incomplete:
-      return "incomplete";
-  }
-  return {};
+  constexpr std::array<std::pair<LightReason, std::string_view>, 9> names{
+      {{LightReason::identified, "identified"},
+       {LightReason::overexposed, "overexposed"},
+       {LightReason::steady, "steady"},
+       {LightReason::too_few_periods, "too_few_periods"},
+       {LightReason::no_clear_period, "no_clear_period"},
+       {LightReason::unknown_period, "unknown_period"},
+       {LightReason::reflection, "reflection"},
+       {LightReason::wrong_shape, "wrong_shape"},
+       {LightReason::incomplete, "incomplete"}}};
+  return find_name(names, reason);
 }
 
 std::string describe(LightReason reason) {
@@ -165,6 +159,90 @@ void write_lights(const std::filesystem::path& file, std::span<const Observation
     }
   }
   csv.save();
+}
+
+namespace {
+
+/// Number of fractional bits of OpenCV's drawing coordinates.
+constexpr int kShift = 8;
+
+cv::Scalar choose_color(LightKind kind) {
+  static const std::map<LightKind, cv::Scalar> colors{{LightKind::lamp, {80, 255, 80}},
+                                                      {LightKind::cut, {0, 220, 255}},
+                                                      {LightKind::unknown, {60, 60, 255}},
+                                                      {LightKind::steady, {255, 160, 60}},
+                                                      {LightKind::formless, {170, 170, 170}}};
+  return colors.at(kind);
+}
+
+std::string make_label(const Light& light) {
+  if (light.kind != LightKind::lamp && light.kind != LightKind::cut) {
+    return fmt::format("{}: {}", to_string(light.kind), to_string(light.reason));
+  }
+  return std::to_string(*light.lamp) + (light.kind == LightKind::cut ? " cut" : "");
+}
+
+cv::Point fine(const Eigen::Vector2d& pixel) {
+  constexpr double unit = 1 << kShift;
+  return {static_cast<int>(std::lround(pixel.x() * unit)),
+          static_cast<int>(std::lround(pixel.y() * unit))};
+}
+
+/// Converts an image to color and brightens it, so that dark surroundings are visible.
+cv::Mat brightened(const cv::Mat& image) {
+  constexpr double gamma = 0.5;
+  const double white = image.depth() == CV_8U ? 255 : 65535;
+  cv::Mat levels, result;
+  image.convertTo(levels, CV_32F, 1 / white);
+  cv::pow(levels, gamma, levels);
+  levels.convertTo(result, CV_8U, 255);
+  cv::cvtColor(result, result, cv::COLOR_GRAY2BGR);
+  return result;
+}
+
+/// Draws a text next to a light, on the side with enough space.
+void write_label(cv::Mat& picture, const Light& light, double size) {
+  const std::string label = make_label(light);
+  const int thickness = static_cast<int>(std::lround(size));
+  const double scale = 0.5 * size;
+  const cv::Size box = cv::getTextSize(label, cv::FONT_HERSHEY_SIMPLEX, scale, thickness, nullptr);
+  const int gap = static_cast<int>(3 * size);
+  int left = static_cast<int>(light.high.x()) + gap;
+  if (left + box.width > picture.cols) left = static_cast<int>(light.low.x()) - gap - box.width;
+  const int bottom = std::clamp(static_cast<int>(light.pixel.y()) + box.height / 2, box.height,
+                                std::max(box.height, picture.rows - 1));
+  cv::putText(picture, label, {std::max(0, left), bottom}, cv::FONT_HERSHEY_SIMPLEX, scale,
+              choose_color(light.kind), thickness, cv::LINE_AA);
+}
+
+}  // namespace
+
+cv::Mat render_annotated(const cv::Mat& image, const std::vector<Light>& lights, Readout readout) {
+  cv::Mat picture = brightened(image);
+  const double size = std::max(1.0, picture.cols / 1000.0);  // of letters and crosses
+  const int thickness = static_cast<int>(std::lround(size));
+  for (const Light& light : lights) {
+    const cv::Scalar color = choose_color(light.kind);
+    for (const EdgePoint& edge : light.outline) {
+      const Eigen::Vector2d at =
+          readout == Readout::rows ? edge.pixel : Eigen::Vector2d(edge.pixel.reverse());
+      cv::circle(picture, fine(at), fine({size, 0}).x, color, cv::FILLED, cv::LINE_AA, kShift);
+    }
+    const Eigen::Vector2d across(6 * size, 0), along(0, 6 * size);
+    cv::line(picture, fine(light.pixel - across), fine(light.pixel + across), color, thickness,
+             cv::LINE_AA, kShift);
+    cv::line(picture, fine(light.pixel - along), fine(light.pixel + along), color, thickness,
+             cv::LINE_AA, kShift);
+    write_label(picture, light, size);
+  }
+  return picture;
+}
+
+void write_annotated(const std::filesystem::path& folder, const std::filesystem::path& image_file,
+                     const cv::Mat& picture) {
+  std::filesystem::path file = folder / image_file.filename();
+  file += ".png";
+  write_file(file, codecs().encode(".png", picture, {}));
 }
 
 }  // namespace vlp

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <opencv2/core.hpp>
 #include <span>
 #include <string>
 #include <string_view>
@@ -10,6 +11,7 @@
 
 #include "frontend/observation.h"
 #include "lamps/shape/light.h"
+#include "rig/calibration.h"
 
 namespace vlp {
 
@@ -43,5 +45,18 @@ std::string describe_light(const Light& light);
 /// Stripes. Cells are empty for a light without lamp, stripes or outline.
 /// @throws InputError if the file cannot be written
 void write_lights(const std::filesystem::path& file, std::span<const Observation> images);
+
+/// Renders the detected lights into a brightened color copy of an image, for visual inspection.
+/// Draws outline points, center, kind and reason of each light. Lamps are green, truncated lights
+/// yellow, unknown ones red, unmodulated ones blue, and lights without outline gray.
+///
+/// @param image  one channel of 8 or 16 bits
+cv::Mat render_annotated(const cv::Mat& image, const std::vector<Light>& lights, Readout readout);
+
+/// Writes an annotated image atomically as PNG into `folder`, named like the image with `.png`
+/// appended.
+/// @throws InputError if the file cannot be written
+void write_annotated(const std::filesystem::path& folder, const std::filesystem::path& image_file,
+                     const cv::Mat& picture);
 
 }  // namespace vlp

@@ -5,6 +5,8 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <exception>
 #include <map>
 #include <mutex>
@@ -23,54 +25,36 @@ std::string message_about(const std::filesystem::path& file, const std::exceptio
   return message.starts_with(prefix) ? message.substr(prefix.size()) : message;
 }
 
-std::string_view remedy_for(RejectionReason reason) {
-  switch (reason) {
-    case RejectionReason::too_dark:
-      return ": more exposure, gain or light";
-    case RejectionReason::overexposed:
-      return ": less exposure, gain or light";
-    case RejectionReason::blurred:
-      return ": focus the lens, or keep camera and board still";
-    default:
-      return "";
-  }
+/// Phrase that follows a number of images, and remedy if there is one.
+struct ReasonText {
+  RejectionReason reason;
+  std::string_view phrase, remedy = "";
+};
+
+constexpr std::array kReasons{
+    ReasonText{RejectionReason::unreadable, "cannot be read"},
+    ReasonText{RejectionReason::wrong_size, "of another size"},
+    ReasonText{RejectionReason::too_dark, "too dark", ": more exposure, gain or light"},
+    ReasonText{RejectionReason::overexposed, "overexposed", ": less exposure, gain or light"},
+    ReasonText{RejectionReason::no_contrast, "without contrast"},
+    ReasonText{RejectionReason::blurred, "blurred",
+               ": focus the lens, or keep camera and board still"},
+    ReasonText{RejectionReason::other_board, "with tags of another board"},
+    ReasonText{RejectionReason::no_board, "without the board"},
+    ReasonText{RejectionReason::too_few_corners, "with too little of the board"},
+    ReasonText{RejectionReason::too_few_lamps, "with too few lamps"},
+    ReasonText{RejectionReason::same_image, "the same image again"},
+    ReasonText{RejectionReason::same_view, "the same view again"},
+    ReasonText{RejectionReason::not_needed, "not needed"},
+    ReasonText{RejectionReason::used_elsewhere, "used elsewhere"}};
+
+const ReasonText& find_text(RejectionReason reason) {
+  return *std::ranges::find(kReasons, reason, &ReasonText::reason);
 }
 
 }  // namespace
 
-std::string_view to_string(RejectionReason reason) {
-  switch (reason) {
-    case RejectionReason::unreadable:
-      return "cannot be read";
-    case RejectionReason::wrong_size:
-      return "of another size";
-    case RejectionReason::too_dark:
-      return "too dark";
-    case RejectionReason::overexposed:
-      return "overexposed";
-    case RejectionReason::no_contrast:
-      return "without contrast";
-    case RejectionReason::blurred:
-      return "blurred";
-    case RejectionReason::other_board:
-      return "with tags of another board";
-    case RejectionReason::no_board:
-      return "without the board";
-    case RejectionReason::too_few_corners:
-      return "with too little of the board";
-    case RejectionReason::too_few_lamps:
-      return "with too few lamps";
-    case RejectionReason::same_image:
-      return "the same image again";
-    case RejectionReason::same_view:
-      return "the same view again";
-    case RejectionReason::not_needed:
-      return "not needed";
-    case RejectionReason::used_elsewhere:
-      return "used elsewhere";
-  }
-  return "";
-}
+std::string_view to_string(RejectionReason reason) { return find_text(reason).phrase; }
 
 bool is_redundant(RejectionReason reason) {
   return reason == RejectionReason::same_image || reason == RejectionReason::same_view ||
@@ -117,7 +101,7 @@ std::string summarize_rejections(std::span<const Observation> images) {
     const bool has_owner = reason == RejectionReason::used_elsewhere;
     const auto colon = std::min(message.find(':'), message.size());
     const std::pair key(reason, has_owner ? message.substr(0, colon) : to_string(reason).data());
-    remedies[key] = has_owner ? message.substr(colon) : remedy_for(reason);
+    remedies[key] = has_owner ? message.substr(colon) : find_text(reason).remedy;
     ++counts[key];
     ++rejected;
   }
@@ -182,6 +166,75 @@ Observations observe_images(ImageSource& source, int threads,
   });
   result.warnings = source.warnings();
   return result;
+}
+
+namespace {
+
+/// Returns the corners of the board, or the lamps by their ids, sorted by index.
+std::vector<PointDetection> points_in(const Observation& image) {
+  if (image.board) return collect_corners(image.board->seen);
+  std::vector<PointDetection> points;
+  for (const Detection& lamp : collect_lamps(image)) {
+    points.push_back({static_cast<std::size_t>(lamp.lamp), lamp.pixel});
+  }
+  std::sort(points.begin(), points.end(),
+            [](const PointDetection& a, const PointDetection& b) { return a.index < b.index; });
+  return points;
+}
+
+bool are_equal(const std::vector<PointDetection>& a, const std::vector<PointDetection>& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [](const PointDetection& one, const PointDetection& two) {
+                      return one.index == two.index && one.pixel == two.pixel;
+                    });
+}
+
+bool are_close(const std::vector<PointDetection>& a, const std::vector<PointDetection>& b,
+               double max_distance_px) {
+  constexpr double min_shared_fraction = 0.7;
+  double sum_px2 = 0, shared = 0;
+  auto other = b.begin();
+  for (const PointDetection& point : a) {
+    while (other != b.end() && other->index < point.index) ++other;
+    if (other == b.end()) break;
+    if (other->index != point.index) continue;
+    ++shared;
+    sum_px2 += (point.pixel - other->pixel).squaredNorm();
+  }
+  const auto larger = static_cast<double>(std::max(a.size(), b.size()));
+  return shared >= min_shared_fraction * larger && std::sqrt(sum_px2 / shared) <= max_distance_px;
+}
+
+}  // namespace
+
+int min_lamps(ImageUse use) { return use == ImageUse::turn || use == ImageUse::places ? 2 : 0; }
+
+void Selection::add(Observation& image) {
+  if (!image.is_kept() || use_ == ImageUse::fixes) return;
+  std::vector<PointDetection> points = points_in(image);
+  if (points.empty()) return;
+  for (const Kept& kept : kept_) {
+    if (!are_equal(points, kept.points)) continue;
+    return image.reject(RejectionReason::same_image, "is the same image as " + kept.name);
+  }
+  if (use_ != ImageUse::places) {
+    for (const Kept& kept : kept_) {
+      if (!are_close(points, kept.points, same_view_fraction_ * image.size_px[0])) continue;
+      return image.reject(RejectionReason::same_view,
+                          "shows the same view as " + kept.name + ": views count once");
+    }
+  }
+  kept_.push_back({image.name(), std::move(points)});
+}
+
+void Selection::keep(const Observation& image) {
+  if (use_ != ImageUse::fixes) kept_.push_back({image.name(), points_in(image)});
+}
+
+void reject_repeated(std::vector<Observation>& images, ImageUse use,
+                     const FrontendOptions& options) {
+  Selection selection(use, options);
+  for (Observation& image : images) selection.add(image);
 }
 
 }  // namespace vlp

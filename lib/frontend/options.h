@@ -31,7 +31,7 @@ struct FrontendOptions {
   /// fraction of the image width.
   double same_view_fraction = 0.01;
 
-  /// Folder of corners that were detected before (corner_cache()); empty: none.
+  /// Folder of corners that were detected before (CornerCache); empty: none.
   std::filesystem::path corner_cache = {};
   /// Folder for annotated images of the detected lights; created if missing. Empty: none.
   std::filesystem::path annotate = {};

@@ -4,8 +4,6 @@
 
 #include <fmt/core.h>
 
-#include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <cstdlib>
 #include <limits>
@@ -14,19 +12,14 @@
 #include <opencv2/videoio.hpp>
 
 #include "codecs/codecs.h"
+#include "frontend/image_folder.h"
 #include "rig/file.h"
 #include "rig/input_error.h"
 
 namespace vlp {
 
 bool is_video_name(const std::filesystem::path& file) {
-  std::string extension = file.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  for (const char* known : {".avi", ".mp4", ".m4v", ".mov", ".mkv", ".webm", ".mpg", ".mpeg"}) {
-    if (extension == known) return true;
-  }
-  return false;
+  return has_extension(file, {".avi", ".mp4", ".m4v", ".mov", ".mkv", ".webm", ".mpg", ".mpeg"});
 }
 
 std::string frame_name(const std::string& video, std::size_t number) {

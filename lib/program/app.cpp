@@ -65,6 +65,16 @@ CLI::Validator number_check(const std::string& name, bool (*accepts)(double)) {
       "");
 }
 
+CLI::Validator ending_check(const std::vector<std::string>& endings, const std::string& problem) {
+  return CLI::Validator(
+      [endings, problem](const std::string& name) {
+        const bool is_valid = std::ranges::any_of(
+            endings, [&](const std::string& ending) { return name.ends_with(ending); });
+        return is_valid ? std::string() : problem;
+      },
+      "");
+}
+
 /// Returns true if the program, or the command that was given, has an option.
 bool has_option(const CLI::App& app, const std::string& name) {
   const auto commands = app.get_subcommands();
@@ -142,11 +152,11 @@ CLI::Validator finite_not_negative() {
 }
 
 CLI::Validator make_ending_validator(const std::string& ending) {
-  return CLI::Validator(
-      [ending](const std::string& name) {
-        return name.ends_with(ending) ? std::string() : "the file's name should end in " + ending;
-      },
-      "");
+  return ending_check({ending}, "the file's name should end in " + ending);
+}
+
+CLI::Validator is_plot_file() {
+  return ending_check({".png", ".svg"}, "a picture's name should end in .png or .svg");
 }
 
 CLI::Validator present_value() {
@@ -154,15 +164,6 @@ CLI::Validator present_value() {
       [](const std::string& text) {
         const std::string_view present = find_present_name(NameKind::value, text);
         return present.empty() ? std::string() : describe_renaming(text, present);
-      },
-      "");
-}
-
-CLI::Validator is_plot_file() {
-  return CLI::Validator(
-      [](const std::string& name) {
-        const bool known = name.ends_with(".png") || name.ends_with(".svg");
-        return known ? std::string() : "a picture's name should end in .png or .svg";
       },
       "");
 }
@@ -220,15 +221,11 @@ int run_app(CLI::App& app, int argc, char** argv, const std::function<void()>& r
   } catch (const CLI::Success& success) {  // --help, --version
     return check_stdout(app.exit(success));
   } catch (const CLI::ParseError& error) {
-    const auto unknown = describe_unknown_options(
-        app);  // a misspelled option is more informative than a missing one
-    if (const auto problem = command_problem(app); !problem.empty()) {
-      spdlog::error("{}; see {} --help", problem, app.get_name());
-    } else if (!unknown.empty()) {
-      spdlog::error("{}; see {} --help", unknown, app.get_name());
-    } else {
-      spdlog::error("{}; see {} --help", error.what(), app.get_name());
-    }
+    std::string problem = command_problem(app);
+    // A misspelled option is more informative than a missing one.
+    if (problem.empty()) problem = describe_unknown_options(app);
+    if (problem.empty()) problem = error.what();
+    spdlog::error("{}; see {} --help", problem, app.get_name());
     return kBadInput;
   } catch (const GateNotMet& error) {
     spdlog::error("{}", error.what());

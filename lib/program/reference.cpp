@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "program/reference.h"
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cctype>
@@ -77,10 +79,8 @@ std::string escape(const std::string& text, std::string_view letters) {
   return result;
 }
 
-std::string join_words(const std::vector<std::string>& words) {
-  std::string line;
-  for (const std::string& word : words) line.append(line.empty() ? "" : " ").append(word);
-  return line;
+std::string join_words(const std::vector<std::string>& words, const char* separator = " ") {
+  return fmt::format("{}", fmt::join(words, separator));
 }
 
 /// Returns a line of roff that prints `text`.
@@ -135,12 +135,10 @@ std::string format_roff_options(const Options& options, bool positional) {
   const HelpFormatter formatter;
   std::string page;
   for (const CLI::Option* option : options) {
-    page.append(".TP\n.B ")
-        .append(escape_roff(formatter.make_option_name(option, positional) +
-                            formatter.make_option_opts(option)))
-        .append("\n")
-        .append(escape_roff(option->get_description()))
-        .append("\n");
+    const std::string name =
+        formatter.make_option_name(option, positional) + formatter.make_option_opts(option);
+    page +=
+        fmt::format(".TP\n.B {}\n{}\n", escape_roff(name), escape_roff(option->get_description()));
   }
   return page;
 }
@@ -153,24 +151,22 @@ std::string make_function_name(const std::string& program) {
 }
 
 std::string format_bash_options(const CLI::App& app, const std::string& indent) {
-  std::vector<std::string> names, quiet, files;
+  std::vector<std::string> names;
   std::string cases;
   for (const CLI::Option* option : find_options(app)) {
     const auto option_names = collect_names(*option);
     names.insert(names.end(), option_names.begin(), option_names.end());
     const Value value = classify_value(*option);
     if (value == Value::none) continue;
-    std::string pattern;
-    for (const std::string& name : option_names)
-      pattern.append(pattern.empty() ? "" : "|").append(name);
-    cases.append(indent).append("  ").append(pattern).append(") ");
-    if (value == Value::choice)
-      cases.append("words='" + join_words(parse_choices(*option)) + "'; ");
-    if (value == Value::file) cases.append("files=yes; ");
-    cases.append("value=yes ;;\n");
+    std::string effect;
+    if (value == Value::choice) {
+      effect = fmt::format("words='{}'; ", join_words(parse_choices(*option)));
+    }
+    if (value == Value::file) effect = "files=yes; ";
+    cases += fmt::format("{}  {}) {}value=yes ;;\n", indent, join_words(option_names, "|"), effect);
   }
-  return indent + "options='" + join_words(names) + "'\n" + indent + "case $previous in\n" + cases +
-         indent + "esac\n";
+  return fmt::format("{0}options='{1}'\n{0}case $previous in\n{2}{0}esac\n", indent,
+                     join_words(names), cases);
 }
 
 /// Returns an argument for _arguments of zsh: '(-o --output)'{-o,--output}'[text]:value:_files'.
@@ -187,8 +183,7 @@ std::string format_zsh_option(const CLI::Option& option) {
   } else if (names.size() > 1) {
     spec = "'(" + join_words(names) + ")'";
   }
-  std::string list;
-  for (const std::string& name : names) list.append(list.empty() ? "" : ",").append(name);
+  const std::string list = join_words(names, ",");
   spec.append(names.size() > 1 ? "{" + list + "}" : list).append("'[" + text + "]");
   const Value value = classify_value(option);
   const int values = value == Value::none ? 0 : std::max(1, option.get_items_expected_min());
@@ -263,14 +258,11 @@ std::string format_bash_completion(const CLI::App& app) {
       "  COMPREPLY=()\n";
   if (!commands.empty()) {
     text.append("  for word in \"${COMP_WORDS[@]:1:COMP_CWORD-1}\"; do\n    case $word in\n      ");
-    std::string pattern = join_words(names);
-    std::replace(pattern.begin(), pattern.end(), ' ', '|');
-    text.append(pattern).append(") command=$word; break ;;\n    esac\n  done\n");
-    text.append("  case $command in\n");
+    text += join_words(names, "|") + ") command=$word; break ;;\n    esac\n  done\n";
+    text += "  case $command in\n";
     for (const CLI::App* command : commands) {
-      text.append("    " + command->get_name() + ")\n")
-          .append(format_bash_options(*command, "      "));
-      text.append("      ;;\n");
+      text += fmt::format("    {})\n{}      ;;\n", command->get_name(),
+                          format_bash_options(*command, "      "));
     }
     text.append("    *)\n").append(format_bash_options(app, "      "));
     text.append("      [ \"$value\" ] || words='" + join_words(names) + "'\n      ;;\n  esac\n");

@@ -4,19 +4,27 @@
 
 #include <fmt/core.h>
 
+#include <Eigen/LU>
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <map>
 #include <stdexcept>
+#include <string>
+#include <utility>
 
 #include "calibration/map/map_errors.h"
 #include "camera/lens.h"
+#include "geometry/angles.h"
+#include "geometry/median.h"
 #include "geometry/polygon.h"
+#include "positioning/correction.h"
 #include "positioning/known_motion.h"
 #include "positioning/residual_noise.h"
 #include "positioning/row_clock.h"
 #include "rig/find_lamp.h"
 #include "session/lamp_captures.h"
+#include "session/row_time_step.h"
 
 namespace vlp {
 
@@ -141,6 +149,12 @@ bool has_sigma(const Frame& frame) {
                      [](const Detection& detection) { return detection.sigma_px.has_value(); });
 }
 
+/// Returns the ids of the rejected lamps, as many as a fix lists.
+std::span<const int> list_rejected(const Fix& fix) {
+  const auto count = static_cast<std::size_t>(fix.rejected_lamps);
+  return std::span(fix.rejected_ids).first(std::min(fix.rejected_ids.size(), count));
+}
+
 FixRow make_fix_row(const Frame& frame, const CapturesTable& captures, const Fix& fix,
                     bool noise_known) {
   FixRow row{frame.image, std::string(to_string(fix.status)), {}, fix.lamps};
@@ -161,9 +175,8 @@ FixRow make_fix_row(const Frame& frame, const CapturesTable& captures, const Fix
       row.fix->noise_sd = fix.noise_covariance.diagonal().cwiseSqrt();
     }
   }
-  const auto listed =
-      std::min<std::size_t>(fix.rejected_ids.size(), static_cast<std::size_t>(fix.rejected_lamps));
-  row.rejected.assign(fix.rejected_ids.begin(), fix.rejected_ids.begin() + std::ptrdiff_t(listed));
+  const auto rejected = list_rejected(fix);
+  row.rejected.assign(rejected.begin(), rejected.end());
   return row;
 }
 
@@ -213,14 +226,9 @@ std::optional<double> find_speed_m_per_s(const std::vector<Fix>& fixes) {
     speeds.push_back(velocity.norm());
     sigmas.push_back(velocity.norm() / std::sqrt(variance));
   }
-  const auto median = [](std::vector<double>& values) {
-    const auto middle = values.begin() + std::ssize(values) / 2;
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-  };
   constexpr double min_sigmas = 3;
-  if (speeds.empty() || median(sigmas) < min_sigmas) return std::nullopt;
-  return median(speeds);
+  if (speeds.empty() || upper_median(sigmas) < min_sigmas) return std::nullopt;
+  return upper_median(speeds);
 }
 
 /// Warns if motion explains failed frames or residuals of a camera that is assumed to stand.
@@ -253,24 +261,13 @@ void warn_of_motion(LocateResult& result, const LocateInput& input, bool is_nois
       *speed_m_per_s));
 }
 
-/// Locates all frames and computes the contribution of the reported errors of calibration and map
-/// to the residuals.
-std::vector<Fix> locate_with_expected_residuals(const LocateInput& input) {
-  PositionerOptions how = input.how;
-  how.computes_common_chi_squared = true;
-  return locate_all_frames(input, how);
-}
-
 /// Scales the given noise of all detections and removes the detections that `fixes` reject.
 LocateInput scale_stated_noise(LocateInput input, const std::vector<Fix>& fixes, double factor) {
   for (std::size_t i = 0; i < input.frames.size(); ++i) {
-    const Fix& fix = fixes[i];
-    const auto rejected_end =
-        fix.rejected_ids.begin() +
-        std::min(static_cast<std::ptrdiff_t>(fix.rejected_lamps), std::ssize(fix.rejected_ids));
+    const auto rejected = list_rejected(fixes[i]);
     std::vector<Detection>& detections = input.frames[i].detections;
     std::erase_if(detections, [&](const Detection& detection) {
-      return std::find(fix.rejected_ids.begin(), rejected_end, detection.lamp) != rejected_end;
+      return std::ranges::find(rejected, detection.lamp) != rejected.end();
     });
     for (Detection& detection : detections) {
       if (!detection.sigma_px) continue;
@@ -296,7 +293,10 @@ void locate_again(const LocateInput& input, const PositionerOptions& how, double
 /// Locates all frames. Uses the noise estimated from the residuals if none is given or the given
 /// one is too small. Returns true if the noise is known.
 bool locate_with_noise(const LocateInput& input, LocateResult& result) {
-  result.fixes = locate_with_expected_residuals(input);
+  // The reported errors of calibration and map contribute to the residuals.
+  PositionerOptions how = input.how;
+  how.computes_common_chi_squared = true;
+  result.fixes = locate_all_frames(input, how);
   std::vector<Fix> stated, unstated;
   for (std::size_t i = 0; i < input.frames.size(); ++i) {
     (has_sigma(input.frames[i]) ? stated : unstated).push_back(result.fixes[i]);
@@ -311,7 +311,7 @@ bool locate_with_noise(const LocateInput& input, LocateResult& result) {
     result.notes.push_back(fmt::format(
         "residuals are {:.2f} times the stated noise: sd follows the residuals", factor));
   }
-  PositionerOptions how = input.how;
+  how = input.how;
   bool is_known = true;
   if (!unstated.empty()) {
     auto unstated_factor = estimate_noise_factor(sum_squared_residuals(unstated));
@@ -333,11 +333,6 @@ bool locate_with_noise(const LocateInput& input, LocateResult& result) {
     locate_again(input, how, factor, result.fixes);
   }
   return is_known;
-}
-
-void warn_of_map(LocateResult& result, const LocateInput& input) {
-  const int elsewhere = Positioner(input.lamps, input.calibration, input.how).lamps_elsewhere();
-  if (elsewhere > 0) result.warnings.push_back(describe_lamps_elsewhere(elsewhere));
 }
 
 void warn_of_image(LocateResult& result, const LocateInput& input) {
@@ -458,7 +453,8 @@ LocateResult locate_frames(const LocateInput& input) {
   }
   warn_of_image(result, input);
   mark_outside_region(result, input);
-  warn_of_map(result, input);
+  const int elsewhere = Positioner(input.lamps, input.calibration, input.how).lamps_elsewhere();
+  if (elsewhere > 0) result.warnings.push_back(describe_lamps_elsewhere(elsewhere));
   warn_of_captures(result, input);
   const bool is_contradicted =
       std::any_of(result.fixes.begin(), result.fixes.end(),
@@ -481,6 +477,185 @@ LocateResult locate_frames(const LocateInput& input) {
                                                        describe(result.fixes.front().status)));
   }
   return result;
+}
+
+namespace {
+
+/// A capture whose tilt is estimated.
+struct TiltedCapture {
+  std::size_t frame;
+  std::vector<Detection> first_detections;
+  /// Plane of the current detections; std::nullopt: that of the first ones.
+  std::optional<std::optional<Eigen::Matrix3d>> level = std::nullopt;
+  bool has_converged = false;
+};
+
+class TiltedCaptures {
+ public:
+  TiltedCaptures(LocateInput& input, const Redetector& redetect)
+      : input_(input),
+        redetect_(redetect),
+        base_from_camera_(level_from_camera(input.calibration, input.how.correction)) {
+    for (std::size_t i = 0; i < input.frames.size(); ++i) {
+      const Frame& frame = input.frames[i];
+      if (make_sensors(frame.image, input).inclination_sigma_rad > 0) {
+        captures_.push_back({i, frame.detections});
+      }
+    }
+  }
+
+  LevelRotations iterate() {
+    if (captures_.empty()) return {};
+    fixes_ = locate_frames(input_).fixes;
+    start_from_ellipses();
+    constexpr int max_iterations = 6;
+    for (int i = 0; i < max_iterations && redetect_in_level_planes(); ++i) {
+    }
+    LevelRotations levels;
+    for (const TiltedCapture& capture : captures_) {
+      if (capture.level) levels.emplace(image_name(capture), *capture.level);
+    }
+    return levels;
+  }
+
+ private:
+  const std::string& image_name(const TiltedCapture& capture) const {
+    return input_.frames[capture.frame].image;
+  }
+
+  void detect_in(const LevelRotations& levels) {
+    if (levels.empty()) return;
+    std::vector<Frame> seen = redetect_(levels);
+    for (const TiltedCapture& capture : captures_) {
+      if (levels.find(image_name(capture)) == levels.end()) continue;
+      const auto frame = std::find_if(seen.begin(), seen.end(), [&](const Frame& candidate) {
+        return candidate.image == image_name(capture);
+      });
+      if (frame != seen.end()) {
+        input_.frames[capture.frame].detections = std::move(frame->detections);
+      }
+    }
+    fixes_ = locate_frames(input_).fixes;
+  }
+
+  void start_from_ellipses() {
+    constexpr double max_small_tilt_rad = 0.05;
+    const std::vector<Fix> first = fixes_;
+    LevelRotations levels;
+    for (TiltedCapture& capture : captures_) {
+      const double sd_rad = make_sensors(image_name(capture), input_).inclination_sigma_rad;
+      if (sd_rad <= max_small_tilt_rad && fixes_[capture.frame].ok()) continue;
+      capture.level.emplace();
+      levels.emplace(image_name(capture), std::nullopt);
+    }
+    detect_in(levels);
+    for (TiltedCapture& capture : captures_) {
+      const Fix& fix = first[capture.frame];
+      std::vector<Detection>& seen = input_.frames[capture.frame].detections;
+      if (fixes_[capture.frame].ok()) continue;
+      capture.has_converged = !fix.ok();
+      if (!fix.ok() && seen.size() > capture.first_detections.size()) continue;
+      capture.level.reset();
+      seen = capture.first_detections;
+      fixes_[capture.frame] = fix;
+    }
+  }
+
+  /// Repeats the detections that have not converged. Returns false if there are none.
+  bool redetect_in_level_planes() {
+    LevelRotations levels;
+    for (TiltedCapture& capture : captures_) {
+      const Fix& fix = fixes_[capture.frame];
+      capture.has_converged = capture.has_converged || !fix.ok() || !fix.body;
+      if (capture.has_converged) continue;
+      const double yaw_in_robot_rad = input_.how.mount ? input_.how.mount->yaw_in_robot_rad : 0;
+      capture.level =
+          compute_level_rotation(fix.body->inclination, yaw_in_robot_rad, base_from_camera_);
+      levels.emplace(image_name(capture), *capture.level);
+    }
+    const std::vector<Fix> before = fixes_;
+    detect_in(levels);
+    for (TiltedCapture& capture : captures_) {
+      if (capture.has_converged) continue;
+      capture.has_converged = is_unchanged(before[capture.frame], fixes_[capture.frame]);
+    }
+    return !levels.empty();
+  }
+
+  static bool is_unchanged(const Fix& before, const Fix& after) {
+    constexpr double tolerance_sd = 0.1;
+    if (!after.ok()) return true;
+    Eigen::Vector4d change;
+    change << after.estimate.pose.position_m - before.estimate.pose.position_m,
+        wrap_rad(after.estimate.pose.yaw_rad - before.estimate.pose.yaw_rad);
+    const Eigen::Vector4d sd = after.noise_covariance.diagonal().cwiseSqrt();
+    return (change.cwiseAbs().array() <= tolerance_sd * sd.array()).all();
+  }
+
+  LocateInput& input_;
+  const Redetector& redetect_;
+  Eigen::Matrix3d base_from_camera_;
+  std::vector<TiltedCapture> captures_;
+  std::vector<Fix> fixes_;
+};
+
+/// Applies an intake to the named images again.
+Observations observe_again(const LampIntake& intake,
+                           const std::vector<std::filesystem::path>& files,
+                           const LevelRotations& levels) {
+  std::vector<std::filesystem::path> named;
+  std::copy_if(files.begin(), files.end(), std::back_inserter(named), [&](const auto& file) {
+    return levels.find(file.filename().string()) != levels.end();
+  });
+  return intake.with_levels(levels).observe_all(named);
+}
+
+bool has_detections(const std::vector<Frame>& frames) {
+  return std::any_of(frames.begin(), frames.end(),
+                     [](const Frame& frame) { return !frame.detections.empty(); });
+}
+
+}  // namespace
+
+LocateResult locate_images(const LampImages& images, ImageUse use, LocateInput input,
+                           const FrontendOptions& options, const IntakeProgress& progress) {
+  const LampIntake intake(images, use, options);
+  if (!input.calibration.camera.readout) input.calibration.camera.readout = intake.readout();
+  const auto files = list_lamp_images(images.images);
+  Observations seen = intake.observe_all(files, progress);
+  check_lamps_seen(images, seen);
+  input.frames = collect_kept_frames(seen.images);
+  const LampIntake without_pictures = intake.with_annotate({});
+  std::map<std::string, Observation> latest;
+  const LevelRotations levels = redetect_tilted_captures(input, [&](const LevelRotations& tilted) {
+    const Observations repeated = observe_again(without_pictures, files, tilted);
+    for (const Observation& image : repeated.images) {
+      if (image.is_kept()) latest.insert_or_assign(image.name(), image);
+    }
+    return collect_kept_frames(repeated.images);
+  });
+  for (Observation& image : seen.images) {
+    const auto repeated = latest.find(image.name());
+    if (levels.contains(image.name()) && repeated != latest.end()) image = repeated->second;
+  }
+  if (!options.annotate.empty()) observe_again(intake, files, levels);
+  LocateResult result;
+  if (has_detections(input.frames)) {
+    seen.failure.reset();
+    result = locate_frames(input);
+  }
+  add_remarks(seen, result);
+  // A classifier identifies lamps without the row time: it is no reason why there is no result.
+  if (options.classifier.empty() || result.ok()) {
+    explain_by_row_time(seen.images, input.lamps, make_detector_camera(input.calibration),
+                        images.calibration_file.filename().string(), result);
+  }
+  result.seen = std::move(seen);
+  return result;
+}
+
+LevelRotations redetect_tilted_captures(LocateInput& input, const Redetector& redetect) {
+  return TiltedCaptures(input, redetect).iterate();
 }
 
 }  // namespace vlp

@@ -23,7 +23,7 @@
 #include "session/dispersion_step.h"
 #include "session/evaluate_step.h"
 #include "session/lens_step.h"
-#include "session/locate_images.h"
+#include "session/locate_step.h"
 #include "session/rotation_step.h"
 #include "session/row_time_step.h"
 #include "session/session_file.h"
@@ -526,7 +526,8 @@ class SessionRun {
       const ImageUse use = session_.check() == folder ? ImageUse::places : ImageUse::fixes;
       LocateResult found =
           locate_images(images, use, std::move(input), lamp_options(), observer_.progress);
-      return Work{found, [this, folder, found] { write_fixes(fixes_of(folder), found.rows); }};
+      return Work{found,
+                  [this, folder, rows = found.rows] { write_fixes(fixes_of(folder), rows); }};
     });
   }
 

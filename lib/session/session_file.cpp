@@ -10,7 +10,6 @@
 
 #include "calibration/error_propagation.h"
 #include "calibration/rotation/rotation_fit.h"
-#include "captures/json_bounds.h"
 #include "captures/shared_folder.h"
 #include "evaluation/junit.h"
 #include "geometry/angles.h"

@@ -9,8 +9,8 @@
 #include <memory>
 #include <stdexcept>
 
-#include "detection/boards/aruco_marker.h"
-#include "detection/boards/tag_families.h"
+#include "detection/boards/tag_finder.h"
+#include "detection/boards/tag_pattern.h"
 #include "rig/board_layout.h"
 
 namespace vlp {

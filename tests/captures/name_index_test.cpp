@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "captures/name_index.h"
+#include "captures/csv_reader.h"
 
 #include <gtest/gtest.h>
 

@@ -227,7 +227,7 @@ TEST_F(BoardIntakeOfFolder, ReturnsCachedDetection) {
   EXPECT_EQ(detected.size_px, cached.size_px);
   EXPECT_EQ(detected.board->seen.tags.size(), cached.board->seen.tags.size());
   // The stored figures count, not the image.
-  corner_cache(options.corner_cache, board)
+  CornerCache(options.corner_cache, board)
       .keep(SourceImage(file), {*detected.board, 1.25, 0.9, 0.1});
   EXPECT_EQ(intake.observe(SourceImage(file)).blur_px, 1.25);
   // Limits are no part of the cache.

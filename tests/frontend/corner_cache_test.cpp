@@ -77,7 +77,7 @@ TEST(CornerCache, RestoresFitsForAllToneCurves) {
                 4, {spoilt->corners_px, spoilt->curvatures, spoilt->corner_sds_px}));
   cv::imwrite(folder / "coded.png", coded);
   const SourceImage image(folder / "coded.png");
-  const BoardCache cache = corner_cache(folder / "cache", board);
+  const CornerCache cache(folder / "cache", board);
   cache.keep(image, {view, 0.8, 0.9, 0.05});
   const auto kept = cache.find(image);
   ASSERT_TRUE(kept);

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "frontend/selection.h"
+#include "frontend/observation.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "session/locate_images.h"
+#include "session/locate_step.h"
 
 #include <gmock/gmock.h>
 

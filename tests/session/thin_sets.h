@@ -12,7 +12,7 @@
 
 #include "calibration/intrinsics/projection_difference.h"
 #include "calibration/intrinsics/synthetic_views.h"
-#include "frontend/selection.h"
+#include "frontend/observation.h"
 #include "geometry/polygon.h"
 #include "session/lens_step.h"
 #include "support/observed_view.h"

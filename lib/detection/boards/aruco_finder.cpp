@@ -13,7 +13,6 @@
 #include <map>
 #include <stdexcept>
 
-#include "detection/boards/aruco_marker.h"
 #include "detection/boards/tag_finder.h"
 
 namespace vlp {

@@ -9,7 +9,6 @@
 #include "detection/boards/square_corners.h"
 #include "detection/boards/tag_edges.h"
 #include "detection/boards/tag_finder.h"
-#include "detection/boards/touching_tags.h"
 #include "rig/board_layout.h"
 
 namespace vlp {

@@ -2,8 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <opencv2/core.hpp>
+#include <string>
 #include <vector>
 
 #include "detection/boards/board_detector.h"
@@ -26,5 +28,17 @@ std::unique_ptr<TagFinder> make_apriltag_finder(const Board& board);
 /// the markers of ChArUco boards. Corners are accurate to 1 to 2 px.
 /// @throws std::invalid_argument if OpenCV does not have the family or dictionary
 std::unique_ptr<TagFinder> make_aruco_finder(const Board& board);
+
+/// Marker of one of OpenCV's dictionaries as printed by its ArUco module, without the black border.
+struct ArucoMarker {
+  /// Number of bits along an edge.
+  int width;
+  /// Bits row by row from the top left; true is white.
+  std::vector<bool> white;
+};
+
+/// Returns the marker `id` of a dictionary, named as in Board::family of a ChArUco board.
+/// @throws std::invalid_argument if there is no such dictionary, or no such id in it
+ArucoMarker make_aruco_marker(const std::string& dictionary, int id);
 
 }  // namespace vlp

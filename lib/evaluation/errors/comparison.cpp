@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "captures/name_index.h"
+#include "captures/csv_reader.h"
 #include "captures/number_text.h"
 
 namespace vlp {

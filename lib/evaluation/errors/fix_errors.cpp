@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "captures/name_index.h"
+#include "captures/csv_reader.h"
 #include "evaluation/errors/reference_points.h"
 #include "geometry/angles.h"
 #include "rig/input_error.h"

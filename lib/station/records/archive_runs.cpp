@@ -14,7 +14,6 @@
 #include "captures/csv_reader.h"
 #include "captures/digest.h"
 #include "captures/id.h"
-#include "captures/json_bounds.h"
 #include "captures/shared_folder.h"
 #include "evaluation/gate.h"
 #include "rig/input_error.h"

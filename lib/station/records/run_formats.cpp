@@ -8,7 +8,6 @@
 
 #include "captures/csv_writer.h"
 #include "captures/id.h"
-#include "captures/json_bounds.h"
 #include "captures/number_text.h"
 #include "captures/printable.h"
 #include "captures/shared_folder.h"

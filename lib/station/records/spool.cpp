@@ -10,6 +10,7 @@
 #include <tuple>
 #include <utility>
 
+#include "captures/id.h"
 #include "captures/printable.h"
 #include "captures/shared_folder.h"
 #include "rig/input_error.h"

@@ -9,7 +9,7 @@
 #include <fmt/core.h>
 
 #include "captures/digest.h"
-#include "frontend/images_in_parallel.h"
+#include "frontend/image_source.h"
 #include "rig/input_error.h"
 #include "session/session_folder.h"
 #include "station/unit/station_faults.h"

@@ -10,9 +10,9 @@
 
 #include "frontend/board_intake.h"
 #include "frontend/image_folder.h"
-#include "frontend/images_in_parallel.h"
+#include "frontend/image_source.h"
 #include "frontend/lamp_intake.h"
-#include "frontend/selection.h"
+#include "frontend/observation.h"
 #include "rig/input_error.h"
 #include "session/row_time_step.h"
 #include "session/session_folder.h"

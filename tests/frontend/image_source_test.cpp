@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "frontend/images_in_parallel.h"
+#include "frontend/image_source.h"
 
 #include <gtest/gtest.h>
 

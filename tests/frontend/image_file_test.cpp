@@ -1,12 +1,11 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "frontend/image_header.h"
+#include "frontend/image_file.h"
 
 #include <gmock/gmock.h>
 
 #include <opencv2/imgcodecs.hpp>
 
-#include "frontend/image_file.h"
 #include "rig/input_error.h"
 #include "support/rejection_message.h"
 #include "support/temporary_folder.h"
