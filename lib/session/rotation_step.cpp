@@ -10,8 +10,7 @@
 #include <utility>
 
 #include "calibration/error_propagation.h"
-#include "calibration/rotation/joint_center.h"
-#include "calibration/rotation/rotation_axis.h"
+#include "calibration/rotation/rotation_fit.h"
 #include "geometry/angles.h"
 #include "positioning/known_motion.h"
 #include "report/plots/calibration_plots.h"

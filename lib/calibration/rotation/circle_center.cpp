@@ -11,8 +11,7 @@
 #include <optional>
 #include <utility>
 
-#include "calibration/rotation/fit_parts.h"
-#include "calibration/rotation/joint_center.h"
+#include "calibration/rotation/rotation_fit.h"
 #include "geometry/median.h"
 #include "geometry/robust_scatter.h"
 #include "geometry/symmetric.h"

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calibration/rotation/robust_fit.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -33,8 +34,7 @@ void RobustFit::add(std::unique_ptr<ceres::CostFunction> cost, std::vector<doubl
   used_.push_back(true);
 }
 
-std::unique_ptr<ceres::Problem> RobustFit::problem(double loss_width,
-                                                   const ParameterMap& places) const {
+std::unique_ptr<ceres::Problem> RobustFit::problem(double loss_width) const {
   ceres::Problem::Options options;
   options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
   auto problem = std::make_unique<ceres::Problem>(options);
@@ -42,31 +42,14 @@ std::unique_ptr<ceres::Problem> RobustFit::problem(double loss_width,
   ceres::LossFunction* loss = loss_width > 0 ? new ceres::CauchyLoss(loss_width) : nullptr;
   for (std::size_t i = 0; i < blocks_.size(); ++i) {
     if (!used_[i]) continue;
-    std::vector<double*> parameters = blocks_[i].parameters;
-    for (double*& parameter : parameters) parameter = places.address_of(parameter);
-    problem->AddResidualBlock(blocks_[i].cost.get(), loss, parameters);
+    problem->AddResidualBlock(blocks_[i].cost.get(), loss, blocks_[i].parameters);
   }
   for (const auto& candidates : fixed_) {
-    const auto first =
-        std::find_if(candidates.begin(), candidates.end(), [&](const double* parameter) {
-          return problem->HasParameterBlock(places.address_of(parameter));
-        });
-    if (first != candidates.end()) problem->SetParameterBlockConstant(places.address_of(*first));
+    const auto first = std::ranges::find_if(
+        candidates, [&](const double* parameter) { return problem->HasParameterBlock(parameter); });
+    if (first != candidates.end()) problem->SetParameterBlockConstant(*first);
   }
   return problem;
-}
-
-RobustFit::ParameterMap RobustFit::copy_parameters() const {
-  ParameterMap places;
-  for (std::size_t i = 0; i < blocks_.size(); ++i) {
-    const auto& sizes = blocks_[i].cost->parameter_block_sizes();
-    for (std::size_t j = 0; used_[i] && j < sizes.size(); ++j) {
-      const double* parameter = blocks_[i].parameters[j];
-      if (!places.begins.emplace(parameter, places.values.size()).second) continue;
-      places.values.insert(places.values.end(), parameter, parameter + sizes[j]);
-    }
-  }
-  return places;
 }
 
 bool RobustFit::minimize(double loss_width) {
@@ -129,76 +112,61 @@ bool RobustFit::refine() {
   return true;
 }
 
-std::vector<std::size_t> RobustFit::outliers() const {
-  std::vector<std::size_t> rejected;
-  for (std::size_t i = 0; i < used_.size(); ++i) {
-    if (!used_[i]) rejected.push_back(i);
-  }
-  return rejected;
-}
-
 int RobustFit::degrees_of_freedom() const {
   const auto all = problem(0);
   return all->NumResiduals() - free_parameters(*all);
 }
 
-std::vector<RobustFit::Jacobians> RobustFit::jacobians() const {
-  std::vector<Jacobians> all;
+std::optional<RobustFit::Linearization> RobustFit::linearize() const {
+  Linearization at;
+  const int redundancy = degrees_of_freedom();
+  if (redundancy <= 0) return std::nullopt;
+  Eigen::Index num_unknowns = 0;
+  double squares = 0;
   for (std::size_t i = 0; i < blocks_.size(); ++i) {
     if (!used_[i]) continue;
-    Jacobians at{i, blocks_[i].parameters, {}};
-    for (const int size : blocks_[i].cost->parameter_block_sizes())
-      at.d_residual_d_parameter.emplace_back(2, size);
+    squares += lengths_[i] * lengths_[i];
+    const auto& [cost, parameters] = blocks_[i];
+    std::vector<Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor>> jacobians;
     std::vector<double*> data;
-    for (auto& by : at.d_residual_d_parameter) data.push_back(by.data());
-    Eigen::Vector2d residual;
-    blocks_[i].cost->Evaluate(at.parameters.data(), residual.data(), data.data());
-    all.push_back(std::move(at));
-  }
-  return all;
-}
-
-std::vector<const double*> RobustFit::fixed_parameters() const {
-  const auto all = problem(0);
-  std::vector<double*> parameters;
-  all->GetParameterBlocks(&parameters);
-  std::vector<const double*> fixed_parameters;
-  for (const double* parameter : parameters) {
-    if (all->IsParameterBlockConstant(parameter)) fixed_parameters.push_back(parameter);
-  }
-  return fixed_parameters;
-}
-
-std::optional<Matrix2> RobustFit::covariance(const double* parameter, const double* other) const {
-  // Ceres orders the parameters by their addresses, and rounding depends on that order.
-  const ParameterMap places = copy_parameters();
-  parameter = places.address_of(parameter);
-  other = places.address_of(other);
-  const auto all = problem(0, places);
-  for (const double* wanted : {parameter, other}) {
-    if (!all->HasParameterBlock(wanted) || all->IsParameterBlockConstant(wanted)) {
-      return std::nullopt;
+    auto& residual = at.residuals.emplace_back(Linearization::Residual{i, {}, {}});
+    for (std::size_t k = 0; k < parameters.size(); ++k) {
+      const int size = cost->parameter_block_sizes()[k];
+      const auto [entry, is_new] = at.first_unknown.emplace(parameters[k], num_unknowns);
+      if (is_new) num_unknowns += size;
+      for (int j = 0; j < size; ++j) residual.unknowns.push_back(entry->second + j);
+      data.push_back(jacobians.emplace_back(2, size).data());
+    }
+    Eigen::Vector2d value;
+    cost->Evaluate(parameters.data(), value.data(), data.data());
+    residual.jacobian.resize(2, std::ssize(residual.unknowns));
+    for (Eigen::Index column = 0; const auto& jacobian : jacobians) {
+      residual.jacobian.middleCols(column, jacobian.cols()) = jacobian;
+      column += jacobian.cols();
     }
   }
-  const int redundancy = all->NumResiduals() - free_parameters(*all);
-  if (redundancy <= 0) return std::nullopt;
-  double squares = 0;
-  for (std::size_t i = 0; i < lengths_.size(); ++i) {
-    if (used_[i]) squares += lengths_[i] * lengths_[i];
+  at.variance = squares / redundancy;
+  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(num_unknowns, num_unknowns);
+  for (const auto& [index, unknowns, jacobian] : at.residuals) {
+    normal(unknowns, unknowns) += jacobian.transpose() * jacobian;
   }
-  ceres::Covariance::Options options;
-  options.algorithm_type = ceres::SPARSE_QR;
-  options.sparse_linear_algebra_library_type = ceres::EIGEN_SPARSE;  // SuiteSparse uses threads
-  options.num_threads = 1;
-  ceres::Covariance inverse(options);
-  Eigen::Matrix<double, 2, 2, Eigen::RowMajor> block;
-  const std::vector<std::pair<const double*, const double*>> wanted{{parameter, other}};
-  if (!inverse.Compute(wanted, all.get()) ||
-      !inverse.GetCovarianceBlock(parameter, other, block.data())) {
-    return std::nullopt;
+  // A fixed unknown is replaced by one that nothing depends on.
+  const auto all = problem(0);
+  Eigen::VectorXd is_free = Eigen::VectorXd::Ones(num_unknowns);
+  for (const auto& [parameter, first] : at.first_unknown) {
+    if (!all->IsParameterBlockConstant(parameter)) continue;
+    is_free.segment(first, all->ParameterBlockSize(parameter)).setZero();
   }
-  if (parameter == other) block = 0.5 * (block + block.transpose()).eval();
-  return Matrix2(block * (squares / redundancy));
+  normal = (is_free.asDiagonal() * normal * is_free.asDiagonal()).eval();
+  normal.diagonal() += Eigen::VectorXd::Ones(num_unknowns) - is_free;
+  const Eigen::VectorXd scale = normal.diagonal().cwiseSqrt().cwiseInverse();
+  const Eigen::LLT<Eigen::MatrixXd> factor(scale.asDiagonal() * normal * scale.asDiagonal());
+  constexpr double rounding = 1e-14;
+  if (factor.info() != Eigen::Success || !(factor.rcond() > rounding)) return std::nullopt;
+  at.inverse = factor.solve(Eigen::MatrixXd((scale.cwiseProduct(is_free)).asDiagonal()));
+  at.inverse = (scale.asDiagonal() * at.inverse).eval();
+  at.inverse = 0.5 * (at.inverse + at.inverse.transpose()).eval();
+  return at;
 }
 
 }  // namespace vlp

@@ -44,51 +44,46 @@ class RobustFit {
   /// Repeats the final fit without outliers, from the current parameters. Returns false if Ceres
   /// finds no usable solution.
   bool refine();
-  /// Returns the indices of the rejected residuals, in the order of add().
-  std::vector<std::size_t> outliers() const;
+  /// Returns false for each rejected residual, in the order of add().
+  const std::vector<bool>& used() const { return used_; }
   /// Returns the norm of each residual, including outliers, in the order of add().
   const std::vector<double>& lengths() const { return lengths_; }
   /// Returns the number of rows of the used residuals minus the number of free parameters.
   int degrees_of_freedom() const;
-  /// Derivatives of a used residual with respect to each of its parameters, including fixed ones,
-  /// in the order of add().
-  struct Jacobians {
-    std::size_t residual;
-    std::vector<double*> parameters;
-    std::vector<Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor>> d_residual_d_parameter;
+
+  /// Used residuals and unknowns at the solution.
+  struct Linearization {
+    /// Used residual: its index in the order of add(), and its derivatives with respect to
+    /// `unknowns`, including fixed ones.
+    struct Residual {
+      std::size_t index;
+      std::vector<Eigen::Index> unknowns;
+      Eigen::Matrix2Xd jacobian;
+    };
+    std::vector<Residual> residuals;
+    /// Index of the first unknown of each parameter, in the order in which residuals refer to them.
+    std::map<const double*, Eigen::Index> first_unknown;
+    /// (J^T J)^-1; zero for fixed unknowns.
+    Eigen::MatrixXd inverse;
+    /// Variance of the residuals found.
+    double variance;
+
+    /// Returns the covariance s^2 (J^T J)^-1 of two parameters of size two. Its rows belong to
+    /// `parameter`.
+    Matrix2 covariance(const double* parameter, const double* other) const {
+      return variance * inverse.block<2, 2>(first_unknown.at(parameter), first_unknown.at(other));
+    }
   };
-  /// Returns the derivatives of all used residuals.
-  std::vector<Jacobians> jacobians() const;
-  /// Returns the parameters of used residuals that the last fit kept fixed.
-  std::vector<const double*> fixed_parameters() const;
-  /// Returns the block of s^2 (J^T J)^-1 of two parameter blocks of size two. Its rows belong to
-  /// `parameter`; s^2 is the variance of the residuals found. Returns std::nullopt if there are no
-  /// more residual rows than parameters, if a block is fixed or unused, or if the residuals do not
-  /// determine it.
-  std::optional<Matrix2> covariance(const double* parameter, const double* other) const;
-  std::optional<Matrix2> covariance(const double* parameter) const {
-    return covariance(parameter, parameter);
-  }
+  /// Linearizes the used residuals. Returns std::nullopt if there are no more residual rows than
+  /// parameters, or if the residuals do not determine the parameters.
+  std::optional<Linearization> linearize() const;
 
  private:
   struct Block {
     std::unique_ptr<ceres::CostFunction> cost;
     std::vector<double*> parameters;
   };
-  /// Addresses of the parameters for Ceres: copies of those in `begins`, the original otherwise.
-  struct ParameterMap {
-    mutable std::vector<double> values;
-    std::map<const double*, std::size_t> begins;
-
-    template <typename Number>
-    Number* address_of(Number* parameter) const {
-      const auto begin = begins.find(parameter);
-      return begin == begins.end() ? parameter : &values[begin->second];
-    }
-  };
-  /// Returns copies of the used parameters, in the order in which residuals refer to them.
-  ParameterMap copy_parameters() const;
-  std::unique_ptr<ceres::Problem> problem(double loss_width, const ParameterMap& places = {}) const;
+  std::unique_ptr<ceres::Problem> problem(double loss_width) const;
   bool minimize(double loss_width);
   void update_lengths();
   /// Estimates the variance of the used residuals per axis from their median. Never returns less

@@ -9,7 +9,6 @@
 #include <utility>
 #include <vector>
 
-#include "calibration/rotation/joint_center.h"
 #include "calibration/rotation/spot.h"
 #include "geometry/angles.h"
 #include "support/matchers.h"

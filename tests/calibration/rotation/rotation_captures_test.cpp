@@ -6,7 +6,7 @@
 
 #include <cmath>
 
-#include "calibration/rotation/rotation_axis.h"
+#include "calibration/rotation/rotation_fit.h"
 #include "calibration/rotation/spot.h"
 #include "geometry/angles.h"
 #include "support/matchers.h"

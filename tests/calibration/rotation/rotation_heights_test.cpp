@@ -4,7 +4,7 @@
 /// arm.
 #include <gmock/gmock.h>
 
-#include "calibration/rotation/rotation_axis.h"
+#include "calibration/rotation/rotation_fit.h"
 #include "calibration/rotation/spot.h"
 #include "geometry/angles.h"
 #include "positioning/positioner.h"

@@ -9,9 +9,8 @@
 #include <string>
 
 #include "calibration/rotation/circle_center.h"
-#include "calibration/rotation/joint_center.h"
 #include "calibration/rotation/planar_scatter.h"
-#include "calibration/rotation/rotation_axis.h"
+#include "calibration/rotation/rotation_fit.h"
 #include "calibration/rotation/spot.h"
 #include "geometry/angles.h"
 #include "support/matchers.h"

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "calibration/rotation/rotation_axis.h"
+#include "calibration/rotation/rotation_fit.h"
 #include "captures/detections_table.h"
 #include "support/synthetic_rig.h"
 

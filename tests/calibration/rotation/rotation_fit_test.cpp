@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "calibration/rotation/rotation_axis.h"
+#include "calibration/rotation/rotation_fit.h"
 
 #include <gmock/gmock.h>
 
