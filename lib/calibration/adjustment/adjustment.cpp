@@ -242,7 +242,7 @@ std::vector<double> compute_residual_norms(const AdjustmentProblem& problem) {
   const auto lens = problem.lens();
   for (const auto& sighting : problem.sightings) {
     const auto at = lens ? problem.linearize(sighting, *lens) : std::nullopt;
-    lengths.push_back(at ? at->residual.norm() : kInfinite);
+    lengths.push_back(at ? at->value.norm() : kInfinite);
   }
   return lengths;
 }
@@ -403,76 +403,31 @@ class Contradictions {
   bool has_contradicting_majority_ = false;
 };
 
-/// Noise of the detections.
-struct Noise {
-  /// Square root of the variance factor: RMS whitened residual.
-  double ratio;
-  /// Degrees of freedom.
-  double freedom;
-};
-
-/// Estimates the noise of the detections. Their degrees of freedom are the number of their
-/// coordinates minus the trace of their hat matrix. The trace is the number of unknowns minus the
-/// fraction of each that priors determine. The detections determine 1 - sd_after^2 / sd_prior^2 of
-/// an unknown.
-Noise estimate_noise(const AssembledProblem& all,
-                     const AdjustmentProblem::GlobalCovariance& global) {
-  const Eigen::MatrixXd& covariance = global.matrix;
-  const AdjustmentProblem& problem = all.problem;
-  const AdjustmentLayout& at = problem.layout();
+/// Returns the square root of the variance factor of the detections: their RMS whitened residual.
+double compute_noise_ratio(const AdjustmentProblem& problem, double degrees_of_freedom) {
   const std::vector<double> lengths = compute_residual_norms(problem);
-  double squares = 0, freedom = 0;
-  std::vector<Eigen::Index> used(problem.captures.size()), place_rows(problem.captures.size());
-  std::vector<bool> lamp_used(problem.lamps.size());
+  double squares = 0;
   for (std::size_t i = 0; i < lengths.size(); ++i) {
-    if (!problem.sightings[i].used) continue;
-    squares += lengths[i] * lengths[i];
-    freedom += 2;
-    ++used[problem.sightings[i].capture];
-    lamp_used[problem.sightings[i].lamp] = true;
+    if (problem.sightings[i].used) squares += lengths[i] * lengths[i];
   }
-  for (const auto& place : problem.places) {
-    if (problem.place_used[place.place]) place_rows[place.capture] += place.size;
-  }
-  std::vector<bool> spot_used(static_cast<std::size_t>(at.global - at.spots) / 3);
-  for (std::size_t k = 0; k < used.size(); ++k) {
-    if (used[k] == 0) continue;
-    const auto& spot = problem.captures[k].spot;
-    freedom -=
-        static_cast<double>(std::min<Eigen::Index>(spot ? 1 : 4, 2 * used[k] + place_rows[k]));
-    freedom -= problem.count_determined_motion(k);
-    if (spot) spot_used[*spot] = true;
-  }
-  freedom -= static_cast<double>(at.lens_size) -
-             covariance.block(at.lens, at.lens, at.lens_size, at.lens_size).trace();
-  freedom -= problem.has_lever_arm ? 4 : 2;
-  for (std::size_t i = 0; i < lamp_used.size(); ++i) {
-    const double sd_m = problem.lamps[i].sd_m;
-    if (!lamp_used[i] || !(sd_m > 0)) continue;
-    freedom -= 3 - covariance.block<3, 3>(at.lamp(i), at.lamp(i)).trace() / (sd_m * sd_m);
-  }
-  freedom -= 3.0 * static_cast<double>(std::count(spot_used.begin(), spot_used.end(), true));
-  freedom += static_cast<double>(problem.gauge.cols());
-  freedom += global.determined_by_places;
-  return {std::sqrt(squares / std::max(freedom, 1.0)), freedom};
+  return std::sqrt(squares / std::max(degrees_of_freedom, 1.0));
 }
 
 /// Solves until the sets of used detections, lamps and known positions and the noise are unchanged,
-/// at most 40 times. Returns false if a solution fails.
-bool refine(AssembledProblem& all, Contradictions& contradictions, Eigen::MatrixXd& covariance,
-            double& freedom) {
+/// at most 40 times. Returns std::nullopt if a solution fails.
+std::optional<AdjustmentProblem::GlobalCovariance> refine(AssembledProblem& all,
+                                                          Contradictions& contradictions) {
   AdjustmentProblem& problem = all.problem;
   constexpr int max_iterations = 40;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
-    if (!problem.solve(false)) return false;
-    const auto global = problem.global_covariance();
-    covariance = global.matrix;
-    const Noise noise = estimate_noise(all, global);
-    freedom = noise.freedom;
-    bool changed = update_inliers(problem, all.noise_is_stated, freedom);
-    if (!changed) changed = contradictions.refine(covariance);
-    if (noise.freedom > 0) {
-      const double scale = problem.noise_scale * noise.ratio;
+    if (!problem.solve(false)) return std::nullopt;
+    const auto found = problem.global_covariance();
+    const double ratio = compute_noise_ratio(problem, found.freedom);
+    bool changed = update_inliers(problem, all.noise_is_stated, found.freedom);
+    if (!changed) changed = contradictions.refine(found.matrix);
+    constexpr double rounding = 1e-6;
+    if (found.freedom > rounding) {
+      const double scale = problem.noise_scale * ratio;
       const double next = std::max(scale, all.noise_is_stated ? 1 : kMinNoise_px);
       constexpr double tolerance = 0.01;
       if (std::abs(next / problem.noise_scale - 1) > tolerance) {
@@ -480,11 +435,10 @@ bool refine(AssembledProblem& all, Contradictions& contradictions, Eigen::Matrix
         changed = true;
       }
     }
-    if (!changed) return true;
+    if (!changed) return found;
   }
-  if (!problem.solve(false)) return false;
-  covariance = problem.global_covariance().matrix;
-  return true;
+  if (!problem.solve(false)) return std::nullopt;
+  return problem.global_covariance();
 }
 
 /// Returns the covariance for equal noise in the image, and estimates that noise. The estimates
@@ -494,8 +448,8 @@ Eigen::MatrixXd compute_covariance_for_image_noise(AssembledProblem& all) {
   for (auto& sighting : problem.sightings) {
     sighting.whitening = Eigen::Matrix2d::Identity() / sighting.sigma_px;
   }
-  const Noise noise = estimate_noise(all, problem.global_covariance());
-  problem.noise_scale = std::max(problem.noise_scale * noise.ratio, kMinNoise_px);
+  const double ratio = compute_noise_ratio(problem, problem.global_covariance().freedom);
+  problem.noise_scale = std::max(problem.noise_scale * ratio, kMinNoise_px);
   return problem.global_covariance().matrix;
 }
 
@@ -521,37 +475,30 @@ std::string explain_undetermined(const AdjustmentProblem& problem,
          "captures that see more lamps at other yaws";
 }
 
-/// Covariance of the unknowns after convergence, and the degrees of freedom of the detections.
-struct AdjustedState {
-  Eigen::MatrixXd covariance;
-  double freedom = 0;
-};
-
 /// Moves the problem to its robust solution and rejects everything far from it. Returns false if
 /// the solution fails.
 bool solve_robustly(AssembledProblem& all, Contradictions& contradictions) {
   AdjustmentProblem& problem = all.problem;
   if (!problem.solve(true) || !problem.solve(true)) return false;
   contradictions.reject_far_observations();
-  const Noise noise = estimate_noise(all, problem.global_covariance());
-  update_inliers(problem, all.noise_is_stated, noise.freedom);
+  update_inliers(problem, all.noise_is_stated, problem.global_covariance().freedom);
   return true;
 }
 
 /// Solves the problem, starting with a robust solution unless the captures are checked. Returns
 /// std::nullopt if it does not converge.
-std::optional<AdjustedState> solve_all(const AdjustmentInput& input, AssembledProblem& all,
-                                       Contradictions& contradictions) {
+std::optional<AdjustmentProblem::GlobalCovariance> solve_all(const AdjustmentInput& input,
+                                                             AssembledProblem& all,
+                                                             Contradictions& contradictions) {
   // A misidentified lamp may be at a point that the lens cannot project.
   const std::vector<double> initial_norms = compute_residual_norms(all.problem);
   for (std::size_t i = 0; i < initial_norms.size(); ++i) {
     all.problem.sightings[i].used = initial_norms[i] < kInfinite;
   }
-  AdjustedState adjusted;
   if (!input.captures_are_checked && !solve_robustly(all, contradictions)) return std::nullopt;
-  if (!refine(all, contradictions, adjusted.covariance, adjusted.freedom)) return std::nullopt;
-  if (input.weighs_in_undistorted_image && !all.noise_is_stated) {
-    adjusted.covariance = compute_covariance_for_image_noise(all);
+  auto adjusted = refine(all, contradictions);
+  if (adjusted && input.weighs_in_undistorted_image && !all.noise_is_stated) {
+    adjusted->matrix = compute_covariance_for_image_noise(all);
   }
   return adjusted;
 }
@@ -762,7 +709,7 @@ AdjustmentResult adjust_captures(const AdjustmentInput& input, const AdjustmentL
         "the calibration this camera's?";
     return result;
   }
-  const Eigen::MatrixXd& covariance = adjusted->covariance;
+  const Eigen::MatrixXd& covariance = adjusted->matrix;
   set_detections(problem, all.noise_is_stated, adjusted->freedom, result);
   bool has_lever_arm = false;
   result.undetermined =

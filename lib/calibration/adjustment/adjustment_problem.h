@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -41,6 +42,17 @@ struct LensParametrization {
   Eigen::MatrixXd directions;
 
   LensParametrization(const Camera& camera, const std::optional<MatrixX>& covariance);
+};
+
+/// Whitened residual with its derivatives with respect to blocks of the state.
+struct AdjustmentResidual {
+  Eigen::VectorXd value;
+  struct Part {
+    /// Index of the first unknown of the block.
+    Eigen::Index first;
+    Eigen::MatrixXd jacobian;
+  };
+  std::vector<Part> parts;
 };
 
 /// Unknowns, observations and priors of an adjustment.
@@ -123,33 +135,12 @@ class AdjustmentProblem {
   /// or not finite.
   bool solve(bool robust);
 
-  /// Whitened residual of an observation, measured minus predicted, and its derivatives with
-  /// respect to the global unknowns and to the local ones of the capture.
-  struct Linearized {
-    Eigen::Vector2d residual;
-    Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::ColMajor, 2, 16> jacobian_wrt_lens;
-    Eigen::Matrix2d jacobian_wrt_zenith, jacobian_wrt_lever_arm;
-    Eigen::Matrix<double, 2, 3> jacobian_wrt_lamp, jacobian_wrt_spot;
-    Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::ColMajor, 2, 7> jacobian_wrt_local;
-  };
-  /// Linearizes an observation at the current state. Returns std::nullopt if the lens cannot
-  /// project the point.
-  std::optional<Linearized> linearize(const Sighting& sighting, const Lens& lens) const;
+  /// Linearizes an observation at the current state, measured minus predicted. Returns std::nullopt
+  /// if the lens cannot project the point.
+  std::optional<AdjustmentResidual> linearize(const Sighting& sighting, const Lens& lens) const;
 
   /// Returns the position of the camera (or of the axis) in the capture, from the current state.
   Eigen::Vector3d predict_position(const PlaceObservation& place) const;
-
-  /// Prior of the motion unknowns of a capture, one entry for each that is not known exactly.
-  /// `deviations` are (state - prior mean) / sd, `weights` are 1 / sd.
-  struct MotionPrior {
-    Eigen::VectorXd deviations, weights;
-  };
-  /// Returns the prior residuals of the motion of a capture.
-  MotionPrior motion_prior(const Capture& capture) const;
-
-  /// Returns the number of motion unknowns of a capture that its observations determine: the sum of
-  /// 1 - (posterior variance / prior variance).
-  double count_determined_motion(std::size_t capture) const;
 
   /// Returns the lens of the current state; std::nullopt if its intrinsics are invalid.
   std::optional<Lens> lens() const;
@@ -160,9 +151,9 @@ class AdjustmentProblem {
     /// Covariance of the global unknowns, zero for exact ones. Unknowns without any residual have
     /// the standard deviation of a guess: 1 rad, 10 m.
     Eigen::MatrixXd matrix;
-    /// Number of unknowns that known positions determine: the sum of tr(C) / sd^2 over the
-    /// positions that are used. C is the covariance of the adjusted position.
-    double determined_by_places;
+    /// Degrees of freedom of the detections that are used: the number of their coordinates minus
+    /// the trace of their hat matrix.
+    double freedom;
   };
   /// Computes the covariance of the global unknowns at the current state, after marginalization of
   /// the local ones.
@@ -171,7 +162,25 @@ class AdjustmentProblem {
   const LensParametrization& freedom() const { return freedom_; }
 
  private:
-  friend struct AdjustmentCosts;
+  /// Residual of the least-squares problem: a detection, another observation, or a prior.
+  struct Term {
+    std::function<std::optional<AdjustmentResidual>()> linearize;
+    /// True if the robust solution limits its influence.
+    bool has_loss = false;
+    bool is_detection = false;
+    /// Capture on whose local unknowns it depends.
+    std::optional<std::size_t> capture = {};
+  };
+  /// Returns all terms, those of the detections first. They refer to this object and to `lens`, the
+  /// lens of the current state.
+  std::vector<Term> make_terms(const std::optional<Lens>& lens) const;
+  AdjustmentResidual linearize(const PlaceObservation& place) const;
+  AdjustmentResidual linearize_motion(const Capture& capture) const;
+  AdjustmentResidual linearize_gauge() const;
+  /// Returns true if the block of the state is a lamp with an exact position.
+  bool is_exact(Eigen::Index first) const;
+  /// Returns the information of the global unknowns without a prior, for a guess.
+  Eigen::MatrixXd guess_information() const;
 
   LensModel model_;
   LensParametrization freedom_;

@@ -310,24 +310,19 @@ TEST_F(AdjustmentDerivatives, LinearizeMatchesFiniteDifferences) {
       const AdjustmentProblem::Sighting sighting{
           capture, lamp, {400, 300}, 0.5, Eigen::Matrix2d::Identity() / 0.5, 0.012};
       const auto residual = [&] {
-        return problem.linearize(sighting, problem.lens().value()).value().residual;
+        return problem.linearize(sighting, problem.lens().value()).value().value;
       };
       const auto found = problem.linearize(sighting, problem.lens().value());
       ASSERT_TRUE(found);
-      const auto expect = [&](const Eigen::MatrixXd& derivative, Eigen::Index first) {
-        const Eigen::MatrixXd expected = differences(first, derivative.cols(), residual);
-        EXPECT_THAT(derivative, IsNear(expected, 1e-6 * (1 + expected.cwiseAbs().maxCoeff())));
-      };
-      expect(found->jacobian_wrt_lens, at.lens);
-      expect(found->jacobian_wrt_zenith, at.zenith);
-      expect(found->jacobian_wrt_lamp, at.lamp(lamp));
       const Eigen::Index local = problem.captures[capture].local;
-      if (capture == 0) {
-        expect(found->jacobian_wrt_lever_arm, at.lever_arm);
-        expect(found->jacobian_wrt_spot, at.spot(0));
-        expect(found->jacobian_wrt_local.leftCols(2), local);
-      } else {
-        expect(found->jacobian_wrt_local, local);
+      std::vector<Eigen::Index> blocks{local, at.zenith, at.lamp(lamp), at.lens};
+      if (capture == 0) blocks.insert(blocks.begin() + 1, {at.spot(0), at.lever_arm});
+      ASSERT_EQ(found->parts.size(), blocks.size());
+      for (std::size_t i = 0; i < blocks.size(); ++i) {
+        const auto& [first, jacobian] = found->parts[i];
+        EXPECT_EQ(first, blocks[i]);
+        const Eigen::MatrixXd expected = differences(first, jacobian.cols(), residual);
+        EXPECT_THAT(jacobian, IsNear(expected, 1e-6 * (1 + expected.cwiseAbs().maxCoeff())));
       }
     }
   }
