@@ -8,7 +8,6 @@
 #include <numeric>
 #include <utility>
 
-#include "calibration/adjustment/adjustment.h"
 #include "captures/number_text.h"
 #include "geometry/angles.h"
 #include "rig/find_lamp.h"
@@ -212,15 +211,6 @@ AdjustmentResult adjust_iteratively(const std::vector<AdjustmentCapture>& captur
   return found;
 }
 
-void store_lamps(TiltCalibration& result, const AdjustmentResult& found) {
-  for (const auto& [id, correction_m, sd_m, moved] : found.lamps) {
-    result.corrections.push_back({id, correction_m, sd_m});
-  }
-  for (std::size_t i = 0; i < found.refined.lamps.size(); ++i) {
-    result.map.lamps[i].position_m = found.refined.lamps[i].position_m;
-  }
-}
-
 }  // namespace
 
 TiltCalibration estimate_tilt_from_lamps(std::span<const Frame> frames, const LampMap& map,
@@ -243,7 +233,12 @@ TiltCalibration estimate_tilt_from_lamps(std::span<const Frame> frames, const La
   if (all_have_sigma(frames)) result.noise_scale = found.noise_scale;
   result.center = found.center;
   result.residual_px = found.residual_px;
-  if (options.refine_map) store_lamps(result, found);
+  if (options.refine_map) {
+    result.corrections = found.lamps;
+    for (std::size_t i = 0; i < map.lamps.size(); ++i) {
+      result.map.lamps[i].position_m = found.refined.lamps[i].position_m;
+    }
+  }
   result.undetermined = explain_uncertainty(result, camera.focal_px(), options);
   return result;
 }

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "calibration/adjustment/adjustment.h"
 #include "captures/detections_table.h"
 #include "positioning/positioner.h"
 #include "rig/calibration.h"
@@ -43,13 +44,8 @@ struct TiltCalibration {
   RotationCenter center;
   /// Lamp map with the corrections; unchanged without `refine_map`.
   LampMap map;
-  /// Correction of one lamp and its standard deviation.
-  struct LampCorrection {
-    int id;
-    Eigen::Vector3d correction_m, sd_m;
-  };
   /// Corrections of the detected lamps, with `refine_map` only.
-  std::vector<LampCorrection> corrections;
+  std::vector<AdjustmentResult::LampCorrection> corrections;
 
   /// Number of captures that are used, that contain fewer than three lamps of the map, and that are
   /// rejected because they contradict the map or the other captures.

@@ -41,7 +41,7 @@ void report(const TiltCalibration& result, const Camera& camera) {
       result.residual_before_px);
   if (result.corrections.empty()) return;
   print_corrections_header();
-  for (const auto& [id, correction_m, sd_m] : result.corrections) {
+  for (const auto& [id, correction_m, sd_m, moved] : result.corrections) {
     print_correction(id, correction_m, sd_m);
   }
 }
