@@ -4,10 +4,8 @@
 
 #include <algorithm>
 
-#include "calibration/dispersion/chen_guan_offset.h"
 #include "calibration/dispersion/offset_separation.h"
 #include "calibration/dispersion/reference_point_fixes.h"
-#include "calibration/dispersion/reference_point_statistics.h"
 
 namespace vlp {
 

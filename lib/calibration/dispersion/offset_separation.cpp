@@ -8,9 +8,13 @@
 #include <cmath>
 #include <utility>
 
+#include "geometry/enclosing_circle.h"
+#include "geometry/plane.h"
 #include "geometry/robust_scatter.h"
+#include "geometry/symmetric.h"
 
 namespace vlp {
+
 namespace {
 
 using Fixes = std::vector<std::optional<ReferencePointFixes::Estimate>>;
@@ -169,6 +173,157 @@ std::optional<OffsetSeparation> separate_camera_and_world_offsets(
   }
   result.by_lamps = propagate_map(fixes, result);
   return result;
+}
+
+namespace {
+
+std::vector<Eigen::Vector2d> compute_errors(const ReferencePointFixes& station,
+                                            const Eigen::Vector2d& offset_px,
+                                            const std::vector<bool>& used) {
+  const OptionalFixes fixes = station.at(offset_px);
+  std::vector<Eigen::Vector2d> errors_m;
+  for (std::size_t i = 0; i < fixes.size(); ++i) {
+    if (fixes[i] && used[i]) errors_m.push_back(fixes[i]->error_m);
+  }
+  return errors_m;
+}
+
+Eigen::Vector2d compute_mean_point(const std::vector<Eigen::Vector2d>& points) {
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  for (const auto& point : points) sum += point;
+  return sum / static_cast<double>(points.size());
+}
+
+/// Differentiates the mean fix with respect to the offset, numerically. The result is not finite if
+/// there is no fix.
+Eigen::Matrix2d differentiate_mean_fix(const ReferencePointFixes& station,
+                                       const Eigen::Vector2d& at_px,
+                                       const std::vector<bool>& used) {
+  constexpr double step_px =
+      0.25;  // fixes are smooth over this step, which is far above their rounding
+  Eigen::Matrix2d derivative;
+  for (Eigen::Index axis = 0; axis < 2; ++axis) {
+    const Eigen::Vector2d step = step_px * Eigen::Vector2d::Unit(axis);
+    derivative.col(axis) = (compute_mean_point(compute_errors(station, at_px + step, used)) -
+                            compute_mean_point(compute_errors(station, at_px - step, used))) /
+                           (2 * step_px);
+  }
+  return derivative;
+}
+
+/// Returns the mean noise covariance of the fixes, in m^2. Returns zero if neither sigma_px nor
+/// residuals determine the noise.
+Eigen::Matrix2d compute_mean_noise(const OptionalFixes& fixes, const std::vector<bool>& used,
+                                   bool noise_is_stated) {
+  Eigen::Matrix2d sum = Eigen::Matrix2d::Zero();
+  double count = 0, squares_px2 = 0, freedom = 0;
+  for (std::size_t i = 0; i < fixes.size(); ++i) {
+    if (!fixes[i] || !used[i]) continue;
+    sum += fixes[i]->covariance;
+    squares_px2 += fixes[i]->squared_residuals_px2;
+    freedom += fixes[i]->degrees_of_freedom;
+    ++count;
+  }
+  const double variance_px2 = noise_is_stated ? 1 : freedom > 0 ? squares_px2 / freedom : 0;
+  return sum * (variance_px2 / count);
+}
+
+/// Estimates the covariance of the mean of n errors from their scatter and their noise.
+///
+/// Few errors do not determine a covariance: two errors give one of rank 1. The sample covariance
+/// therefore has weight n - 1 and its isotropic mean has isotropic_weight.
+/// compute_variance_factor() scales the variance along each axis of the result, in coordinates in
+/// which the noise is the unit matrix.
+Eigen::Matrix2d estimate_covariance_of_mean(const std::vector<Eigen::Vector2d>& errors,
+                                            const Eigen::Matrix2d& noise) {
+  constexpr double isotropic_weight = 2;  // as three errors
+  const Eigen::Vector2d mean = compute_mean_point(errors);
+  Eigen::Matrix2d squares = Eigen::Matrix2d::Zero();
+  for (const auto& error : errors) squares += (error - mean) * (error - mean).transpose();
+  const double n = static_cast<double>(errors.size());
+  const double isotropic = squares.trace() / (2 * (n - 1));
+  const double freedom = 2 * n - 2;
+  const Eigen::Matrix2d scatter =
+      (squares + isotropic_weight * isotropic * Eigen::Matrix2d::Identity()) /
+      (n - 1 + isotropic_weight);
+  const Eigen::LLT<Eigen::Matrix2d> root(noise);
+  if (root.info() != Eigen::Success)
+    return compute_variance_factor(1, freedom, false) * scatter / n;
+  const Eigen::Matrix2d l = root.matrixL(), l_inverse = l.inverse();
+  auto [values, axes] =
+      decompose_symmetric(Eigen::Matrix2d(l_inverse * scatter * l_inverse.transpose()));
+  const double ratio = (l_inverse * squares * l_inverse.transpose()).trace() / freedom;
+  for (double& value : values) value = compute_variance_factor(value, freedom, true, ratio);
+  return l * axes * values.asDiagonal() * axes.transpose() * l.transpose() / n;
+}
+
+/// Computes the derivatives of the offset with respect to the positions of the lamps. The offset
+/// compensates the mean change of the fixes.
+LampDerivatives compute_offset_derivatives(const ReferencePointFixes& station,
+                                           const ChenGuanOffset& found,
+                                           const Eigen::Matrix2d& image_from_floor) {
+  LampDerivatives derivatives = station.compute_lamp_derivatives(found.offset_px);
+  Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(2, derivatives.by_positions.cols());
+  double count = 0;
+  for (std::size_t i = 0; i < found.used.size(); ++i) {
+    if (!found.used[i]) continue;
+    mean += derivatives.by_positions.middleRows<2>(2 * static_cast<Eigen::Index>(i));
+    ++count;
+  }
+  derivatives.by_positions = -image_from_floor * mean / count;
+  return derivatives;
+}
+
+}  // namespace
+
+Circle fit_dispersion_circle(const std::vector<Eigen::Vector2d>& points, DispersionCircle kind) {
+  if (kind == DispersionCircle::enclosing) return compute_enclosing_circle(points);
+  Circle circle{compute_mean_point(points), 0};
+  for (const auto& point : points) {
+    circle.radius = std::max(circle.radius, (point - circle.center).norm());
+  }
+  return circle;
+}
+
+ChenGuanOffset find_chen_guan_offset(const ReferencePointFixes& station,
+                                     const Eigen::Vector2d& focal_px, DispersionCircle kind,
+                                     bool noise_is_stated) {
+  const OptionalFixes fixes = station.at({0, 0});
+  const std::vector<bool> used = find_near_median(fixes);
+  const MeanFix mean_fix = compute_mean_fix(fixes, used);
+  if (!mean_fix.is_at_one_yaw()) return {.status = DispersionStatus::many_yaws};
+  Eigen::Matrix2d image_from_floor =
+      focal_px.asDiagonal() *
+      Eigen::Matrix2d(product_matrix(mean_fix.heading.normalized()).transpose() /
+                      mean_fix.height_m);
+  constexpr int max_iterations = 30;
+  constexpr double tolerance_m = 1e-10;  // far below any noise
+  Eigen::Vector2d offset_px = Eigen::Vector2d::Zero();
+  for (int iteration = 0; iteration < max_iterations; ++iteration) {
+    const auto errors_m = compute_errors(station, offset_px, used);
+    if (errors_m.size() < 2) break;
+    const Eigen::Vector2d center_m = fit_dispersion_circle(errors_m, kind).center;
+    if (iteration > 0) {
+      image_from_floor = differentiate_mean_fix(station, offset_px, used).inverse();
+      if (!image_from_floor.allFinite()) break;
+    }
+    if (center_m.norm() > tolerance_m) {
+      offset_px -= image_from_floor * center_m;
+      continue;
+    }
+    ChenGuanOffset found{.status = DispersionStatus::ok, .offset_px = offset_px, .used = used};
+    if (kind == DispersionCircle::mean) {
+      const Eigen::Matrix2d noise_m2 =
+          compute_mean_noise(station.at(offset_px), used, noise_is_stated);
+      const Eigen::Matrix2d mean_covariance_m2 = estimate_covariance_of_mean(errors_m, noise_m2);
+      Matrix2 covariance = image_from_floor * mean_covariance_m2 * image_from_floor.transpose();
+      covariance(1, 0) = covariance(0, 1);
+      found.covariance = covariance;
+      found.by_lamps = compute_offset_derivatives(station, found, image_from_floor);
+    }
+    return found;
+  }
+  return {.status = DispersionStatus::diverged};
 }
 
 }  // namespace vlp

@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "calibration/dispersion/dispersion.h"
 #include "calibration/dispersion/reference_point_fixes.h"
 
 namespace vlp {
@@ -44,5 +45,39 @@ inline constexpr double kFixOutlierSigmas = 5;
 /// Smallest variance of residuals, in m^2 or relative to their covariance. Smaller ones are numeric
 /// noise.
 inline constexpr double kFixRoundingVariance = 1e-24;
+
+/// Returns the dispersion circle of the points.
+/// @pre there is at least one point
+Circle fit_dispersion_circle(const std::vector<Eigen::Vector2d>& points, DispersionCircle kind);
+
+/// Result of find_chen_guan_offset(). Members other than `status` are valid only if it is `ok`.
+struct ChenGuanOffset {
+  /// Status `ok`, `many_yaws` or `diverged`.
+  DispersionStatus status;
+  Eigen::Vector2d offset_px = Eigen::Vector2d::Zero();
+  /// Covariance from the scatter of the fixes, at least that of their noise. Absent for the
+  /// enclosing circle.
+  std::optional<Matrix2> covariance = {};
+  /// Derivatives of offset_px with respect to the positions of the lamps; empty without a
+  /// covariance.
+  LampDerivatives by_lamps = {};
+  /// True for each capture whose fix is used.
+  std::vector<bool> used = {};
+};
+
+/// Finds the offset with which the circle of the fixes is centered at the reference point (eq. 10
+/// and 11), for captures at one yaw.
+///
+/// @param noise_is_stated  whether all detections have a sigma_px; otherwise it is estimated from
+///     the residuals of the fixes
+/// @pre there is at least one fix
+///
+/// Starts with eq. 12 and 13 in their intended form, -f e^{-jg} D / H. This is exact if the offset
+/// is applied as a shift and all lamps have one height. After a rotation center of model `tilt` the
+/// offset is applied as a rotation, which moves fixes by more. The offset is therefore corrected by
+/// the remaining D until it vanishes.
+ChenGuanOffset find_chen_guan_offset(const ReferencePointFixes& station,
+                                     const Eigen::Vector2d& focal_px, DispersionCircle kind,
+                                     bool noise_is_stated);
 
 }  // namespace vlp

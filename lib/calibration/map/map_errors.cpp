@@ -347,19 +347,19 @@ bool is_contradicted(const std::optional<LampDisplacements>& found) {
   return !found || found->inlier_fraction < min_inlier_fraction;
 }
 
+/// Returns true if the RMS displacement of the lamps exceeds the tolerance of Positioner, relative
+/// to the size of the map.
+bool is_other_room(const LampDisplacements& found) {
+  constexpr double max_residual_fraction = 0.1;  // PositionerOptions::max_residual_share
+  const double rms_m =
+      found.displacement_m.norm() / std::sqrt(static_cast<double>(found.lamps.size()));
+  return rms_m > max_residual_fraction * rms_radius(found.map_m);
+}
+
 /// Returns true if a map explains the captures: most detections agree, and the displacement of the
-/// lamps is below 10 % of their distance from their mean. Survey errors stay far below this limit.
+/// lamps is small. Survey errors stay far below this limit.
 bool explains_captures(const OtherMap& other) {
-  if (is_contradicted(other.found)) return false;
-  constexpr double max_fraction = 0.1;
-  Eigen::Vector2d mean_m = Eigen::Vector2d::Zero();
-  for (const Eigen::Vector2d& lamp_m : other.found->map_m) mean_m += lamp_m;
-  mean_m /= static_cast<double>(other.found->map_m.size());
-  double squares_m2 = 0;
-  for (const Eigen::Vector2d& lamp_m : other.found->map_m) {
-    squares_m2 += (lamp_m - mean_m).squaredNorm();
-  }
-  return other.size_m() <= max_fraction * std::sqrt(squares_m2);
+  return !is_contradicted(other.found) && !is_other_room(*other.found);
 }
 
 /// Finds two lamps that are swapped, or a mirrored map. The captures have to fit the alternative
@@ -447,15 +447,6 @@ std::optional<MapError> find_unsteady(const LampDisplacements& found, const Lamp
     return error;
   }
   return std::nullopt;
-}
-
-/// Returns true if the RMS displacement of the lamps exceeds the tolerance of Positioner, relative
-/// to the size of the map.
-bool is_other_room(const LampDisplacements& found) {
-  constexpr double max_residual_fraction = 0.1;  // PositionerOptions::max_residual_share
-  const double rms_m =
-      found.displacement_m.norm() / std::sqrt(static_cast<double>(found.lamps.size()));
-  return rms_m > max_residual_fraction * rms_radius(found.map_m);
 }
 
 /// Describes an offset in whole millimeters from 10 mm on, otherwise in tenths. Includes the height

@@ -9,7 +9,7 @@
 #include <optional>
 #include <vector>
 
-#include "calibration/dispersion/reference_point_statistics.h"
+#include "calibration/dispersion/reference_point_fixes.h"
 #include "calibration/dispersion/station.h"
 #include "positioning/positioner.h"
 #include "rig/calibration_error.h"
