@@ -14,7 +14,6 @@
 #include "evaluation/limits_table.h"
 #include "geometry/angles.h"
 #include "positioning/floor_limits.h"
-#include "positioning/floor_summary.h"
 #include "program/app.h"
 #include "program/steps/capture_options.h"
 #include "program/steps/print_fixes.h"

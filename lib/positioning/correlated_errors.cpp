@@ -282,22 +282,8 @@ CommonErrors::Effect CommonErrors::effect_on(const Sighting& sighting, const Lev
   const Eigen::Matrix<double, 2, 3> d_z_d_base = d_z * level_from_base;
   Effect effect;
   effect.jacobian_wrt_lamp = predict(pose, sighting.lamp_m).d_z_d_state.leftCols<3>();
-  // As effect_on_ray(), the narrow products first.
-  const Eigen::Vector3d ray =
-      camera_from_base_ * (level_from_base.transpose() * sighting.z.homogeneous());
-  effect.jacobian_wrt_shared.resize(2, shared());
-  if (const auto seen = lens.project_with_jacobians(ray)) {
-    const Eigen::Matrix2d d_z_d_pixel = -d_z_d_base * base_from_camera_.leftCols<2>() *
-                                        seen->d_pixel_d_point.leftCols<2>().inverse();
-    effect.jacobian_wrt_shared.leftCols(intrinsics_).noalias() =
-        d_z_d_pixel.lazyProduct(seen->d_pixel_d_parameters);
-  } else {
-    effect.jacobian_wrt_shared.leftCols(intrinsics_).setZero();
-  }
-  for (std::size_t i = 0; i < turns_.size(); ++i) {
-    effect.jacobian_wrt_shared.col(intrinsics_ + static_cast<Eigen::Index>(i)) =
-        d_z_d_base * (turns_[i] * ray);
-  }
+  effect.jacobian_wrt_shared = d_z_d_base.lazyProduct(
+      effect_on_ray(level_from_base.transpose() * sighting.z.homogeneous(), lens));
   return effect;
 }
 
@@ -326,6 +312,22 @@ CommonErrors::Gain CommonErrors::compute_error_gain(std::span<const Sighting> si
   return gain;
 }
 
+CommonErrors::BodyEffect CommonErrors::effect_on(const BodyObservation& sighting,
+                                                 const EvaluatedState& body,
+                                                 const Eigen::Vector3d& arm_m, const Lens& lens,
+                                                 const Eigen::Matrix3d& body_from_base) const {
+  const Eigen::Matrix<double, 2, 3> d_pixel = d_whitened_pixel_d_lamp(
+      sighting, body.lamp_in_body(sighting.lamp_m, sighting.time_s) - arm_m);
+  BodyEffect effect;
+  effect.jacobian_wrt_state =
+      d_pixel.lazyProduct(body.d_lamp_in_body(sighting.lamp_m, sighting.time_s));
+  const Eigen::Matrix<double, 2, 3> by_ray = sighting.whitened_pixel_from_ray * body_from_base;
+  effect.by_errors.jacobian_wrt_shared =
+      by_ray.lazyProduct(effect_on_ray(body_from_base.transpose() * sighting.ray, lens));
+  effect.by_errors.jacobian_wrt_lamp = effect.jacobian_wrt_state.leftCols<3>();
+  return effect;
+}
+
 CommonErrors::BodyGain CommonErrors::compute_error_gain(
     std::span<const BodyObservation> sightings, std::span<const std::size_t> lamps,
     const Eigen::Vector3d& arm_m, const BodyFix& fix, const Lens& lens,
@@ -333,18 +335,11 @@ CommonErrors::BodyGain CommonErrors::compute_error_gain(
   const EvaluatedState body(fix.state);
   BodyGain whole(shared());
   for (std::size_t i = 0; i < sightings.size(); ++i) {
-    const BodyObservation& seen = sightings[i];
-    const auto d_q = body.d_lamp_in_body(seen.lamp_m, seen.time_s);
-    const Eigen::Matrix<double, 2, 3> d_pixel =
-        d_whitened_pixel_d_lamp(seen, body.lamp_in_body(seen.lamp_m, seen.time_s) - arm_m);
-    const Eigen::Matrix<double, 2, kBodyStates> d_pixel_d_state = d_pixel.lazyProduct(d_q);
+    const auto [by_state, by_errors] = effect_on(sightings[i], body, arm_m, lens, body_from_base);
     const Eigen::Matrix<double, kBodyStates, 2> gain =
-        fix.covariance.lazyProduct(d_pixel_d_state.transpose());
-    const Eigen::Matrix<double, 2, 3> d_pixel_d_ray = seen.whitened_pixel_from_ray * body_from_base;
-    const Eigen::Matrix<double, kBodyStates, 3> by_ray = gain * d_pixel_d_ray;
-    whole.jacobian_wrt_shared.noalias() +=
-        by_ray.lazyProduct(effect_on_ray(body_from_base.transpose() * seen.ray, lens));
-    whole.add(lamps[i], gain * d_pixel_d_state.leftCols<3>());
+        fix.covariance.lazyProduct(by_state.transpose());
+    whole.jacobian_wrt_shared.noalias() += gain.lazyProduct(by_errors.jacobian_wrt_shared);
+    whole.add(lamps[i], gain * by_errors.jacobian_wrt_lamp);
   }
   return whole;
 }
@@ -400,16 +395,8 @@ double CommonErrors::expected_chi_squared(std::span<const BodyObservation> sight
   information.setZero();
   double sum = 0;
   for (std::size_t i = 0; i < sightings.size(); ++i) {
-    const BodyObservation& seen = sightings[i];
-    const Eigen::Matrix<double, 2, 3> d_pixel =
-        d_whitened_pixel_d_lamp(seen, body.lamp_in_body(seen.lamp_m, seen.time_s) - arm_m);
-    const Eigen::Matrix<double, 2, kBodyStates> by_state =
-        d_pixel.lazyProduct(body.d_lamp_in_body(seen.lamp_m, seen.time_s));
-    const Eigen::Matrix<double, 2, 3> by_ray = seen.whitened_pixel_from_ray * body_from_base;
-    const Effect effect{
-        by_ray.lazyProduct(effect_on_ray(body_from_base.transpose() * seen.ray, lens)),
-        by_state.leftCols<3>()};
-    sum += compute_covariance(effect, lamps[i]).trace();
+    const auto [by_state, by_errors] = effect_on(sightings[i], body, arm_m, lens, body_from_base);
+    sum += compute_covariance(by_errors, lamps[i]).trace();
     information += by_state.transpose() * by_state;
   }
   // States that are not estimated have no variance, and `common` is zero there.
@@ -426,20 +413,10 @@ template Matrix4 CommonErrors::compute_covariance(const Gain& gain) const;
 template BodyCovariance CommonErrors::compute_covariance(const BodyGain& gain) const;
 
 Matrix2 CommonErrors::compute_covariance(const Effect& effect, std::size_t lamp) const {
-  const Eigen::Index n = shared();
-  const Effect& e = effect;
-  const Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::ColMajor, 2, 20> with_shared =
-      e.jacobian_wrt_shared.lazyProduct(covariance_.topLeftCorner(n, n));
-  Eigen::Matrix2d sum = with_shared.lazyProduct(e.jacobian_wrt_shared.transpose());
-  Eigen::Matrix2d half = Eigen::Matrix2d::Zero();
-  if (const auto& row = lamps_[lamp].row) {
-    const Eigen::Matrix<double, 2, 3> mixed =
-        e.jacobian_wrt_shared.lazyProduct(covariance_.block(0, *row, n, 3));
-    half = mixed * e.jacobian_wrt_lamp.transpose();
-  }
-  sum += half + half.transpose() +
-         e.jacobian_wrt_lamp * covariance_of_lamp(lamp) * e.jacobian_wrt_lamp.transpose();
-  return sum;
+  GainMatrix<2> gain(shared());
+  gain.jacobian_wrt_shared = effect.jacobian_wrt_shared;
+  gain.add(lamp, effect.jacobian_wrt_lamp);
+  return compute_covariance(gain);
 }
 
 OutlierLamps find_outlier_lamps(std::span<const Sighting> sightings,

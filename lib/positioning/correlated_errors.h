@@ -13,9 +13,9 @@
 #include "../geometry/types.h"
 #include "../rig/calibration.h"
 #include "../rig/lamp_map.h"
-#include "camera_mount.h"
 #include "correction.h"
 #include "fix.h"
+#include "inclination_rotation.h"
 #include "least_squares_fix.h"
 #include "outlier_rejection.h"
 #include "pose_estimation.h"
@@ -85,7 +85,6 @@ class CommonErrors {
   Effect effect_on(const Sighting& sighting, const LevelPose& pose, const Lens& lens,
                    const Eigen::Matrix3d& level_from_base) const;
 
-  /// G: what the errors do to the states of a fix, by the shared ones and by each lamp's own.
   template <int States>
   /// G: derivatives of the states of a fix by the shared errors and by the errors of each lamp.
   struct GainMatrix {
@@ -157,6 +156,15 @@ class CommonErrors {
     /// Variance per axis of a lamp without rows; 0 if unknown.
     double variance_m2 = 0;
   };
+  /// Derivatives of the pixel of a body's observation, in standard deviations, by the states and by
+  /// the errors.
+  struct BodyEffect {
+    Eigen::Matrix<double, 2, kBodyStates> jacobian_wrt_state;
+    Effect by_errors;
+  };
+  BodyEffect effect_on(const BodyObservation& sighting, const EvaluatedState& body,
+                       const Eigen::Vector3d& arm_m, const Lens& lens,
+                       const Eigen::Matrix3d& body_from_base) const;
   /// Gives rows to the lamps that are correlated with other errors, and sets the size of the joint
   /// covariance.
   void assign_rows(std::span<const Lamp> lamps, const Calibration& calibration);

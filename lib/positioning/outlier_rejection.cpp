@@ -7,8 +7,7 @@
 
 #include <Eigen/LU>
 
-#include "positioning/initial_pose.h"
-#include "positioning/two_lamp_fix.h"
+#include "positioning/closed_form.h"
 
 namespace vlp {
 

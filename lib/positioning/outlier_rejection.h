@@ -49,22 +49,29 @@ ConsistentFix estimate_pose_checked(std::span<const Sighting> sightings, double 
 /// Computes the RMS distance of the observations from their mean, in z.
 double compute_rms_radius(std::span<const Sighting> sightings);
 
-/// Lamps observed in one frame. The arrays have a fixed size, so that no memory is allocated.
-struct FrameObservations {
-  std::array<Sighting, kMaxSightings> sightings;
+/// Lamps observed in one frame or in several. The arrays have a fixed size, so that no memory is
+/// allocated.
+template <typename Observation>
+struct LampObservations {
+  std::array<Observation, kMaxSightings> sightings;
   std::array<int, kMaxSightings> ids;
   /// Horizontal distance from each lamp to the nearest other lamp of the map.
   std::array<double, kMaxSightings> nearest_m;
   std::size_t size = 0;
   /// True if a detector reported every sigma_px.
   bool noise_is_stated = true;
-  /// False if observations are weighted in the undistorted image, where the noise differs.
-  bool is_weighed_by_noise = true;
   int unknown_lamps = 0;
   int rejected_lamps = 0;
-  std::array<int, kMaxSightings> rejected_ids;
+  std::array<int, kMaxSightings> rejected_ids = {};
 
-  std::span<const Sighting> span() const { return {sightings.data(), size}; }
+  std::span<const Observation> span() const { return {sightings.data(), size}; }
+};
+
+/// Lamps observed in one frame by a level camera.
+struct FrameObservations : LampObservations<Sighting> {
+  /// False if observations are weighted in the undistorted image, where the noise differs.
+  bool is_weighed_by_noise = true;
+
   /// Removes all observations except those in `kept`. The removed ones count as rejected.
   void keep(const std::bitset<kMaxSightings>& kept);
 };

@@ -58,7 +58,6 @@ template <bool velocity, bool yaw_rate, bool lean>
 struct States {
   static constexpr std::size_t kYawRate = velocity ? 6 : 4, kLean = kYawRate + (yaw_rate ? 1 : 0);
   static constexpr std::size_t kCount = kLean + (lean ? 2 : 0);
-  static constexpr bool kHasLean = lean;
 
   static Columns<kCount> d_in_body(const EvaluatedState& at, const LampTerms& terms,
                                    double time_s) {
@@ -249,8 +248,7 @@ std::optional<BodyFix> solve(std::span<const BodyObservation> sightings,
         if (!fix->covariance.allFinite()) fix.reset();
         return fix;
       }
-      const EvaluatedState next =
-          S::kHasLean ? EvaluatedState(next_state) : EvaluatedState(next_state, at);
+      const EvaluatedState next(next_state);
       const Linearized<S> next_normal(sightings, arm_m, prior, weights, next);
       if (next_normal.lamps_ahead &&
           next_normal.chi_squared <= normal.chi_squared * (1 + rounding)) {
@@ -285,12 +283,6 @@ EvaluatedState::EvaluatedState(const BodyState& at) : state(at), heading(unit(at
   body_from_level << cp, 0, -sp, sr * sp, cr, sr * cp, cr * sp, -sr, cr * cp;
   pitch_axis = {0, cr, -sr};
 }
-
-EvaluatedState::EvaluatedState(const BodyState& at, const EvaluatedState& other)
-    : state(at),
-      heading(unit(at.pose.yaw_rad)),
-      body_from_level(other.body_from_level),
-      pitch_axis(other.pitch_axis) {}
 
 Eigen::Vector3d EvaluatedState::lamp_in_body(const Eigen::Vector3d& lamp_m, double time_s) const {
   return compute_lamp_terms(*this, lamp_m, time_s).in_body;

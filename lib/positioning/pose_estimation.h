@@ -93,8 +93,6 @@ struct BodyFix {
 class EvaluatedState {
  public:
   explicit EvaluatedState(const BodyState& state);
-  /// Copies the terms of roll and pitch from `other`, which has the same roll and pitch.
-  EvaluatedState(const BodyState& state, const EvaluatedState& other);
 
   /// Returns q + arm of a lamp.
   Eigen::Vector3d lamp_in_body(const Eigen::Vector3d& lamp_m, double time_s) const;

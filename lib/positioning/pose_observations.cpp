@@ -10,7 +10,7 @@
 #include <optional>
 
 #include "geometry/angles.h"
-#include "positioning/initial_pose.h"
+#include "positioning/closed_form.h"
 #include "positioning/three_lamp_poses.h"
 
 namespace vlp {
@@ -61,9 +61,7 @@ struct LevelSightings {
 
 BodyState make_body_state(const Pose& camera, const Problem& problem, const Eigen::Matrix3d& lean) {
   BodyState state{camera, problem.prior.mean};
-  if (!problem.arm_m.isZero(0)) {
-    state.pose.position_m -= rotation_about_z(camera.yaw_rad) * lean * problem.arm_m;
-  }
+  state.pose.position_m -= rotation_about_z(camera.yaw_rad) * lean * problem.arm_m;
   return state;
 }
 
@@ -160,10 +158,8 @@ bool is_determined(const BodyObservations& frame, const BodyFix& fix) {
 
 bool are_below_lamps(const BodyObservations& frame, const Problem& problem,
                      const BodyState& state) {
-  double z_m = state.pose.position_m.z();
-  if (!problem.arm_m.isZero(0)) {
-    z_m += (level_from_inclination(state.motion.inclination) * problem.arm_m).z();
-  }
+  const double z_m = state.pose.position_m.z() +
+                     (level_from_inclination(state.motion.inclination) * problem.arm_m).z();
   return std::all_of(frame.sightings.begin(),
                      frame.sightings.begin() + static_cast<std::ptrdiff_t>(frame.size),
                      [&](const BodyObservation& seen) { return seen.lamp_m.z() > z_m; });

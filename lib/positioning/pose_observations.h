@@ -2,9 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <cstddef>
-#include <span>
 
 #include "fix.h"
 #include "outlier_rejection.h"
@@ -12,24 +10,11 @@
 
 namespace vlp {
 
-/// Lamps observed in one frame, or in several consecutive frames. The arrays have a fixed size, so
-/// that no memory is allocated.
-struct BodyObservations {
-  std::array<BodyObservation, kMaxSightings> sightings;
-  std::array<int, kMaxSightings> ids;
-  /// Horizontal distance from each lamp to the nearest other lamp of the map.
-  std::array<double, kMaxSightings> nearest_m;
-  std::size_t size = 0;
+/// Lamps observed in one frame, or in several consecutive frames.
+struct BodyObservations : LampObservations<BodyObservation> {
   /// Number of observations, at the start of the arrays, from the frame of the fix. The others are
   /// from earlier frames.
   std::size_t num_current = 0;
-  /// True if a detector reported every sigma_px.
-  bool noise_is_stated = true;
-  int unknown_lamps = 0;
-  int rejected_lamps = 0;
-  std::array<int, kMaxSightings> rejected_ids = {};
-
-  std::span<const BodyObservation> span() const { return {sightings.data(), size}; }
 };
 
 /// Status of a fix and the fix.

@@ -7,16 +7,15 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <stdexcept>
 #include <string>
 
 #include "camera/lens.h"
 #include "geometry/plane.h"
-#include "positioning/camera_mount.h"
+#include "positioning/closed_form.h"
 #include "positioning/correlated_errors.h"
+#include "positioning/inclination_rotation.h"
 #include "positioning/known_motion.h"
-#include "positioning/one_lamp_fix.h"
 #include "positioning/outlier_rejection.h"
 #include "positioning/pose_observations.h"
 #include "positioning/row_clock.h"
@@ -44,7 +43,7 @@ void check_places(const std::vector<Lamp>& lamps) {
 std::vector<Lamp> sorted_by_id(std::vector<Lamp> lamps) {
   if (lamps.empty()) throw std::invalid_argument("the lamp map is empty");
   check_places(lamps);
-  std::sort(lamps.begin(), lamps.end(), [](const Lamp& a, const Lamp& b) { return a.id < b.id; });
+  std::ranges::sort(lamps, {}, &Lamp::id);
   for (std::size_t i = 1; i < lamps.size(); ++i) {
     if (lamps[i].id == lamps[i - 1].id) {
       throw std::invalid_argument("lamp " + std::to_string(lamps[i].id) + " stands twice");
@@ -79,27 +78,15 @@ Eigen::Vector3d center_of(const std::vector<Lamp>& lamps) {
 }
 
 /// Returns the horizontal distance of each lamp to the nearest other one; infinity if there is
-/// none. Goes along x from each lamp, and no farther than the nearest lamp found.
+/// none.
 std::vector<double> distances_to_nearest(const std::vector<Lamp>& lamps) {
-  std::vector<std::size_t> by_x(lamps.size());
-  std::iota(by_x.begin(), by_x.end(), 0U);
-  // Lamps of equal x by y, as in a grid: the nearest one is tried first.
-  std::ranges::sort(by_x, {}, [&](std::size_t i) {
-    return std::pair(lamps[i].position_m.x(), lamps[i].position_m.y());
-  });
   std::vector<double> nearest_m(lamps.size(), std::numeric_limits<double>::infinity());
-  // Returns false once lamps are too far apart along x.
-  const auto try_pair = [&](std::size_t i, std::size_t j) {
-    const Eigen::Vector3d offset_m = lamps[j].position_m - lamps[i].position_m;
-    if (std::abs(offset_m.x()) >= nearest_m[i]) return false;
-    if (lamps[j].id != lamps[i].id) {
-      nearest_m[i] = std::min(nearest_m[i], offset_m.head<2>().norm());
+  for (std::size_t i = 0; i < lamps.size(); ++i) {
+    for (std::size_t k = 0; k < i; ++k) {
+      const double distance_m = (lamps[k].position_m - lamps[i].position_m).head<2>().norm();
+      nearest_m[i] = std::min(nearest_m[i], distance_m);
+      nearest_m[k] = std::min(nearest_m[k], distance_m);
     }
-    return true;
-  };
-  for (std::size_t k = 0; k < by_x.size(); ++k) {
-    for (std::size_t j = k + 1; j < by_x.size() && try_pair(by_x[k], by_x[j]);) ++j;
-    for (std::size_t j = k; j > 0 && try_pair(by_x[k], by_x[j - 1]);) --j;
   }
   return nearest_m;
 }
@@ -153,44 +140,328 @@ static_assert(Positioner::max_lamps == kMaxSightings);
 
 class Positioner::Impl {
  public:
-  Impl(const LampMap& map, const Calibration& calibration, const PositionerOptions& options);
+  Impl(const LampMap& map, const Calibration& calibration, const PositionerOptions& options)
+      : lamps_(sorted_by_id(map.lamps)),
+        lens_(calibration.camera.lens_model, calibration.camera.intrinsics),
+        origin_m_(center_of(lamps_)),
+        base_from_camera_(level_from_camera(calibration, options.correction)),
+        common_(lamps_, calibration, options.correction),
+        mount_(options.mount.value_or(CameraMount{Eigen::Vector3d::Zero(), 0})),
+        body_from_base_(rotation_about_z(mount_.yaw_in_robot_rad)),
+        body_from_camera_(body_from_base_ * base_from_camera_),
+        max_residual_share_(options.max_residual_share),
+        unstated_sigma_px_(options.unstated_sigma_px),
+        computes_common_chi_squared_(options.computes_common_chi_squared),
+        row_clock_(make_row_clock(calibration.camera)) {
+    for (Lamp& lamp : lamps_) lamp.position_m -= origin_m_;
+    nearest_m_ = distances_to_nearest(lamps_);
+    if (!(mount_.position_in_robot_m.allFinite() && std::isfinite(mount_.yaw_in_robot_rad))) {
+      throw std::invalid_argument("the camera's place on the robot is not finite");
+    }
+    if (!(max_residual_share_ > 0))
+      throw std::invalid_argument("max_residual_share is not positive");
+    if (!(unstated_sigma_px_ >= kMinSigma_px && unstated_sigma_px_ <= kMaxSigma_px)) {
+      throw std::invalid_argument("unstated_sigma_px is not within 0.0001 and 1000");
+    }
+  }
 
-  Fix locate(std::span<const Detection> detections, const Sensors& sensors) const;
+  Fix locate(std::span<const Detection> detections, const Sensors& sensors) const {
+    if (!finite(sensors)) return without_fix(FixStatus::not_finite, 0);
+    if (needs_body(sensors) && detections.size() > 1) {
+      if (auto fix = locate_body(detections, sensors, {})) return *fix;
+    }
+    const InclinationRotation lean =
+        sensors.inclination
+            ? compute_inclination_rotation(*sensors.inclination, mount_.yaw_in_robot_rad)
+            : InclinationRotation();
+    FrameObservations frame;
+    const FixStatus seen = sight(detections, lean.level_from_base, frame);
+    if (seen != FixStatus::ok) return without_fix(seen, frame.unknown_lamps);
+
+    Fix fix;
+    Matrix4 height_and_yaw_covariance = Matrix4::Zero();
+    InclinationJacobian d_pose_d_inclination = InclinationJacobian::Zero();
+    if (frame.size > 1) {
+      // If common errors are known, the noise alone must not reject lamps.
+      const bool total = common_.complete();
+      if (total) frame.noise_is_stated = false;
+      ConsistentFix found = estimate_pose_robust(frame, max_residual_share_);
+      if (total) reject_outlier_lamps(frame, lean.level_from_base, found);
+      const auto& [status, solution] = found;
+      if (status != FixStatus::ok) return without_fix(status, frame.unknown_lamps);
+      fix.estimate = {solution.pose, solution.covariance};
+      fix.residual_px = solution.residual_px;
+      fix.chi_squared = solution.chi_squared;
+    } else if (frame.size == 1 && sensors.height_and_yaw) {
+      const auto readout = motion_at_readout(detections, frame.ids.front(), sensors);
+      if (!readout) return without_fix(FixStatus::row_time_unknown, frame.unknown_lamps);
+      const Sighting& sighting = frame.sightings.front();
+      HeightAndYaw known = *sensors.height_and_yaw;
+      known.z_m -= origin_m_.z();
+      const auto pose = compute_pose_at_known_height_and_yaw(sighting, known, *readout);
+      if (!pose) return without_fix(FixStatus::lamp_below_camera, frame.unknown_lamps);
+      fix.estimate = {*pose, compute_one_lamp_covariance(sighting, *pose)};
+      height_and_yaw_covariance =
+          compute_one_lamp_sensor_covariance(sighting, *pose, known, *readout);
+      d_pose_d_inclination = compute_one_lamp_rotation_jacobian(sighting, *pose) * lean.error_axes;
+    } else {
+      return without_fix(FixStatus::too_few_lamps, frame.unknown_lamps);
+    }
+    fix.status = FixStatus::ok;
+    fix.lamps = fix.sightings = static_cast<int>(frame.size);
+    fix.redundancy = frame.size < 3 ? 0 : 2 * static_cast<double>(frame.size) - 4;
+    fix.time_s = sensors.time_s;
+    set_rejected(frame, fix);
+    fix.unknown_lamps = frame.unknown_lamps;
+    add_covariances(frame, lean, d_pose_d_inclination, sensors, height_and_yaw_covariance, fix);
+    fix.estimate.pose.position_m += origin_m_;
+    return fix;
+  }
+
   Fix locate(std::span<const Detection> detections, const Sensors& sensors,
-             std::span<const EarlierFrame> earlier) const;
+             std::span<const EarlierFrame> earlier) const {
+    const bool finite_times =
+        std::all_of(earlier.begin(), earlier.end(),
+                    [](const EarlierFrame& before) { return std::isfinite(before.before_s); });
+    if (!finite(sensors) || !finite_times) return without_fix(FixStatus::not_finite, 0);
+    if (const auto fix = locate_body(detections, sensors, earlier)) return *fix;
+    return locate(detections, sensors);
+  }
+
   int lamps_elsewhere() const { return common_.lamps_elsewhere(); }
 
  private:
+  /// Adds each detection of a lamp of the map to the frame: `add` takes it, its lamp, its ray and
+  /// its standard deviation, and fills the frame's sighting.
   template <typename Frame, typename Add>
-  FixStatus find_lamps(std::span<const Detection> detections, Frame& frame, const Add& add) const;
-  FixStatus sight(std::span<const Detection> detections, const Eigen::Matrix3d& level_from_base,
-                  FrameObservations& frame) const;
-  std::size_t find_index(int id) const;
+  FixStatus find_lamps(std::span<const Detection> detections, Frame& frame, const Add& add) const {
+    const auto ids_begin = frame.ids.begin() + static_cast<std::ptrdiff_t>(frame.size);
+    for (const Detection& detection : detections) {
+      const auto lamp = std::ranges::lower_bound(lamps_, detection.lamp, {}, &Lamp::id);
+      if (lamp == lamps_.end() || lamp->id != detection.lamp) {
+        ++frame.unknown_lamps;
+        continue;
+      }
+      const auto ids_end = frame.ids.begin() + static_cast<std::ptrdiff_t>(frame.size);
+      if (std::find(ids_begin, ids_end, lamp->id) != ids_end) return FixStatus::duplicate_lamp;
+      if (frame.size == max_lamps) return FixStatus::too_many_lamps;
+      const double sigma_px = detection.sigma_px.value_or(unstated_sigma_px_);
+      const bool plausible = sigma_px >= kMinSigma_px && sigma_px <= kMaxSigma_px;
+      if (!detection.pixel.allFinite() || !plausible) return FixStatus::not_finite;
+      const auto ray = lens_.unproject(detection.pixel);
+      if (!ray) return FixStatus::outside_lens;
+      const FixStatus added = add(detection, *lamp, *ray, sigma_px);
+      if (added != FixStatus::ok) return added;
+      if (!detection.sigma_px) frame.noise_is_stated = false;
+      frame.nearest_m[frame.size] = nearest_m_[static_cast<std::size_t>(lamp - lamps_.begin())];
+      frame.ids[frame.size++] = lamp->id;
+    }
+    return FixStatus::ok;
+  }
+
+  std::size_t find_index(int id) const {
+    return static_cast<std::size_t>(std::ranges::lower_bound(lamps_, id, {}, &Lamp::id) -
+                                    lamps_.begin());
+  }
+
+  /// Rejects lamps by the reported uncertainties if all are known; otherwise estimate_pose_robust()
+  /// decides.
   void reject_outlier_lamps(FrameObservations& frame, const Eigen::Matrix3d& level_from_base,
-                            ConsistentFix& solution) const;
+                            ConsistentFix& solution) const {
+    constexpr std::size_t min_lamps = 4;  // fewer identify no outlier
+    if (solution.status != FixStatus::ok || frame.size < min_lamps) return;
+    // If the noise alone explains the residuals, no other error is needed.
+    if (solution.fix.chi_squared <= static_cast<double>(2 * frame.size - 4)) return;
+    const LevelPose pose(solution.fix.pose);
+    std::array<Matrix2, max_lamps> common;
+    for (std::size_t i = 0; i < frame.size; ++i) {
+      common[i] = common_.compute_covariance(
+          common_.effect_on(frame.sightings[i], pose, lens_, level_from_base),
+          find_index(frame.ids[i]));
+    }
+    const OutlierLamps wrong =
+        find_outlier_lamps(frame.span(), {common.data(), frame.size}, solution.fix);
+    if (wrong.count == 0) return;
+    std::bitset<kMaxSightings> kept;
+    kept.set();
+    for (std::size_t i = 0; i < wrong.count; ++i) kept.reset(wrong.lamps[i]);
+    frame.keep(kept);
+    solution = estimate_pose_checked(frame.span(), std::numeric_limits<double>::infinity());
+  }
+
   /// Returns G C G'. Sets fix.common_chi_squared if PositionerOptions require it.
   Matrix4 common_covariance(const FrameObservations& frame, const Eigen::Matrix3d& level_from_base,
-                            Fix& fix) const;
+                            Fix& fix) const {
+    std::array<std::size_t, max_lamps> lamps;
+    for (std::size_t i = 0; i < frame.size; ++i) lamps[i] = find_index(frame.ids[i]);
+    const std::span<const std::size_t> in_map(lamps.data(), frame.size);
+    const Matrix4 common = common_.compute_covariance(
+        common_.compute_error_gain(frame.span(), in_map, fix.estimate, lens_, level_from_base));
+    if (computes_common_chi_squared_ && fix.redundancy > 0) {
+      fix.common_chi_squared = common_.expected_chi_squared(frame.span(), in_map, fix.estimate,
+                                                            common, lens_, level_from_base);
+    }
+    return common;
+  }
+
   BodyCovariance common_covariance(const BodyObservations& frame, const Eigen::Vector3d& arm_m,
-                                   const BodyFix& solution, Fix& fix) const;
+                                   const BodyFix& solution, Fix& fix) const {
+    std::array<std::size_t, max_lamps> lamps;
+    for (std::size_t i = 0; i < frame.size; ++i) lamps[i] = find_index(frame.ids[i]);
+    const std::span<const std::size_t> in_map(lamps.data(), frame.size);
+    const BodyCovariance common = common_.compute_covariance(
+        common_.compute_error_gain(frame.span(), in_map, arm_m, solution, lens_, body_from_base_));
+    if (computes_common_chi_squared_ && fix.redundancy > 0) {
+      fix.common_chi_squared = common_.expected_chi_squared(frame.span(), in_map, arm_m, solution,
+                                                            common, lens_, body_from_base_);
+    }
+    return common;
+  }
+
+  FixStatus sight(std::span<const Detection> detections, const Eigen::Matrix3d& level_from_base,
+                  FrameObservations& frame) const {
+    const Eigen::Matrix3d level_from_camera = level_from_base * base_from_camera_;
+    const auto add = [&](const Detection& detection, const Lamp& lamp, const Lens::Ray& ray,
+                         double sigma_px) {
+      const Eigen::Vector3d direction = level_from_camera * ray.direction;
+      if (!(direction.z() > 0)) return FixStatus::lamp_below_camera;
+      const Eigen::Matrix<double, 3, 2> d_direction = level_from_camera * ray.d_direction_d_pixel;
+      const Eigen::Vector2d z = direction.head<2>() / direction.z();
+      const Eigen::Matrix2d d_z_d_pixel =
+          (d_direction.topRows<2>() - z * d_direction.row(2)) / direction.z();
+      frame.sightings[frame.size] = {lamp.position_m, z, lens_.focal_px().asDiagonal(), sigma_px};
+      if (detection.sigma_px) {
+        frame.sightings[frame.size].d_pixel_d_z = d_z_d_pixel.inverse();
+      } else {
+        frame.is_weighed_by_noise = false;
+      }
+      return FixStatus::ok;
+    };
+    return find_lamps(detections, frame, add);
+  }
+
+  FixStatus sight_from_body(std::span<const Detection> detections, double time_s,
+                            BodyObservations& frame) const {
+    const auto add = [&](const Detection& detection, const Lamp& lamp, const Lens::Ray& ray,
+                         double sigma_px) {
+      const Eigen::Vector3d direction = body_from_camera_ * ray.direction;
+      const auto whitened =
+          whitened_pixel_from_ray(direction, body_from_camera_ * ray.d_direction_d_pixel, sigma_px);
+      if (!whitened) return FixStatus::outside_lens;
+      const double read_s = row_clock_ ? row_clock_->time_s(detection.pixel) : 0;
+      frame.sightings[frame.size] = {lamp.position_m, direction.normalized(), *whitened, sigma_px,
+                                     time_s + read_s};
+      return FixStatus::ok;
+    };
+    return find_lamps(detections, frame, add);
+  }
+
+  /// Returns std::nullopt if the frame has fewer than two lamps of the map.
+  std::optional<Fix> locate_body(std::span<const Detection> detections, const Sensors& sensors,
+                                 std::span<const EarlierFrame> earlier) const {
+    const KnownMotion motion = sensors.motion.value_or(KnownMotion());
+    if (moves(motion) && !row_clock_) return without_fix(FixStatus::row_time_unknown, 0);
+    BodyPrior prior{{motion.velocity_m_per_s, motion.yaw_rate_rad_per_s,
+                     sensors.inclination.value_or(Inclination{0, 0})},
+                    motion.velocity_sd_m_per_s,
+                    motion.yaw_rate_sd_rad_per_s,
+                    sensors.inclination_sigma_rad,
+                    sensors.height};
+    if (prior.height) prior.height->z_m -= origin_m_.z();
+    Fix fix;
+    BodyObservations frame;
+    const FixStatus seen = sight_from_body(detections, 0, frame);
+    fix.unknown_lamps = frame.unknown_lamps;
+    if (seen != FixStatus::ok) return without_fix(seen, fix.unknown_lamps);
+    frame.num_current = frame.size;
+    for (const EarlierFrame& before : earlier) {
+      const FixStatus status = sight_from_body(before.detections, -before.before_s, frame);
+      if (status != FixStatus::ok) return without_fix(status, fix.unknown_lamps);
+    }
+    if (frame.num_current < 2) return std::nullopt;
+    // If common errors are known, the noise alone must not reject lamps.
+    if (common_.complete()) frame.noise_is_stated = false;
+    const Eigen::Vector3d& arm_m = mount_.position_in_robot_m;
+    const auto [status, solution] = estimate_body_robust(frame, arm_m, prior, max_residual_share_);
+    if (status != FixStatus::ok) return without_fix(status, fix.unknown_lamps);
+    fix.status = status;
+    fix.redundancy = solution.redundancy;
+    fix.chi_squared = solution.pixels_chi_squared;
+    fix.body = in_world(solution, common_.stated() ? common_covariance(frame, arm_m, solution, fix)
+                                                   : BodyCovariance(BodyCovariance::Zero()));
+    fix.noise_covariance = fix.body->noise_covariance.topLeftCorner<4, 4>();
+    fix.estimate = {solution.state.pose, fix.body->covariance.topLeftCorner<4, 4>()};
+    fix.estimate.pose.position_m += origin_m_;
+    fix.residual_px = solution.residual_px;
+    fix.lamps = static_cast<int>(frame.num_current);
+    fix.sightings = static_cast<int>(frame.size);
+    set_rejected(frame, fix);
+    fix.time_s = sensors.time_s;
+    return fix;
+  }
+
   /// Replaces covariance and redundancy for equal noise in the undistorted image, by which the fix
   /// weighs its sightings, by those for equal noise in the image:
   ///   A = N^-1 J' W,   cov = A V A',   redundancy = tr(W V) - tr(N cov),   N = J' W J.
   void convert_to_image_noise(const FrameObservations& frame,
-                              const Eigen::Matrix3d& level_from_base, Fix& fix) const;
-  /// Returns the motion of the camera when a lamp is read, or std::nullopt if it moves and the row
-  /// time is not known.
-  std::optional<MotionAtReadout> motion_at_readout(std::span<const Detection> detections, int lamp,
-                                                   const Sensors& sensors) const;
+                              const Eigen::Matrix3d& level_from_base, Fix& fix) const {
+    const LevelPose pose(fix.estimate.pose);
+    const Eigen::Matrix3d camera_from_level = (level_from_base * base_from_camera_).transpose();
+    const Matrix4 by_weights = fix.estimate.covariance;
+    Matrix4 covariance = Matrix4::Zero();
+    double expected_squares = 0;
+    for (const Sighting& sighting : frame.span()) {
+      const auto seen = lens_.project_with_jacobians(camera_from_level * sighting.z.homogeneous());
+      Eigen::Matrix2d d_pixel_d_z = sighting.d_pixel_d_z;
+      if (seen) d_pixel_d_z = seen->d_pixel_d_point * camera_from_level.leftCols<2>();
+      const Eigen::Matrix2d z_by_noise = sighting.sigma_px * d_pixel_d_z.inverse();
+      const Eigen::Matrix2d whitening = sighting.d_pixel_d_z / sighting.sigma_px;
+      const Eigen::Matrix2d residual_by_noise = whitening * z_by_noise;
+      const Eigen::Matrix<double, 4, 2> fix_by_noise =
+          by_weights * predict(pose, sighting.lamp_m).d_z_d_state.transpose() *
+          whitening.transpose() * residual_by_noise;
+      covariance += fix_by_noise * fix_by_noise.transpose();
+      expected_squares += residual_by_noise.squaredNorm();
+    }
+    if (fix.redundancy > 0) {
+      fix.redundancy = expected_squares - (by_weights.inverse() * covariance).trace();
+    }
+    fix.estimate.covariance = covariance;
+  }
+
   /// Adds the covariances of a fix of lamps, and transfers it to the robot if there is a mount.
   void add_covariances(const FrameObservations& frame, const InclinationRotation& lean,
                        const InclinationJacobian& d_pose_d_inclination, const Sensors& sensors,
-                       const Matrix4& height_and_yaw_covariance, Fix& fix) const;
-  FixStatus sight_from_body(std::span<const Detection> detections, double time_s,
-                            BodyObservations& frame) const;
-  /// Returns std::nullopt if the frame has fewer than two lamps of the map.
-  std::optional<Fix> locate_body(std::span<const Detection> detections, const Sensors& sensors,
-                                 std::span<const EarlierFrame> earlier) const;
+                       const Matrix4& height_and_yaw_covariance, Fix& fix) const {
+    const double sigma_rad = sensors.inclination_sigma_rad;
+    const Matrix4 common = common_.stated() ? common_covariance(frame, lean.level_from_base, fix)
+                                            : Matrix4(Matrix4::Zero());
+    if (!frame.is_weighed_by_noise) convert_to_image_noise(frame, lean.level_from_base, fix);
+    fix.estimate.covariance += height_and_yaw_covariance;
+    // The error of the inclination is independent between frames, too.
+    PoseEstimate whole = fix.estimate;
+    whole.covariance += common;
+    fix.noise_covariance =
+        compute_robot_pose(fix.estimate, d_pose_d_inclination, sigma_rad, mount_, lean).covariance;
+    fix.estimate = compute_robot_pose(whole, d_pose_d_inclination, sigma_rad, mount_, lean);
+  }
+
+  /// Returns the motion of the camera when a lamp is read, or std::nullopt if it moves and the row
+  /// time is not known.
+  std::optional<MotionAtReadout> motion_at_readout(std::span<const Detection> detections, int lamp,
+                                                   const Sensors& sensors) const {
+    MotionAtReadout readout;
+    if (!sensors.motion || !moves(*sensors.motion)) return readout;
+    if (!row_clock_) return std::nullopt;
+    const auto detection = std::find_if(detections.begin(), detections.end(),
+                                        [&](const Detection& one) { return one.lamp == lamp; });
+    readout.motion = *sensors.motion;
+    readout.time_s = row_clock_->time_s(detection->pixel);
+    const Eigen::Rotation2Dd camera_from_robot(-mount_.yaw_in_robot_rad);
+    readout.motion.velocity_m_per_s = camera_from_robot * sensors.motion->velocity_m_per_s;
+    readout.arm_m = camera_from_robot * mount_.position_in_robot_m.head<2>();
+    return readout;
+  }
 
   std::vector<Lamp> lamps_;        // in the order of ids, positions relative to origin_m_
   std::vector<double> nearest_m_;  // from each to the nearest other, on the floor plan
@@ -198,7 +469,8 @@ class Positioner::Impl {
   Eigen::Vector3d origin_m_;
   Eigen::Matrix3d base_from_camera_;
   CommonErrors common_;
-  std::optional<CameraMount> mount_;
+  /// Without a mount, the robot is the camera.
+  CameraMount mount_;
   /// The base is the camera's level frame.
   Eigen::Matrix3d body_from_base_, body_from_camera_;
   double max_residual_share_;
@@ -207,344 +479,6 @@ class Positioner::Impl {
   /// std::nullopt if the calibration lacks row time or readout direction.
   std::optional<RowClock> row_clock_;
 };
-
-Positioner::Impl::Impl(const LampMap& map, const Calibration& calibration,
-                       const PositionerOptions& options)
-    : lamps_(sorted_by_id(map.lamps)),
-      lens_(calibration.camera.lens_model, calibration.camera.intrinsics),
-      origin_m_(center_of(lamps_)),
-      base_from_camera_(level_from_camera(calibration, options.correction)),
-      common_(lamps_, calibration, options.correction),
-      mount_(options.mount),
-      body_from_base_(rotation_about_z(mount_ ? mount_->yaw_in_robot_rad : 0)),
-      body_from_camera_(body_from_base_ * base_from_camera_),
-      max_residual_share_(options.max_residual_share),
-      unstated_sigma_px_(options.unstated_sigma_px),
-      computes_common_chi_squared_(options.computes_common_chi_squared),
-      row_clock_(make_row_clock(calibration.camera)) {
-  for (Lamp& lamp : lamps_) lamp.position_m -= origin_m_;
-  nearest_m_ = distances_to_nearest(lamps_);
-  if (mount_ &&
-      !(mount_->position_in_robot_m.allFinite() && std::isfinite(mount_->yaw_in_robot_rad))) {
-    throw std::invalid_argument("the camera's place on the robot is not finite");
-  }
-  if (!(max_residual_share_ > 0)) throw std::invalid_argument("max_residual_share is not positive");
-  if (!(unstated_sigma_px_ >= kMinSigma_px && unstated_sigma_px_ <= kMaxSigma_px)) {
-    throw std::invalid_argument("unstated_sigma_px is not within 0.0001 and 1000");
-  }
-}
-
-/// Adds each detection of a lamp of the map to the frame: `add` takes it, its lamp, its ray and its
-/// standard deviation, and fills the frame's sighting.
-template <typename Frame, typename Add>
-FixStatus Positioner::Impl::find_lamps(std::span<const Detection> detections, Frame& frame,
-                                       const Add& add) const {
-  const auto ids_begin = frame.ids.begin() + static_cast<std::ptrdiff_t>(frame.size);
-  for (const Detection& detection : detections) {
-    const auto lamp =
-        std::lower_bound(lamps_.begin(), lamps_.end(), detection.lamp,
-                         [](const Lamp& candidate, int id) { return candidate.id < id; });
-    if (lamp == lamps_.end() || lamp->id != detection.lamp) {
-      ++frame.unknown_lamps;
-      continue;
-    }
-    const auto ids_end = frame.ids.begin() + static_cast<std::ptrdiff_t>(frame.size);
-    if (std::find(ids_begin, ids_end, lamp->id) != ids_end) return FixStatus::duplicate_lamp;
-    if (frame.size == max_lamps) return FixStatus::too_many_lamps;
-    const double sigma_px = detection.sigma_px.value_or(unstated_sigma_px_);
-    const bool plausible = sigma_px >= kMinSigma_px && sigma_px <= kMaxSigma_px;
-    if (!detection.pixel.allFinite() || !plausible) return FixStatus::not_finite;
-    const auto ray = lens_.unproject(detection.pixel);
-    if (!ray) return FixStatus::outside_lens;
-    const FixStatus added = add(detection, *lamp, *ray, sigma_px);
-    if (added != FixStatus::ok) return added;
-    if (!detection.sigma_px) frame.noise_is_stated = false;
-    frame.nearest_m[frame.size] = nearest_m_[static_cast<std::size_t>(lamp - lamps_.begin())];
-    frame.ids[frame.size++] = lamp->id;
-  }
-  return FixStatus::ok;
-}
-
-std::size_t Positioner::Impl::find_index(int id) const {
-  const auto lamp =
-      std::lower_bound(lamps_.begin(), lamps_.end(), id,
-                       [](const Lamp& candidate, int sought) { return candidate.id < sought; });
-  return static_cast<std::size_t>(lamp - lamps_.begin());
-}
-
-/// Rejects lamps by the reported uncertainties if all are known; otherwise estimate_pose_robust()
-/// decides.
-void Positioner::Impl::reject_outlier_lamps(FrameObservations& frame,
-                                            const Eigen::Matrix3d& level_from_base,
-                                            ConsistentFix& solution) const {
-  constexpr std::size_t min_lamps = 4;  // fewer identify no outlier
-  if (solution.status != FixStatus::ok || frame.size < min_lamps) return;
-  // If the noise alone explains the residuals, no other error is needed.
-  if (solution.fix.chi_squared <= static_cast<double>(2 * frame.size - 4)) return;
-  const LevelPose pose(solution.fix.pose);
-  std::array<Matrix2, max_lamps> common;
-  for (std::size_t i = 0; i < frame.size; ++i) {
-    common[i] = common_.compute_covariance(
-        common_.effect_on(frame.sightings[i], pose, lens_, level_from_base),
-        find_index(frame.ids[i]));
-  }
-  const OutlierLamps wrong =
-      find_outlier_lamps(frame.span(), {common.data(), frame.size}, solution.fix);
-  if (wrong.count == 0) return;
-  std::bitset<kMaxSightings> kept;
-  kept.set();
-  for (std::size_t i = 0; i < wrong.count; ++i) kept.reset(wrong.lamps[i]);
-  frame.keep(kept);
-  solution = estimate_pose_checked(frame.span(), std::numeric_limits<double>::infinity());
-}
-
-Matrix4 Positioner::Impl::common_covariance(const FrameObservations& frame,
-                                            const Eigen::Matrix3d& level_from_base,
-                                            Fix& fix) const {
-  std::array<std::size_t, max_lamps> lamps;
-  for (std::size_t i = 0; i < frame.size; ++i) lamps[i] = find_index(frame.ids[i]);
-  const std::span<const std::size_t> in_map(lamps.data(), frame.size);
-  const Matrix4 common = common_.compute_covariance(
-      common_.compute_error_gain(frame.span(), in_map, fix.estimate, lens_, level_from_base));
-  if (computes_common_chi_squared_ && fix.redundancy > 0) {
-    fix.common_chi_squared = common_.expected_chi_squared(frame.span(), in_map, fix.estimate,
-                                                          common, lens_, level_from_base);
-  }
-  return common;
-}
-
-BodyCovariance Positioner::Impl::common_covariance(const BodyObservations& frame,
-                                                   const Eigen::Vector3d& arm_m,
-                                                   const BodyFix& solution, Fix& fix) const {
-  std::array<std::size_t, max_lamps> lamps;
-  for (std::size_t i = 0; i < frame.size; ++i) lamps[i] = find_index(frame.ids[i]);
-  const std::span<const std::size_t> in_map(lamps.data(), frame.size);
-  const BodyCovariance common = common_.compute_covariance(
-      common_.compute_error_gain(frame.span(), in_map, arm_m, solution, lens_, body_from_base_));
-  if (computes_common_chi_squared_ && fix.redundancy > 0) {
-    fix.common_chi_squared = common_.expected_chi_squared(frame.span(), in_map, arm_m, solution,
-                                                          common, lens_, body_from_base_);
-  }
-  return common;
-}
-
-FixStatus Positioner::Impl::sight(std::span<const Detection> detections,
-                                  const Eigen::Matrix3d& level_from_base,
-                                  FrameObservations& frame) const {
-  const Eigen::Matrix3d level_from_camera = level_from_base * base_from_camera_;
-  const auto add = [&](const Detection& detection, const Lamp& lamp, const Lens::Ray& ray,
-                       double sigma_px) {
-    const Eigen::Vector3d direction = level_from_camera * ray.direction;
-    if (!(direction.z() > 0)) return FixStatus::lamp_below_camera;
-    const Eigen::Matrix<double, 3, 2> d_direction = level_from_camera * ray.d_direction_d_pixel;
-    const Eigen::Vector2d z = direction.head<2>() / direction.z();
-    const Eigen::Matrix2d d_z_d_pixel =
-        (d_direction.topRows<2>() - z * d_direction.row(2)) / direction.z();
-    frame.sightings[frame.size] = {lamp.position_m, z, lens_.focal_px().asDiagonal(), sigma_px};
-    if (detection.sigma_px) {
-      frame.sightings[frame.size].d_pixel_d_z = d_z_d_pixel.inverse();
-    } else {
-      frame.is_weighed_by_noise = false;
-    }
-    return FixStatus::ok;
-  };
-  return find_lamps(detections, frame, add);
-}
-
-FixStatus Positioner::Impl::sight_from_body(std::span<const Detection> detections, double time_s,
-                                            BodyObservations& frame) const {
-  const auto add = [&](const Detection& detection, const Lamp& lamp, const Lens::Ray& ray,
-                       double sigma_px) {
-    const Eigen::Vector3d direction = body_from_camera_ * ray.direction;
-    const auto whitened =
-        whitened_pixel_from_ray(direction, body_from_camera_ * ray.d_direction_d_pixel, sigma_px);
-    if (!whitened) return FixStatus::outside_lens;
-    const double read_s = row_clock_ ? row_clock_->time_s(detection.pixel) : 0;
-    frame.sightings[frame.size] = {lamp.position_m, direction.normalized(), *whitened, sigma_px,
-                                   time_s + read_s};
-    return FixStatus::ok;
-  };
-  return find_lamps(detections, frame, add);
-}
-
-std::optional<Fix> Positioner::Impl::locate_body(std::span<const Detection> detections,
-                                                 const Sensors& sensors,
-                                                 std::span<const EarlierFrame> earlier) const {
-  const KnownMotion motion = sensors.motion.value_or(KnownMotion());
-  if (moves(motion) && !row_clock_) return without_fix(FixStatus::row_time_unknown, 0);
-  BodyPrior prior{{motion.velocity_m_per_s, motion.yaw_rate_rad_per_s,
-                   sensors.inclination.value_or(Inclination{0, 0})},
-                  motion.velocity_sd_m_per_s,
-                  motion.yaw_rate_sd_rad_per_s,
-                  sensors.inclination_sigma_rad,
-                  sensors.height};
-  if (prior.height) prior.height->z_m -= origin_m_.z();
-  Fix fix;
-  BodyObservations frame;
-  const FixStatus seen = sight_from_body(detections, 0, frame);
-  fix.unknown_lamps = frame.unknown_lamps;
-  if (seen != FixStatus::ok) return without_fix(seen, fix.unknown_lamps);
-  frame.num_current = frame.size;
-  for (const EarlierFrame& before : earlier) {
-    const FixStatus status = sight_from_body(before.detections, -before.before_s, frame);
-    if (status != FixStatus::ok) return without_fix(status, fix.unknown_lamps);
-  }
-  if (frame.num_current < 2) return std::nullopt;
-  // If common errors are known, the noise alone must not reject lamps.
-  if (common_.complete()) frame.noise_is_stated = false;
-  const Eigen::Vector3d arm_m =
-      mount_ ? mount_->position_in_robot_m : Eigen::Vector3d(Eigen::Vector3d::Zero());
-  const auto [status, solution] = estimate_body_robust(frame, arm_m, prior, max_residual_share_);
-  if (status != FixStatus::ok) return without_fix(status, fix.unknown_lamps);
-  fix.status = status;
-  fix.redundancy = solution.redundancy;
-  fix.chi_squared = solution.pixels_chi_squared;
-  fix.body = in_world(solution, common_.stated() ? common_covariance(frame, arm_m, solution, fix)
-                                                 : BodyCovariance(BodyCovariance::Zero()));
-  fix.noise_covariance = fix.body->noise_covariance.topLeftCorner<4, 4>();
-  fix.estimate = {solution.state.pose, fix.body->covariance.topLeftCorner<4, 4>()};
-  fix.estimate.pose.position_m += origin_m_;
-  fix.residual_px = solution.residual_px;
-  fix.lamps = static_cast<int>(frame.num_current);
-  fix.sightings = static_cast<int>(frame.size);
-  set_rejected(frame, fix);
-  fix.time_s = sensors.time_s;
-  return fix;
-}
-
-Fix Positioner::Impl::locate(std::span<const Detection> detections, const Sensors& sensors,
-                             std::span<const EarlierFrame> earlier) const {
-  const bool finite_times =
-      std::all_of(earlier.begin(), earlier.end(),
-                  [](const EarlierFrame& before) { return std::isfinite(before.before_s); });
-  if (!finite(sensors) || !finite_times) return without_fix(FixStatus::not_finite, 0);
-  if (const auto fix = locate_body(detections, sensors, earlier)) return *fix;
-  return locate(detections, sensors);
-}
-
-void Positioner::Impl::convert_to_image_noise(const FrameObservations& frame,
-                                              const Eigen::Matrix3d& level_from_base,
-                                              Fix& fix) const {
-  const LevelPose pose(fix.estimate.pose);
-  const Eigen::Matrix3d camera_from_level = (level_from_base * base_from_camera_).transpose();
-  const Matrix4 by_weights = fix.estimate.covariance;
-  Matrix4 covariance = Matrix4::Zero();
-  double expected_squares = 0;
-  for (const Sighting& sighting : frame.span()) {
-    const auto seen = lens_.project_with_jacobians(camera_from_level * sighting.z.homogeneous());
-    Eigen::Matrix2d d_pixel_d_z = sighting.d_pixel_d_z;
-    if (seen) d_pixel_d_z = seen->d_pixel_d_point * camera_from_level.leftCols<2>();
-    const Eigen::Matrix2d z_by_noise = sighting.sigma_px * d_pixel_d_z.inverse();
-    const Eigen::Matrix2d whitening = sighting.d_pixel_d_z / sighting.sigma_px;
-    const Eigen::Matrix2d residual_by_noise = whitening * z_by_noise;
-    const Eigen::Matrix<double, 4, 2> fix_by_noise =
-        by_weights * predict(pose, sighting.lamp_m).d_z_d_state.transpose() *
-        whitening.transpose() * residual_by_noise;
-    covariance += fix_by_noise * fix_by_noise.transpose();
-    expected_squares += residual_by_noise.squaredNorm();
-  }
-  if (fix.redundancy > 0) {
-    fix.redundancy = expected_squares - (by_weights.inverse() * covariance).trace();
-  }
-  fix.estimate.covariance = covariance;
-}
-
-void Positioner::Impl::add_covariances(const FrameObservations& frame,
-                                       const InclinationRotation& lean,
-                                       const InclinationJacobian& d_pose_d_inclination,
-                                       const Sensors& sensors,
-                                       const Matrix4& height_and_yaw_covariance, Fix& fix) const {
-  const double sigma_rad = sensors.inclination_sigma_rad;
-  const Matrix4 common = common_.stated() ? common_covariance(frame, lean.level_from_base, fix)
-                                          : Matrix4(Matrix4::Zero());
-  if (!frame.is_weighed_by_noise) convert_to_image_noise(frame, lean.level_from_base, fix);
-  fix.estimate.covariance += height_and_yaw_covariance;
-  // The error of the inclination is independent between frames, too.
-  if (mount_) {
-    PoseEstimate whole = fix.estimate;
-    whole.covariance += common;
-    fix.noise_covariance =
-        compute_robot_pose(fix.estimate, d_pose_d_inclination, sigma_rad, *mount_, lean).covariance;
-    fix.estimate = compute_robot_pose(whole, d_pose_d_inclination, sigma_rad, *mount_, lean);
-  } else {
-    if (sigma_rad > 0) {
-      fix.estimate.covariance +=
-          sigma_rad * sigma_rad * d_pose_d_inclination * d_pose_d_inclination.transpose();
-    }
-    fix.noise_covariance = fix.estimate.covariance;
-    fix.estimate.covariance += common;
-  }
-}
-
-std::optional<MotionAtReadout> Positioner::Impl::motion_at_readout(
-    std::span<const Detection> detections, int lamp, const Sensors& sensors) const {
-  MotionAtReadout readout;
-  if (!sensors.motion || !moves(*sensors.motion)) return readout;
-  if (!row_clock_) return std::nullopt;
-  const auto detection = std::find_if(detections.begin(), detections.end(),
-                                      [&](const Detection& one) { return one.lamp == lamp; });
-  readout.motion = *sensors.motion;
-  readout.time_s = row_clock_->time_s(detection->pixel);
-  if (mount_) {
-    const Eigen::Rotation2Dd camera_from_robot(-mount_->yaw_in_robot_rad);
-    readout.motion.velocity_m_per_s = camera_from_robot * sensors.motion->velocity_m_per_s;
-    readout.arm_m = camera_from_robot * mount_->position_in_robot_m.head<2>();
-  }
-  return readout;
-}
-
-Fix Positioner::Impl::locate(std::span<const Detection> detections, const Sensors& sensors) const {
-  if (!finite(sensors)) return without_fix(FixStatus::not_finite, 0);
-  if (needs_body(sensors) && detections.size() > 1) {
-    if (auto fix = locate_body(detections, sensors, {})) return *fix;
-  }
-  const InclinationRotation lean =
-      sensors.inclination ? compute_inclination_rotation(*sensors.inclination,
-                                                         mount_ ? mount_->yaw_in_robot_rad : 0)
-                          : InclinationRotation();
-  FrameObservations frame;
-  const FixStatus seen = sight(detections, lean.level_from_base, frame);
-  if (seen != FixStatus::ok) return without_fix(seen, frame.unknown_lamps);
-
-  Fix fix;
-  Matrix4 height_and_yaw_covariance = Matrix4::Zero();
-  InclinationJacobian d_pose_d_inclination = InclinationJacobian::Zero();
-  if (frame.size > 1) {
-    // If common errors are known, the noise alone must not reject lamps.
-    const bool total = common_.complete();
-    if (total) frame.noise_is_stated = false;
-    ConsistentFix found = estimate_pose_robust(frame, max_residual_share_);
-    if (total) reject_outlier_lamps(frame, lean.level_from_base, found);
-    const auto& [status, solution] = found;
-    if (status != FixStatus::ok) return without_fix(status, frame.unknown_lamps);
-    fix.estimate = {solution.pose, solution.covariance};
-    fix.residual_px = solution.residual_px;
-    fix.chi_squared = solution.chi_squared;
-  } else if (frame.size == 1 && sensors.height_and_yaw) {
-    const auto readout = motion_at_readout(detections, frame.ids.front(), sensors);
-    if (!readout) return without_fix(FixStatus::row_time_unknown, frame.unknown_lamps);
-    const Sighting& sighting = frame.sightings.front();
-    HeightAndYaw known = *sensors.height_and_yaw;
-    known.z_m -= origin_m_.z();
-    const auto pose = compute_pose_at_known_height_and_yaw(sighting, known, *readout);
-    if (!pose) return without_fix(FixStatus::lamp_below_camera, frame.unknown_lamps);
-    fix.estimate = {*pose, compute_one_lamp_covariance(sighting, *pose)};
-    height_and_yaw_covariance =
-        compute_one_lamp_sensor_covariance(sighting, *pose, known, *readout);
-    d_pose_d_inclination = compute_one_lamp_rotation_jacobian(sighting, *pose) * lean.error_axes;
-  } else {
-    return without_fix(FixStatus::too_few_lamps, frame.unknown_lamps);
-  }
-  fix.status = FixStatus::ok;
-  fix.lamps = fix.sightings = static_cast<int>(frame.size);
-  fix.redundancy = frame.size < 3 ? 0 : 2 * static_cast<double>(frame.size) - 4;
-  fix.time_s = sensors.time_s;
-  set_rejected(frame, fix);
-  fix.unknown_lamps = frame.unknown_lamps;
-  add_covariances(frame, lean, d_pose_d_inclination, sensors, height_and_yaw_covariance, fix);
-  fix.estimate.pose.position_m += origin_m_;
-  return fix;
-}
 
 Positioner::Positioner(const LampMap& map, const Calibration& calibration,
                        const PositionerOptions& options)

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "positioning/floor_summary.h"
+#include "positioning/floor_limits.h"
 #include "positioning/unit_errors.h"
 #include "report/plots/evaluation_plots.h"
 #include "report/plots/plot_parts.h"

@@ -32,7 +32,7 @@
 #include "frontend/mat_view.h"
 #include "geometry/angles.h"
 #include "lamps/light_detector.h"
-#include "positioning/pose_bound.h"
+#include "positioning/error_budget.h"
 #include "positioning/positioner.h"
 #include "rig/find_lamp.h"
 #include "simulation/exposure.h"

@@ -3,9 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "geometry/angles.h"
-#include "positioning/initial_pose.h"
-#include "positioning/one_lamp_fix.h"
-#include "positioning/two_lamp_fix.h"
+#include "positioning/closed_form.h"
 #include "support/matchers.h"
 #include "support/random.h"
 

@@ -6,9 +6,8 @@
 #include <gtest/gtest.h>
 
 #include "positioning/error_budget.h"
-#include "positioning/initial_pose.h"
+#include "positioning/closed_form.h"
 #include "positioning/positioner.h"
-#include "positioning/two_lamp_fix.h"
 #include "support/body_rig.h"
 #include "support/scatter.h"
 #include "support/synthetic_rig.h"

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
 /// Compares errors of body fixes at random positions with the Cramer-Rao lower bound.
-#include "positioning/pose_bound.h"
+#include "positioning/error_budget.h"
 
 #include <gtest/gtest.h>
 

@@ -13,7 +13,6 @@
 
 #include "geometry/symmetric.h"
 #include "positioning/floor_limits.h"
-#include "positioning/floor_summary.h"
 #include "positioning/positioner.h"
 #include "positioning/stated_rig.h"
 #include "rig/calibration_error.h"

@@ -24,6 +24,21 @@
 namespace vlp {
 namespace {
 
+// The codes of the C interface are those of FixStatus.
+static_assert(VLP_OK == static_cast<int>(FixStatus::ok));
+static_assert(VLP_TOO_FEW_LAMPS == static_cast<int>(FixStatus::too_few_lamps));
+static_assert(VLP_TOO_MANY_LAMPS == static_cast<int>(FixStatus::too_many_lamps));
+static_assert(VLP_DUPLICATE_LAMP == static_cast<int>(FixStatus::duplicate_lamp));
+static_assert(VLP_NOT_FINITE == static_cast<int>(FixStatus::not_finite));
+static_assert(VLP_OUTSIDE_LENS == static_cast<int>(FixStatus::outside_lens));
+static_assert(VLP_LAMP_BELOW_CAMERA == static_cast<int>(FixStatus::lamp_below_camera));
+static_assert(VLP_DEGENERATE == static_cast<int>(FixStatus::degenerate));
+static_assert(VLP_AMBIGUOUS == static_cast<int>(FixStatus::ambiguous));
+static_assert(VLP_INCONSISTENT == static_cast<int>(FixStatus::inconsistent));
+static_assert(VLP_MIRRORED_MAP == static_cast<int>(FixStatus::mirrored_map));
+static_assert(VLP_UNDETERMINED == static_cast<int>(FixStatus::undetermined));
+static_assert(VLP_ROW_TIME_UNKNOWN == static_cast<int>(FixStatus::row_time_unknown));
+
 using testing::HasSubstr;
 using testing::IsEmpty;
 using Handle = std::unique_ptr<vlp_positioner, void (*)(vlp_positioner*)>;

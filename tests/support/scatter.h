@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "geometry/angles.h"
-#include "positioning/camera_mount.h"
+#include "positioning/inclination_rotation.h"
 
 namespace vlp {
 

@@ -8,7 +8,6 @@
 #include "evaluation/fix_summary.h"
 #include "evaluation/gate.h"
 #include "positioning/floor_limits.h"
-#include "positioning/floor_summary.h"
 
 namespace vlp {
 

@@ -2,14 +2,52 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <optional>
+#include <span>
 
 #include "../geometry/frames.h"
+#include "fix.h"
 #include "known_motion.h"
 #include "robot.h"
 #include "sighting.h"
 
 namespace vlp {
+
+/// The poses from two lamps: none, one or two.
+struct TwoLampPoses {
+  int count = 0;
+  std::array<Pose, 2> poses;
+  /// True if a pose would exist with a lamp at or below the camera's height.
+  bool lamp_below_camera = false;
+};
+
+/// Computes position and yaw from two lamps in closed form. With D = p_2 - p_1, h = Z_2 - Z_1 and H
+/// = Z_1 - Zs, the positioning equation gives D = e^{jg} (H (z_2 - z_1) + h z_2), so
+///   |z_2 - z_1|^2 H^2 + 2 h Re(conj(z_2 - z_1) z_2) H + h^2 |z_2|^2 - |D|^2 = 0.
+/// At equal heights (h = 0): H = |D| / |z_2 - z_1|, g = arg(D / (z_2 - z_1)), eq. 5 with eq. 7.
+///
+/// Lamps at different heights have two solutions if both are far from the image center and close
+/// together (|h z_2| > |D|); otherwise one. Returns none if the lamps coincide in the image.
+TwoLampPoses compute_two_lamp_poses(const Sighting& first, const Sighting& second);
+
+/// Computes position and yaw from two or more lamps at one height, in closed form. The
+/// least-squares similarity p = s + c z gives H = |c|, g = arg c (the method of [19] in Chen and
+/// Guan). All lamps have equal weights. Returns std::nullopt if the lamps coincide in the image.
+/// @pre the lamps have equal heights; their mean is used
+std::optional<Pose> compute_coplanar_pose(std::span<const Sighting> sightings);
+
+/// A pose in closed form and its status.
+struct InitialPose {
+  /// `ok`, or the reason of failure.
+  FixStatus status;
+  Pose pose;
+};
+
+/// Computes a pose from two or more lamps in closed form, exact without noise. Two lamps:
+/// compute_two_lamp_poses(). Lamps at one height: the similarity. Otherwise the solutions from the
+/// two lamps that are far apart in the image; of these, the one that fits the other lamps best.
+InitialPose compute_initial_pose(std::span<const Sighting> sightings);
 
 /// Motion of the camera at the readout time of the lamp's row.
 struct MotionAtReadout {
