@@ -110,13 +110,19 @@ void run(const CLI::App& app, const Options& options) {
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Everything that captures share, solved together: the camera's tilt and lever arm, the\n"
-      "lamps' places, the lens within what its calibration leaves open, with their joint\n"
-      "covariance, from any sets of captures: turns on a spot, known places, drives, heights.\n"
-      "captures.csv in a set's folder tells what is known: pivot (captures of one name were taken\n"
-      "turning on one spot), x_m, y_m, z_m with reference_point (camera or axis) and\n"
-      "position_sd_m; vx_m_per_s, vy_m_per_s, yaw_rate_rad_per_s with velocity_sd_m_per_s (of the\n"
-      "camera, in its level frame). A set called rotation is a turn on the spot.\n\n"
+      "Estimates tilt and lever arm of a camera, lamp positions and lens jointly from sets of "
+      "captures, with their joint covariance. A set may be a rotation in place, a drive, or "
+      "captures at known positions or several heights. The lens is corrected within the covariance "
+      "of its calibration.\n\n"
+      "The file captures.csv in the folder of a set may have these columns:\n"
+      "  pivot                 rotation in place to which the capture belongs\n"
+      "  x_m, y_m, z_m         known position, with reference_point (camera or axis)\n"
+      "                        and position_sd_m\n"
+      "  vx_m_per_s, vy_m_per_s, yaw_rate_rad_per_s\n"
+      "                        motion in the level frame of the camera, with\n"
+      "                        velocity_sd_m_per_s\n"
+      "  roll_rad, pitch_rad   inclination\n\n"
+      "A set named rotation is a rotation in place.\n\n"
       "Example, from the project's folder:\n"
       "  build/bin/vlp-adjust datasets/example/detections.csv \\\n"
       "    --turn datasets/example/turning.csv \\\n"
@@ -126,43 +132,45 @@ int main(int argc, char** argv) {
       "vlp-adjust");
   vlp::Options options;
   app.add_option("sets", options.sets,
-                 "Folders of images, or tables: image, lamp, u_px, v_px [, sigma_px]")
+                 "Folders of images, or tables with columns image, lamp, u_px, v_px [, sigma_px]")
       ->option_text("SET...");
-  app.add_option("--turn", options.turns, "Further sets, each a turn on the spot")
+  app.add_option("--turn", options.turns, "Further sets, each a rotation in place")
       ->option_text("SET...");
-  app.add_option("--lamps", options.images.lamps, "Lamp map, lamps.yaml, with its sd_m")
+  app.add_option("--lamps", options.images.lamps,
+                 "Lamp map, lamps.yaml. Without sd_m it needs --map-sd-m")
       ->required();
   app.add_option("--calibration", options.images.calibration,
-                 "Calibration of the camera; a rotation center in it is where the search starts")
+                 "Calibration of the camera. Its rotation center, if any, is the initial value")
       ->required();
   app.add_option("-o,--output", options.images.output,
-                 "Where to write the calibration with its adjustment")
+                 "Output file of the calibration with its adjustment, YAML")
       ->required();
   app.add_option("--refine-map", options.refined_map,
-                 "Where to write the map with its lamps "
-                 "where the captures show them")
+                 "Output file of the lamp map with the estimated positions, YAML. The covariance "
+                 "of the output calibration then refers to this map")
       ->option_text("FILE");
   app.add_option("--map-sd-m", options.map_sd_m,
-                 "Standard deviation per axis of lamps whose survey states none")
+                 "Standard deviation per axis of lamp positions without sd_m, in m")
       ->check(vlp::finite_not_negative());
   app.add_option("--position-sd-m", options.place_sd_m,
-                 "Standard deviation per axis of positions that state none, those of truth.csv too")
+                 "Standard deviation per axis of known positions without position_sd_m, in m. Also "
+                 "uses truth.csv in folders of images (default: such positions are ignored)")
       ->check(vlp::make_finite_positive_validator());
-  app.add_option("--lens-sd-px", options.lens_sd_px,
-                 "Of a lens whose calibration states no covariance: by how much each of its "
-                 "parameters may be off, as the shift of the image that it makes, rms; such a lens "
-                 "is then estimated (default: it is exact)")
+  app.add_option(
+         "--lens-sd-px", options.lens_sd_px,
+         "Standard deviation of each lens parameter, as RMS displacement of the image, in px. For "
+         "calibrations without lens covariance; the lens is then estimated (default: exact lens)")
       ->check(vlp::make_finite_positive_validator())
       ->check(CLI::Range(1e-3, 1e3));  // px; smaller: exact lens, larger: unusable lens
   vlp::add_motion_options(
       app, options.motion,
-      "The camera drives, so fast at most: its velocity is estimated in each capture (default: as "
-      "captures.csv says, or else it stands)");
+      "Maximum speed of the camera, in m/s. Estimates the motion of each capture unless "
+      "captures.csv has it (default: motion of captures.csv, or 0)");
   vlp::add_yaw_rate_sd_option(app, options.yaw_rate_sd_deg_per_s);
   vlp::add_detect_options(app, options.images);
   return vlp::run_app(app, argc, argv, [&] {
     if (options.sets.empty() && options.turns.empty()) {
-      throw std::invalid_argument("which captures? Name a folder of images or a table");
+      throw std::invalid_argument("SET: missing; give a folder of images or a table of detections");
     }
     vlp::run(app, options);
   });
