@@ -62,19 +62,19 @@ void run(const Options& options) {
   const bool squares = options.chessboard || options.charuco;
   if (squares && std::min(options.cols.value_or(min_squares), options.rows.value_or(min_squares)) <
                      min_squares) {
-    throw std::invalid_argument("a board of squares has 4 x 4 of them or more");
+    throw std::invalid_argument("--cols, --rows: a board of squares needs at least 4 x 4 squares");
   }
   if (!squares && options.square_mm) {
-    throw std::invalid_argument("--square-mm is for --chessboard and --charuco");
+    throw std::invalid_argument("--square-mm: only for --chessboard and --charuco; use --tag-mm");
   }
   const PageSize& paper = find_page_size(options.paper);
   Board board = make_board(options);
   if (board.has_squares() ? !options.square_mm : !options.tag_mm) {
     const auto largest_m = find_largest_size_m(board, paper);
     if (!largest_m) {
-      throw std::invalid_argument(std::string("so many ") +
-                                  (board.has_squares() ? "squares" : "tags") + " do not fit on " +
-                                  paper.name);
+      throw std::invalid_argument(fmt::format(
+          "--cols, --rows: {} x {} {} do not fit on {}; use fewer or a larger --paper", board.cols,
+          board.rows, board.has_squares() ? "squares" : "tags", paper.name));
     }
     (board.has_squares() ? board.square_size_m : board.tag_size_m) = *largest_m;
   }
@@ -103,60 +103,65 @@ void run(const Options& options) {
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Makes a board to print at true scale, of AprilTags, of squares (chessboard) or of both\n"
-      "(ChArUco, with markers of OpenCV's dictionaries), and the board.yaml that tells\n"
-      "vlp-intrinsics of it. Print it at 100 %, measure its ruler, and glue it to something "
-      "flat.\n\n"
+      "Creates a printable calibration board of AprilTags, squares (chessboard) or both (ChArUco, "
+      "with markers of an OpenCV dictionary). Also writes its description, board.yaml, for "
+      "vlp-intrinsics. Print the board at 100 %, measure the ruler on the print, and mount it on a "
+      "flat surface.\n\n"
       "Examples:\n"
       "  build/bin/vlp-board -o board.pdf\n"
       "  build/bin/vlp-board --kalibr --cols 6 --rows 6 --paper A3 -o board.pdf\n",
       "vlp-board");
   vlp::Options options;
   app.add_option("-o,--output", options.output,
-                 "Where to write the PDF; board.yaml goes beside it, under the same name")
+                 "Output file of the board, PDF. The board description has the same name with "
+                 "extension .yaml")
       ->required()
       ->check(vlp::make_ending_validator(".pdf"));
-  app.add_option("--paper", options.paper, "A0 to A4 or Letter (default: A4)");
-  app.add_option("--cols", options.cols, "Tags or squares along the width (default: 6 tags, 10)")
+  app.add_option("--paper", options.paper, "Paper size, A0 to A4 or Letter (default: A4)");
+  app.add_option("--cols", options.cols,
+                 "Number of tags or squares along the width (default: 6 tags or 10 squares)")
       ->check(CLI::Range(1, 100));
-  app.add_option("--rows", options.rows, "Tags or squares along the height (default: 5 tags, 7)")
+  app.add_option("--rows", options.rows,
+                 "Number of tags or squares along the height (default: 5 tags or 7 squares)")
       ->check(CLI::Range(1, 100));
-  auto* tag_mm =
-      app.add_option("--tag-mm", options.tag_mm,
-                     "Width of a tag's black border (default: as wide as the paper allows)")
-          ->check(CLI::Range(1.0, 1000.0));
+  auto* tag_mm = app.add_option("--tag-mm", options.tag_mm,
+                                "Width of a tag including its black border, in mm (default: "
+                                "largest that fits on the paper)")
+                     ->check(CLI::Range(1.0, 1000.0));
   auto* spacing =
-      app.add_option("--spacing", options.spacing,
-                     "Gap between tags over the width of a tag (default: 1; 0.3 with --kalibr)")
+      app.add_option(
+             "--spacing", options.spacing,
+             "Gap between tags as a fraction of the tag width (default: 1; with --kalibr 0.3)")
           ->check(CLI::Range(0.05, 5.0));
-  auto* family =
-      app.add_option("--family", options.family, "Family of the tags (default: tag36h11)")
-          ->check(
-              CLI::IsMember({"tag36h11", "tag25h9", "tag16h5", "tagCircle21h7", "tagCircle49h12",
-                             "tagCustom48h12", "tagStandard41h12", "tagStandard52h13"}));
+  auto* family = app.add_option("--family", options.family, "Tag family (default: tag36h11)")
+                     ->check(CLI::IsMember({"tag36h11", "tag25h9", "tag16h5", "tagCircle21h7",
+                                            "tagCircle49h12", "tagCustom48h12", "tagStandard41h12",
+                                            "tagStandard52h13"}));
   auto* first_id =
       app.add_option("--first-id", options.first_id, "Id of the first tag or marker (default: 0)")
           ->check(CLI::Range(0, 100000));
-  auto* kalibr = app.add_flag("--kalibr", options.kalibr,
-                              "A Kalibr AprilGrid: borders of two bits, corner squares");
+  auto* kalibr = app.add_flag(
+      "--kalibr", options.kalibr,
+      "Make a Kalibr AprilGrid: black borders two bits wide, squares at the tag corners");
   auto* chessboard =
-      app.add_flag("--chessboard", options.chessboard, "Black and white squares")->excludes(kalibr);
-  auto* charuco = app.add_flag("--charuco", options.charuco,
-                               "Squares with a marker in each white one, as OpenCV draws them")
-                      ->excludes(kalibr)
-                      ->excludes(chessboard);
+      app.add_flag("--chessboard", options.chessboard, "Make a chessboard")->excludes(kalibr);
+  auto* charuco =
+      app.add_flag("--charuco", options.charuco,
+                   "Make a ChArUco board of OpenCV: chessboard with a marker in each white square")
+          ->excludes(kalibr)
+          ->excludes(chessboard);
   for (CLI::Option* of_tags : {tag_mm, spacing, family}) {
     of_tags->excludes(chessboard)->excludes(charuco);
   }
   first_id->excludes(chessboard);
   app.add_option("--square-mm", options.square_mm,
-                 "Width of a square (default: as wide as the paper allows)")
+                 "Width of a square, in mm (default: largest that fits on the paper)")
       ->check(CLI::Range(1.0, 1000.0));
   app.add_option("--dictionary", options.dictionary,
-                 "OpenCV's dictionary of the markers (default: DICT_5X5_100)")
+                 "OpenCV dictionary of the markers (default: DICT_5X5_100)")
       ->needs(charuco);
   app.add_option("--marker-share", options.marker_share,
-                 "Width of a marker over that of its square (default: 0.75)")
+                 "Marker width as a fraction of the square width (default: 0.75)")
       ->check(CLI::Range(0.3, 0.9))
       ->needs(charuco);
   return vlp::run_app(app, argc, argv, [&] { vlp::run(options); });

@@ -638,7 +638,7 @@ const std::string kClearParts =
     "no regular expression|no such status|none is held out|none of the folders|"
     "not colSpacingMeters|not in the map|of letters, digits|of the golden unit|outside the room|"
     "parameters, not|run writes there|scene has |should|smaller than the square|split off|"
-    "squares has 4 x 4|stands four times|stands twice|states them|stdin: a line|"
+    "stands four times|stands twice|states them|stdin: a line|"
     "string of keywords|stripes, seen from z|takes four|the board's white|the brightest lamp|"
     "their place|there are no|there is no|too small for|turn on the spot|two are called|"
     "two black bits|views with the board|wants a value|wants RESULTS|was not judged|"
