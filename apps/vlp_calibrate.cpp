@@ -43,21 +43,23 @@ void run(Options options) {
 
 int calibrate(int argc, char** argv) {
   CLI::App app(
-      "Calibrates a camera from a folder of its captures, checks it, and writes a report: the\n"
-      "steps lens, row-time, rotation, dispersion, check, evaluate. A step whose inputs, options\n"
-      "and outputs are as before is not run again; killed, the same command goes on.\n\n"
-      "SESSION, which is only read, holds\n"
-      "  lamps.yaml            the lamps, with their frequencies\n"
-      "  boards/, board.yaml   images of the board, and what it is; or camera.yaml,\n"
-      "                        the camera part of a calibration\n"
-      "  rotation/             captures while the camera turns on the spot\n"
-      "  dispersion/           at known places, turning; captures.csv says where\n"
+      "Calibrates a camera from a folder of its captures, evaluates it, and writes a report. Runs "
+      "the steps lens, row-time, rotation, dispersion, check, one per line-*, and evaluate. Skips "
+      "a step if its inputs, options and outputs are unchanged. After an interruption the same "
+      "command continues.\n\n"
+      "The input folder SESSION is not modified. It contains:\n"
+      "  lamps.yaml            lamp map with frequencies\n"
+      "  boards/, board.yaml   images of the board and its description; or\n"
+      "  camera.yaml           camera part of a calibration, used instead of boards/\n"
+      "  rotation/             captures while the camera rotates in place\n"
+      "  dispersion/           captures at several yaws, with positions in captures.csv\n"
+      "                        or truth.csv (optional)\n"
+      "  check/                captures to locate (optional); errors and report need\n"
+      "                        positions in truth.csv or captures.csv\n"
+      "  line-*/               captures along a straight line, with positions\n"
       "                        (optional)\n"
-      "  check/                to locate; with truth.csv, or places in captures.csv,\n"
-      "                        also the errors and the report (optional)\n"
-      "  line-*/               along a straight line each, with places (optional)\n"
-      "  classifier.yaml       of vlp-train, to tell the lamps apart (optional)\n"
-      "  gates.yaml            what the figures have to keep to (optional)\n\n"
+      "  classifier.yaml       lamp classifier of vlp-train (optional)\n"
+      "  gates.yaml            limits of the metrics (optional)\n\n"
       "Example, from the project's folder:\n"
       "  build/bin/vlp-simulate datasets/paper-rig/scene.yaml \\\n"
       "    --only boards,rotation,dispersion,check -o out/session\n"
@@ -67,31 +69,34 @@ int calibrate(int argc, char** argv) {
   Options options;
   auto& how = options.how;
   how.frontend = make_default_frontend();
-  app.add_option("session", options.session, "Folder of the captures")->required();
+  app.add_option("session", options.session, "Input folder of the captures")->required();
   app.add_option("-o,--output", options.results,
-                 "Folder for calibration.yaml, check-fixes.csv, evaluation.json, report.html, "
-                 "session.json and what each step wrote; made when it is not there")
+                 "Output folder, created if missing: calibration.yaml, check-fixes.csv, "
+                 "evaluation.json, report.html, session.json, junit.xml and the files of each step")
       ->required();
-  app.add_option("--camera-id", how.camera_id, "Name of the camera (default: camera)");
+  app.add_option("--camera-id", how.camera_id, "Camera id in the calibration (default: camera)");
   add_lens_option(app, options.lens);
   app.add_option("--row-time-s", how.frontend.row_time_s,
-                 "Time from one row of the read-out to the next (default: found from rotation)")
+                 "Row time: time between the readout of successive rows, in s (default: estimated "
+                 "from rotation/)")
       ->check(CLI::Range(1e-8, 1e-3));
   add_readout_option(app, how.frontend.readout);
   add_room_option(app, how.frontend.room);
   add_board_limit_options(app, how.frontend);
   app.add_option("--gates", how.gates_file,
-                 "Gates, vlp-gates/1, for a session that has no gates.yaml; of the lens there are "
-                 "some in any case");
-  app.add_flag("--report,!--no-report", how.report,
-               "Draw pictures and write report.html (default), or not");
-  app.add_option("--redo", how.redo, "Run a step again though nothing has changed")
+                 "File of gates, vlp-gates/1, for sessions without gates.yaml. Its gates are added "
+                 "to the default gates of the lens, or replace them");
+  app.add_flag("--report,!--no-report", how.report, "Write plots and report.html (default: yes)");
+  app.add_option("--redo", how.redo, "Steps to run even if nothing has changed")
       ->option_text("STEP ...");
   add_threads_option(app, how.frontend.threads);
   app.add_flag(
       "--batch-stdin",
-      [](std::int64_t) { throw CLI::ValidationError("--batch-stdin", "stands alone"); },
-      "Alone: do what stdin says, a line of JSON for each session; see apps/vlp-calibrate.md");
+      [](std::int64_t) {
+        throw CLI::ValidationError("--batch-stdin", "excludes all other arguments; give it alone");
+      },
+      "Read requests from stdin, one line of JSON for each session; see apps/vlp-calibrate.md. "
+      "Excludes all other arguments");
   app.footer("Gates:\n" + gate_descriptions(session_metrics()));
   return run_app(app, argc, argv, [&] { run(options); });
 }

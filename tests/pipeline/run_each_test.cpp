@@ -99,7 +99,8 @@ TEST_F(RunEach, RejectsInvalidLine) {
   const auto with_more = run_program("vlp-calibrate a -o b --batch-stdin");
   EXPECT_EQ(with_more.exit_code, 2);
   EXPECT_EQ(with_more.errors,
-            "vlp-calibrate: error: --batch-stdin: stands alone; see vlp-calibrate --help\n");
+            "vlp-calibrate: error: --batch-stdin: excludes all other arguments; give it alone; see "
+            "vlp-calibrate --help\n");
 }
 
 }  // namespace
