@@ -43,7 +43,7 @@ void print_region(const Options& options, const Camera& camera, const ImageRegio
   const bool kept = options.to == "calibration" || options.to == "mrcal";
   fmt::print("known         in {:.1f} % of the image, which {}\n",
              100 * compute_image_fraction(region, camera.imager_px),
-             kept ? "is kept" : "the format cannot say");
+             kept ? "is kept" : "the format does not support");
 }
 
 void run(const CLI::App& app, const Options& options) {
@@ -83,26 +83,29 @@ void run(const CLI::App& app, const Options& options) {
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Converts a camera from the file of one tool to that of another: a calibration of "
-      "this toolbox, mrcal's .cameramodel, OpenCV's FileStorage (also cv::fisheye), ROS "
-      "camera_info, Kalibr's camchain. The input's content tells its format. The numbers stay as "
-      "they are where both have the lens model; otherwise --lens fits one that the other has.\n\n"
+      "Converts a camera file between the formats of this toolbox (calibration), mrcal "
+      "(.cameramodel), OpenCV (FileStorage, also of cv::fisheye), ROS (camera_info) and Kalibr "
+      "(camchain). The format of the input is detected from its content. Parameters stay unchanged "
+      "if the output format supports the lens model. Otherwise, fit a supported model with "
+      "--lens.\n\n"
       "Example, from the project's folder:\n"
       "  build/bin/vlp-convert datasets/paper-rig/rendered/true_calibration.yaml \\\n"
       "    --to ros -o ros.yaml\n",
       "vlp-convert");
   vlp::Options options;
-  app.add_option("input", options.input, "File with a camera")->required();
-  app.add_option("-o,--output", options.output, "Where to write it")->required();
-  app.add_option("--to", options.to, "Format to write (default: calibration)")
+  app.add_option("input", options.input, "Input file with a camera")->required();
+  app.add_option("-o,--output", options.output, "Output file")->required();
+  app.add_option("--to", options.to, "Output format (default: calibration)")
       ->check(CLI::IsMember({"calibration", "mrcal", "opencv", "ros", "kalibr"}))
       ->option_text("calibration|mrcal|opencv|ros|kalibr");
   app.add_option("--lens", options.lens,
-                 "Lens model to fit, which is said how well (default: as it is)")
+                 "Lens model to fit to the input. The largest difference between both is printed "
+                 "(default: lens model of the input)")
       ->check([](const std::string& name) {
         return vlp::lens_model_from_name(name) ? std::string()
                                                : "the models are: " + vlp::lens_model_names();
       });
-  app.add_option("--camera-id", options.camera_id, "Name of the camera (default: as it is)");
+  app.add_option("--camera-id", options.camera_id,
+                 "Camera id in the output (default: that of the input)");
   return vlp::run_app(app, argc, argv, [&] { vlp::run(app, options); });
 }

@@ -79,7 +79,7 @@ TEST_F(VlpConvert, KeepsCalibratedRegion) {
   EXPECT_FALSE(back.intrinsics_report->expected_max_error_px);
   EXPECT_THAT(convert("camera.yaml", "out", "--to mrcal"),
               HasSubstr("% of the image, which is kept"));
-  EXPECT_THAT(convert("camera.yaml", "out", "--to ros"), HasSubstr("the format cannot say"));
+  EXPECT_THAT(convert("camera.yaml", "out", "--to ros"), HasSubstr("the format does not support"));
 
   calibration_.intrinsics_report->region_px.clear();
   EXPECT_FALSE(round_trip("mrcal").intrinsics_report);
