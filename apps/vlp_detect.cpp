@@ -37,13 +37,14 @@ void run(const CaptureOptions& options, const std::string& captures) {
       inputs);
   check_every(options.frontend.every, {options.images});
   if (!captures.empty() && !is_video_name(options.images)) {
-    throw std::invalid_argument("--captures is for a video, whose frames have times");
+    throw std::invalid_argument("--captures: images have no frame times; use it for a video only");
   }
   std::optional<Calibration> calibration;
   if (!options.calibration.empty()) {
     calibration = read_calibration(options.calibration);
   } else if (!options.frontend.row_time_s && options.frontend.classifier.empty()) {
-    throw std::invalid_argument("--calibration, --row-time-s or --classifier has to tell lamps");
+    throw std::invalid_argument(
+        "lamps cannot be identified; give --calibration, --row-time-s or --classifier");
   }
   const Observations found =
       observe_captures(options, ImageUse::fixes,
@@ -71,8 +72,8 @@ void run(const CaptureOptions& options, const std::string& captures) {
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Finds the lamps in images of a rolling-shutter camera and tells them apart by their\n"
-      "stripes. Only lamps wholly in the image and identified beyond doubt are written.\n\n"
+      "Detects lamps in images of a rolling-shutter camera and identifies them by their stripes. "
+      "Writes only lamps that are completely visible and identified without ambiguity.\n\n"
       "Example, from the project's folder:\n"
       "  build/bin/vlp-detect datasets/paper-rig/rendered/sample \\\n"
       "    --lamps datasets/paper-rig/rendered/lamps.yaml \\\n"
@@ -82,26 +83,23 @@ int main(int argc, char** argv) {
   vlp::CaptureOptions options;
   app.add_option("images", options.images,
                  "Folder of images: PNG, JPEG, BMP, TIFF or PGM; or a video: AVI, MP4, MOV, MKV or "
-                 "WebM. With --calibration inclinations of the camera in the folder's captures.csv "
-                 "count")
+                 "WebM. With --calibration, inclinations in captures.csv of the folder are applied")
       ->required();
   app.add_option("--lamps", options.lamps,
-                 "Lamp map, lamps.yaml, with frequencies unless there is a classifier")
+                 "Lamp map, lamps.yaml. Needs frequencies unless --classifier is given")
       ->required();
   app.add_option("--calibration", options.calibration,
-                 "Calibration: the camera with its row time, and its tilt when known; without it "
+                 "Calibration of the camera, with row time and, if known, tilt. Without it, "
                  "centers are those of ellipses in the image");
   app.add_option("--row-time-s", options.frontend.row_time_s,
-                 "Row time of a camera without a calibration")
+                 "Row time of a camera without calibration, in s")
       ->check(vlp::make_finite_positive_validator())
       ->excludes("--calibration");
-  app.add_option("-o,--output", options.output, "Where to write detections.csv")->required();
-  app.add_option(
-      "--lights", options.lights,
-      "Where to write lights.csv: every light, what it is and why, and what was measured");
+  app.add_option("-o,--output", options.output, "Output file of detections, CSV")->required();
+  app.add_option("--lights", options.lights,
+                 "Output file of all lights, CSV, with class, reason and measured values");
   std::string captures;
-  app.add_option("--captures", captures,
-                 "Where to write captures.csv of a video: its frames and when they were taken");
+  app.add_option("--captures", captures, "Output file of the frame times of a video, captures.csv");
   vlp::add_every_option(app, options.frontend.every);
   vlp::add_detect_options(app, options);
   return vlp::run_app(app, argc, argv, [&] { vlp::run(options, captures); });

@@ -92,7 +92,7 @@ TEST_F(VlpDetectVideo, ReportsErrorInOneLine) {
   refused(none, "", none + ": cannot be opened as a video: is it cut short, or none?");
   refused(kRig + "/sample", "--every 2", "--every is for videos, and there is none");
   refused(kRig + "/sample", "--captures " + (folder / "captures.csv").string(),
-          "--captures is for a video, whose frames have times");
+          "--captures: images have no frame times; use it for a video only");
   const auto located =
       run_program("vlp-locate " + none + " --lamps " + kRig + "/lamps.yaml --calibration " + kRig +
                   "/true_calibration.yaml -o " + (folder / "fixes.csv").string());
