@@ -57,17 +57,18 @@ KnownPlaces find_places(const Options& options, const std::vector<Frame>& frames
   KnownPlaces places = collect_known_places(frames, captures, station_m,
                                             options.of == "axis" ? PlaceOf::axis : PlaceOf::camera);
   if (places.captures.empty() && captures.empty()) {
-    throw std::invalid_argument("where is the station? Give --reference-point or --captures");
+    throw std::invalid_argument(
+        "the positions of the captures are unknown; give --reference-point or --captures");
   }
   const std::string table = options.captures.empty() ? options.images.images : options.captures;
   if (places.captures.empty()) {
     throw InputError(table,
-                     "tells no place of these captures: it needs x_m and y_m, and the names of the "
-                     "images; or give --reference-point");
+                     "no capture has a position; add columns x_m and y_m for these images, or give "
+                     "--reference-point");
   }
   if (places.without > 0) {
-    spdlog::warn("{} of {} captures left out: {} does not tell their place", places.without,
-                 frames.size(), table);
+    spdlog::warn("{}: {} of {} captures have no position and are ignored; add x_m and y_m", table,
+                 places.without, frames.size());
   }
   return places;
 }
@@ -100,8 +101,9 @@ void run(const CLI::App& app, Options options) {
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "What a camera's fixes at a known station still lack: an offset of the image center, told\n"
-      "apart from errors of lamp map and station by captures at different yaws.\n\n"
+      "Estimates the dispersion offset of a camera, the image offset that remains in fixes at "
+      "known positions. Captures at several yaws separate it from errors of lamp map and reference "
+      "points.\n\n"
       "Example, from the project's folder:\n"
       "  build/bin/vlp-dispersion datasets/example/station.csv \\\n"
       "    --lamps datasets/example/lamps.yaml \\\n"
@@ -110,35 +112,38 @@ int main(int argc, char** argv) {
       "vlp-dispersion");
   vlp::Options options;
   vlp::add_capture_options(app, options.images,
-                           {"A folder of images taken at the station, or their detections.csv",
-                            "Calibration of the camera; its rotation_center is applied",
-                            "Where to write the calibration with its dispersion"});
+                           {"Folder of images taken at known positions, or their detections.csv",
+                            "Calibration of the camera. Its rotation_center is applied",
+                            "Output file of the calibration with its dispersion, YAML"});
   auto* station =
-      app.add_option("--reference-point", options.station_m, "Where the camera is in the world")
+      app.add_option(
+             "--reference-point", options.station_m,
+             "Known position of all captures in the world, in m. Overrides positions in tables")
           ->check(vlp::finite())
           ->option_text("X_M Y_M");
   app.add_option("--position-of", options.of,
-                 "Whose position --reference-point is: the camera's (default), or that of the axis "
-                 "it turns "
-                 "about, a lever arm away")
+                 "Point to which --reference-point refers: camera (default), or axis, the rotation "
+                 "axis at the distance of the lever arm")
       ->needs(station)
       ->check(CLI::IsMember({"camera", "axis"}))
       ->option_text("camera|axis");
   app.add_option("--captures", options.captures,
-                 "captures.csv: image, x_m, y_m (where the camera is) [, roll_rad, pitch_rad]; "
-                 "default: captures.csv and truth.csv in the folder")
+                 "Table of captures, captures.csv: image, x_m, y_m [, reference_point, roll_rad, "
+                 "pitch_rad] (default: captures.csv and truth.csv in the folder)")
       ->excludes(station);
-  app.add_option(
-         "--method", options.method,
-         "camera (default): captures at different yaws; chen-guan: the circle's center, captures "
-         "at one yaw, lamp map and station supposed right")
+  app.add_option("--method", options.method,
+                 "Method. camera (default): separates errors that rotate with the camera from "
+                 "errors in the world; needs several yaws. chen-guan: moves the circle center to "
+                 "the reference point; needs one yaw and an exact lamp map and reference point")
       ->check(vlp::present_value())
       ->check(CLI::IsMember({"camera", "chen-guan"}))
       ->option_text("camera|chen-guan");
   app.add_option("--circle", options.circle,
-                 "The dispersion circle: around the mean fix (default), or the smallest enclosing")
+                 "Dispersion circle: mean (default), centered at the mean fix; or enclosing, the "
+                 "smallest that contains all fixes")
       ->check(CLI::IsMember({"mean", "enclosing"}))
       ->option_text("mean|enclosing");
-  app.add_option("--plot", options.plot, "Draw the fixes and their circles, .png or .svg");
+  app.add_option("--plot", options.plot,
+                 "Output file of a plot of fixes and circles, .png or .svg");
   return vlp::run_app(app, argc, argv, [&] { vlp::run(app, options); });
 }

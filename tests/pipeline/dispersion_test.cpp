@@ -83,13 +83,14 @@ TEST_F(VlpDispersion, ReadsPlacesFromCapturesCsv) {
   folder.file("captures.csv", table.substr(0, table.find("5.png")));
   const auto fewer = dispersion(frames, "--captures " + captures);
   EXPECT_EQ(fewer.exit_code, 0);
-  EXPECT_THAT(fewer.errors, HasSubstr("1 of 6 captures left out"));
+  EXPECT_THAT(fewer.errors, HasSubstr("1 of 6 captures have no position"));
 
   folder.file("captures.csv", "image,time_s\n0.png,0\n");
   const auto none = dispersion(frames, "--captures " + captures);
   EXPECT_EQ(none.exit_code, 2);
-  EXPECT_THAT(none.errors, HasSubstr("captures.csv: tells no place"));
-  EXPECT_THAT(dispersion(frames, "").errors, HasSubstr("where is the station?"));
+  EXPECT_THAT(none.errors, HasSubstr("captures.csv: no capture has a position"));
+  EXPECT_THAT(dispersion(frames, "").errors,
+              HasSubstr("the positions of the captures are unknown"));
 }
 
 TEST_F(VlpDispersion, RequiresSeveralYawsOrMethodPaper) {
