@@ -57,7 +57,7 @@ struct Options {
 /// Checks the coordinates X0, Y0, X1, Y1 of a commanded line, m. Throws std::invalid_argument.
 void check_line(const std::string& option, const std::array<double, 4>& line_m) {
   if (line_m[0] == line_m[2] && line_m[1] == line_m[3]) {
-    throw std::invalid_argument(option + ": the line begins where it ends");
+    throw std::invalid_argument(option + ": start and end of the line are equal; correct them");
   }
   for (const double value_m : line_m) {
     if (std::abs(value_m) > kMaxCoordinate_m) {
@@ -105,20 +105,20 @@ void check_options(const Options& options, const std::vector<Gate>& gates) {
                          (options.line_m.empty() ? 0 : 1);
   if (references != 1) {
     throw std::invalid_argument(
-        "say what to hold the fixes against: one of --truth, --path, --line");
+        "the fixes need exactly one reference; give one of --truth, --path, --line");
   }
   if (const auto& line_m = options.line_m; !line_m.empty()) {
     check_line("--line", {line_m[0], line_m[1], line_m[2], line_m[3]});
   }
   if (!options.junit.empty() && gates.empty()) {
-    throw std::invalid_argument(
-        "--junit tells of gates, and there are none: add --gate or --gates");
+    throw std::invalid_argument("--junit: there are no gates; add --gate or --gates");
   }
   if (options.noise_px == 0 && options.report.file.empty() && !options.lamps.empty()) {
-    throw std::invalid_argument("--lamps is for the theoretical limit, which needs --noise-px");
+    throw std::invalid_argument(
+        "--lamps: no effect without --noise-px or --report; add one of them");
   }
   if (options.noise_px > 0 && options.truth.empty()) {
-    throw std::invalid_argument("--noise-px is for the theoretical limit, which needs --truth");
+    throw std::invalid_argument("--noise-px: the theoretical limit (CRLB) needs --truth; add it");
   }
 }
 
@@ -175,8 +175,8 @@ std::string make_proposed_gates(const EvaluationInput& input, const Evaluation& 
   const std::vector<Gate> gates = propose_gates(input, evaluation);
   if (gates.empty()) {
     throw Undetermined(
-        fmt::format("--propose-gates: too few stations or captures to propose gates from: at least "
-                    "{} are needed",
+        fmt::format("--propose-gates: too few reference points or captures to propose gates; at "
+                    "least {} are needed, add captures",
                     kMinClusters));
   }
   return format_gates(gates, evaluation);
@@ -190,7 +190,8 @@ std::vector<JUnitTest> make_evaluation_tests(const EvaluateResult& found) {
   if (!comparison || !comparison->too_few()) return tests;
   for (JUnitTest& test : tests) {
     if (test.name != "worse_mm") continue;
-    test.warnings.emplace_back("too few stations or captures to tell a change from chance");
+    test.warnings.emplace_back(
+        "too few reference points or captures to distinguish a change from chance");
   }
   return tests;
 }
@@ -201,8 +202,10 @@ void run_evaluation(const CLI::App& app, const Options& options, const std::vect
   throw_if_failed(found);
   for (const CheckedMetric& gate : found.gates) {
     if (gate.value) continue;
-    throw std::invalid_argument("gate '" + gate.name + "': there is no such figure here: " +
-                                metric_kind(gate.name)->meaning);
+    throw std::invalid_argument(
+        "gate '" + gate.name +
+        "': the metric has no value here; remove the gate or give what the metric needs: " +
+        metric_kind(gate.name)->meaning);
   }
   std::string report, proposed;
   if (!options.report.file.empty()) report = render_report(app, options, input, found);
@@ -245,67 +248,70 @@ void run(const CLI::App& app, const Options& options) {
 }
 
 void add_report_options(CLI::App& app, ReportOption& option) {
-  auto* report = app.add_option(
-      "--report", option.file,
-      "Write the report for people, one HTML file; with --lamps it shows them on the floor plan, "
-      "with --calibration what that says");
+  auto* report = app.add_option("--report", option.file,
+                                "Output file of the report, HTML. With --lamps it has a floor "
+                                "plan, with --calibration the calibration");
   app.add_option("--picture", option.pictures,
-                 "A picture for the report, .svg of --plot of vlp-intrinsics, vlp-rotation or "
-                 "vlp-dispersion, or another; again for another")
+                 "Plot for the report, .svg or .png, such as --plot of vlp-intrinsics, "
+                 "vlp-rotation or vlp-dispersion. Repeat for several")
       ->needs(report)
       ->allow_extra_args(false);
   app.add_option("--track", option.tracks,
-                 "A drive for the report: fixes and the straight line commanded; again for another")
+                 "Drive for the report: its fixes and the commanded straight line, in m. Repeat "
+                 "for several")
       ->needs(report)
       ->option_text("FIXES X0_M Y0_M X1_M Y1_M");
 }
 
 void add_options(CLI::App& app, Options& options) {
-  app.add_option("fixes", options.fixes, "fixes.csv of vlp-locate")->required();
+  app.add_option("fixes", options.fixes, "Fixes to evaluate, fixes.csv of vlp-locate")->required();
   app.add_option("--truth", options.truth,
-                 "truth.csv: image, x_m, y_m [, z_m, yaw_rad]; a capture of it without a fix is "
-                 "missing");
-  app.add_option("--path", options.path,
-                 "The path driven: a CSV of waypoints, x_m, y_m [, z_m]; errors are distances from "
-                 "it");
+                 "Ground truth, truth.csv: image, x_m, y_m [, z_m, yaw_rad]. Captures without a "
+                 "fix count as missing");
+  app.add_option(
+      "--path", options.path,
+      "Path of the camera, CSV of waypoints: x_m, y_m [, z_m]. Errors are distances from it");
   app.add_option("--line", options.line_m,
-                 "The straight line commanded: errors are distances from it, of the fixes and, as "
-                 "in the paper, of a line fitted to them")
+                 "Commanded straight line, in m. Errors are distances from it: of the fixes, and "
+                 "of a line fitted to them (Chen and Guan)")
       ->expected(4)
       ->check(finite())
       ->option_text("X0_M Y0_M X1_M Y1_M");
-  app.add_option(
-         "--station-mm", options.station_mm,
-         "Captures whose true places are within so much are of one station (default: 1, and "
-         "what a turn about the calibration's lever arm adds)")
+  app.add_option("--station-mm", options.station_mm,
+                 "Maximum distance between true positions of one reference point (station), in mm "
+                 "(default: 1 plus twice the lever arm of --calibration)")
       ->check(make_finite_positive_validator());
   app.add_option("--compare", options.compare,
-                 "Other fixes of the same captures: are these better, worse, the same (within "
-                 "1 um or 1 % of the mean error, whichever is more), or is there no evidence?");
+                 "Other fixes of the same captures, fixes.csv. Reports better, worse, the same "
+                 "(within 1 um or 1 % of their mean error, whichever is larger) or no evidence");
   app.add_option("--gate", options.gates,
-                 "What a figure has to be at most; again for another, or with commas")
+                 "Limit of a metric. Repeat, or separate by commas, for several")
       ->delimiter(',')
       ->allow_extra_args(false)
       ->option_text("NAME=VALUE");
-  app.add_option("--gates", options.gates_file, "Gates from a file, vlp-gates/1");
-  app.add_option("--json", options.json, "Write the figures for programs, evaluation.json");
-  app.add_option("--junit", options.junit,
-                 "Write the gates for a CI system, JUnit XML; an error if they cannot be checked");
+  app.add_option("--gates", options.gates_file,
+                 "File of gates, vlp-gates/1. --gate takes precedence");
+  app.add_option("--json", options.json, "Output file of the metrics, JSON");
+  app.add_option(
+      "--junit", options.junit,
+      "Output file of the checked gates, JUnit XML. Contains an error if they cannot be checked");
   app.add_option("--propose-gates", options.proposed_gates,
-                 "Write gates that a run as good as this one meets, gates.yaml");
-  auto* lamps = app.add_option(
-      "--lamps", options.lamps,
-      "Lamp map, lamps.yaml, for the theoretical limit at the true places, and the report");
+                 "Output file of gates that runs of the same accuracy pass, gates.yaml");
+  auto* lamps = app.add_option("--lamps", options.lamps,
+                               "Lamp map, lamps.yaml, for the report and the theoretical limit "
+                               "(CRLB) at the true positions");
   add_room_option(app, options.room);
   auto* calibration = app.add_option("--calibration", options.calibration,
-                                     "... the camera; the limit is that of a level one; its "
-                                     "lever arm is for --station-mm");
+                                     "Calibration of the camera, for the report, for the CRLB (of "
+                                     "a level camera), and for the lever arm in --station-mm");
   auto* noise = app.add_option("--noise-px", options.noise_px,
-                               "... and the standard deviation of each lamp's pixel, per axis")
+                               "Standard deviation of lamp positions in the image, per axis, in "
+                               "px. Computes the CRLB")
                     ->check(make_finite_positive_validator());
   noise->needs(lamps)->needs(calibration);
   add_report_options(app, options.report);
-  add_threads_option(app, options.threads, "For the intervals");
+  add_threads_option(app, options.threads,
+                     "Number of threads for reading and confidence intervals");
 }
 
 }  // namespace
@@ -313,8 +319,8 @@ void add_options(CLI::App& app, Options& options) {
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "What fixes are worth: their errors against a truth, a path or a commanded line, and gates\n"
-      "for them. Exit code 1 when a gate is not met.\n\n"
+      "Evaluates fixes against ground truth, a path or a commanded line, and checks gates. Exit "
+      "code 1 if a gate fails.\n\n"
       "Example, from the project's folder:\n"
       "  build/bin/vlp-locate datasets/example/detections.csv \\\n"
       "    --lamps datasets/example/lamps.yaml \\\n"

@@ -90,9 +90,9 @@ TEST_F(VlpEvaluate, ReturnsOneAndWritesAllWhenGateFails) {
 TEST_F(VlpEvaluate, WritesErrorToJUnitWhenNoGateIsChecked) {
   const auto unknown = with_truth("--gate mean_mm=1,worse_mm=1 --junit junit.xml");
   EXPECT_EQ(unknown.exit_code, 2);
-  EXPECT_THAT(content("junit.xml"),
-              AllOf(HasSubstr("errors=\"1\""), HasSubstr("<error type=\"bad_input\" message=\"gate "
-                                                         "'worse_mm': there is no such figure")));
+  EXPECT_THAT(content("junit.xml"), AllOf(HasSubstr("errors=\"1\""),
+                                          HasSubstr("<error type=\"bad_input\" message=\"gate "
+                                                    "'worse_mm': the metric has no value here")));
   folder.file("fixes.csv", kFixes + "a.png,too_few_lamps,,,,,,,,,1,\n");
   const auto none = with_truth("--gate mean_mm=1 --junit junit.xml");
   EXPECT_EQ(none.exit_code, 3);
@@ -102,7 +102,7 @@ TEST_F(VlpEvaluate, WritesErrorToJUnitWhenNoGateIsChecked) {
 TEST_F(VlpEvaluate, ProposesGatesThatPass) {
   const auto few = with_truth("--propose-gates gates.yaml");
   EXPECT_EQ(few.exit_code, 3);
-  EXPECT_THAT(few.errors, HasSubstr("--propose-gates: too few stations or captures"));
+  EXPECT_THAT(few.errors, HasSubstr("--propose-gates: too few reference points or captures"));
   const auto proposed =
       evaluate_example("--noise-px 0.05 --propose-gates '" + path("gates.yaml") + "'");
   ASSERT_EQ(proposed.exit_code, 0) << proposed.errors;

@@ -642,7 +642,7 @@ const std::string kClearParts =
     "string of keywords|stripes, seen from z|takes four|the board's white|the brightest lamp|"
     "their place|there are no|there is no|too small for|turn on the spot|two are called|"
     "two black bits|views with the board|wants a value|wants RESULTS|was not judged|"
-    "weights go up to|where it begins|where it ends|without the other|works on this camera";
+    "weights go up to|where it begins|without the other|works on this camera";
 
 /// Returns true if a message asks a question that names the likely cause, or if it has the form
 /// "<what is wrong>; <what to do>".

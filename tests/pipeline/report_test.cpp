@@ -99,7 +99,7 @@ TEST_F(VlpEvaluateReport, RejectsInvalidContent) {
   EXPECT_THAT(refusal(" --picture" + in("fixes.csv")), HasSubstr("is neither an SVG nor a PNG"));
   EXPECT_THAT(refusal(" --picture" + in("none.svg")), HasSubstr("none.svg: cannot be opened"));
   EXPECT_THAT(refusal(" --track" + in("track.csv") + " 1 0 1 0"),
-              HasSubstr("begins where it ends"));
+              HasSubstr("start and end of the line are equal"));
   EXPECT_THAT(refusal(" --json" + in("report.html")),
               HasSubstr("--json and --report name one file"));
 }
