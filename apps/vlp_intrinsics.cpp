@@ -62,25 +62,26 @@ std::string corner_file(const CLI::App& app, const Options& options) {
                                   [](const auto& name) { return is_corner_file(name); });
   if (found == options.images.end()) {
     if (options.imager_px) {
-      throw std::invalid_argument("--imager-px is for files of corners: images tell their size");
+      throw std::invalid_argument(
+          "--imager-px: images have a size already; use it for files of corners only");
     }
     return "";
   }
   if (!options.corners.empty()) {
-    throw std::invalid_argument("--corners is for images: " + *found + " has them already");
+    throw std::invalid_argument("--corners: " + *found +
+                                " is a file of corners already; leave --corners out");
   }
   if (options.images.size() > 1) {
-    throw std::invalid_argument(*found + " holds corners: give it alone, without images");
+    throw std::invalid_argument(*found + ": a file of corners excludes images; give it alone");
   }
   if (!options.imager_px) {
-    throw std::invalid_argument(
-        *found + " holds corners, but not the size of their images: --imager-px has to tell it");
+    throw std::invalid_argument(*found + ": a file of corners has no image size; give --imager-px");
   }
   for (const char* digest_images :
        {"--cache", "--threads", "--max-mpx", "--max-blur-px", "--max-white-fraction", "--every"}) {
     if (app.count(digest_images) == 0) continue;
-    throw std::invalid_argument(std::string(digest_images) + " is for images: " + *found +
-                                " holds corners");
+    throw std::invalid_argument(std::string(digest_images) + ": only for images, and " + *found +
+                                " is a file of corners; leave it out");
   }
   return *found;
 }
@@ -115,7 +116,7 @@ void check_names(const std::vector<std::filesystem::path>& images) {
   for (const auto& image : images) {
     if (names.insert(image.filename().string()).second) continue;
     throw std::invalid_argument(fmt::format(
-        "--corners tells images by their names, and two are called {}", image.filename().string()));
+        "--corners: two images have the name {}; rename one of them", image.filename().string()));
   }
 }
 
@@ -200,52 +201,53 @@ void run(const CLI::App& app, const Options& options) {
   const std::string failed = describe_failed_gates(checked);
   if (failed.empty()) return;
   if (lens.better_model && has_failed_lens_gate(checked)) {
-    throw GateNotMet(fmt::format("{}; take --lens {}", failed, to_string(*lens.better_model)));
+    throw GateNotMet(fmt::format("{}; use --lens {}", failed, to_string(*lens.better_model)));
   }
   if (std::isfinite(lens.report.uncertainty_worst_px)) {
     throw GateNotMet(
         fmt::format("{}; add views, next {}", failed, recommend_next_view(lens.coverage)));
   }
   throw GateNotMet(
-      fmt::format("{}; the lens that was found has no rays in part of the image: take "
-                  "another lens model, for a wide lens --lens OPENCV_FISHEYE",
+      fmt::format("{}; the estimated lens has no rays in part of the image: use another lens "
+                  "model, for a wide lens --lens OPENCV_FISHEYE",
                   failed));
 }
 
 void add_input_options(CLI::App& app, Options& options) {
   app.add_option("images", options.images,
-                 "Images of the board, folders of them, or videos; or a file of its corners, "
-                 "mrcal's .vnl or a .csv as of --corners, with --imager-px")
+                 "Images of the board, folders of images, or videos; or one file of corners, .vnl "
+                 "of mrcal or .csv of --corners, with --imager-px")
       ->required();
   app.add_option("--board", options.board,
-                 "The board, board.yaml, or Kalibr's description of an aprilgrid")
+                 "Board description: board.yaml, or Kalibr's YAML of an aprilgrid or checkerboard")
       ->required();
   app.add_option("-o,--output", options.output,
-                 "Where to write the calibration with its camera part; mrcal's .cameramodel "
-                 "(of lens models that mrcal has) and .corners.vnl go beside it")
+                 "Output file of the calibration with its camera part, YAML. Files of mrcal get "
+                 "the same name: .corners.vnl and, if mrcal supports the lens model, .cameramodel")
       ->required();
-  app.add_option("--camera-id", options.camera_id, "Name of the camera (default: camera)");
+  app.add_option("--camera-id", options.camera_id,
+                 "Camera id in the calibration (default: camera)");
   add_lens_option(app, options.lens);
   app.add_option("--row-time-s", options.frontend.row_time_s,
-                 "Time from one row of the read-out to the next, which every program that finds "
-                 "lamps needs; vlp-train --row-time finds it, too")
+                 "Row time: time between the readout of successive rows, in s. Needed to identify "
+                 "lamps by frequency; vlp-train --row-time estimates it")
       ->check(CLI::Range(1e-8, 1e-3));
   add_readout_option(app, options.frontend.readout);
   app.add_option("--imager-px", options.imager_px,
-                 "Width and height of the images that a file of corners is of")
+                 "Width and height of the images of a corner file, in px")
       ->check(CLI::Range(16, 100000))
       ->option_text("WIDTH HEIGHT");
 }
 
 void add_solve_options(CLI::App& app, Options& options) {
   app.add_option("--corners", options.corners,
-                 "Write the corners as they were seen, too, a .csv to calibrate from again without "
-                 "the images")
+                 "Output file of the detected corners, .csv. It can replace the images in a later "
+                 "calibration")
       ->check(make_ending_validator(".csv"));
-  app.add_option("--pixel-pitch-m", options.pixel_pitch_m, "Width of a pixel")
+  app.add_option("--pixel-pitch-m", options.pixel_pitch_m, "Pixel pitch of the imager, in m")
       ->check(CLI::Range(1e-7, 1e-4));
   app.add_option("--held-out", options.held_out,
-                 "Keep every Nth view out of the solve, and say how well the lens fits it")
+                 "Exclude every Nth view from the solve, and report its residuals")
       ->check(CLI::Range(2, 1000))
       ->option_text("N");
   app.add_option_function<std::string>(
@@ -255,28 +257,32 @@ void add_solve_options(CLI::App& app, Options& options) {
                           : name == "off" ? WarpChoice::off
                                           : WarpChoice::automatic;
          },
-         "Solve for how the board bends (default: auto, when the corners show it)")
+         "Estimate the warp of the board. auto (default): keep it if it reduces the residuals "
+         "significantly")
       ->check(CLI::IsMember({"auto", "on", "off"}))
       ->option_text("auto|on|off");
-  app.add_option("--gate", options.gates,
-                 "Change a gate: rms_px=1, expected_max_error_px=2 (of a projection where the "
-                 "lens is known), split_half_px=1 (rms, between the lenses of two halves of the "
-                 "views), coverage=0.4 (of the image), "
-                 "views=6 (that differ), board_tilt_deg=20 (between two views)")
+  app.add_option(
+         "--gate", options.gates,
+         "Change or add a gate of a lens metric. Defaults: rms_px=1, expected_max_error_px=2 (of a "
+         "projection in the valid region), split_half_px=1 (RMS difference between the lenses of "
+         "two halves of the views), coverage=0.4 (fraction of the image), views=6 (distinct "
+         "views), board_tilt_deg=20 (between two views)")
       ->delimiter(',')
       ->option_text("NAME=VALUE,...");
 }
 
 void add_output_options(CLI::App& app, Options& options) {
-  app.add_option("--ros", options.ros, "Write the camera for ROS, too (camera_info)");
-  app.add_option("--kalibr", options.kalibr, "Write the camera for Kalibr, too (camchain)");
-  app.add_option("--opencv", options.opencv, "Write the camera for OpenCV, too (FileStorage)");
-  app.add_option("--plot", options.plot,
-                 "Draw the corners, their residuals and the uncertainty over the image, .png or "
-                 ".svg")
+  app.add_option("--ros", options.ros, "Output file of the camera for ROS (camera_info), YAML");
+  app.add_option("--kalibr", options.kalibr,
+                 "Output file of the camera for Kalibr (camchain), YAML");
+  app.add_option("--opencv", options.opencv,
+                 "Output file of the camera for OpenCV (FileStorage), YAML");
+  app.add_option(
+         "--plot", options.plot,
+         "Output file of a plot of corners, residuals and uncertainty over the image, .png or .svg")
       ->check(is_plot_file());
   app.add_option("--cache", options.frontend.corner_cache,
-                 "Folder to keep the corners of each image in, for the next time");
+                 "Folder for the detected corners of each image, which later runs reuse");
   add_every_option(app, options.frontend.every);
   add_max_mpx_option(app, options.frontend.max_mpx);
   add_board_limit_options(app, options.frontend);
@@ -288,9 +294,9 @@ void add_output_options(CLI::App& app, Options& options) {
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Calibrates the lens of a camera from images of a board of AprilTags (see vlp-board), and "
-      "says\n"
-      "how far the result can be trusted. Exit code 1 when it is worse than the gates allow.\n\n"
+      "Calibrates the lens of a camera from images of a board: AprilTags (see vlp-board), Kalibr "
+      "AprilGrid, ChArUco or chessboard. Reports the uncertainty of the result. Exit code 1 if a "
+      "gate fails.\n\n"
       "Example, from the project's folder:\n"
       "  build/bin/vlp-simulate datasets/paper-rig/scene.yaml --only boards -o out/rig\n"
       "  build/bin/vlp-intrinsics out/rig/boards/*.png --board out/rig/board.yaml \\\n"

@@ -56,9 +56,9 @@ constexpr const char* kSize = "--imager-px 800 600";
 TEST_F(VlpIntrinsicsCornerFiles, RejectOptionsForImages) {
   const std::string corners = folder.file("corners.vnl", vnl({"a.png"})).string();
   for (const std::string option : {"--cache", "--threads", "--max-mpx", "--every"}) {
-    EXPECT_EQ(
-        refusal(corners, std::string(kSize) + " " + option + " 2"),
-        "vlp-intrinsics: error: " + option + " is for images: " + corners + " holds corners\n");
+    EXPECT_EQ(refusal(corners, std::string(kSize) + " " + option + " 2"),
+              "vlp-intrinsics: error: " + option + ": only for images, and " + corners +
+                  " is a file of corners; leave it out\n");
   }
 }
 
@@ -179,10 +179,11 @@ TEST_F(VlpIntrinsicsCornerFiles, AreRejectedWithCauseInOneLine) {
     return folder.file("corners.vnl", changed).string();
   };
   const std::string file = with("0.png", "0.png");
-  EXPECT_THAT(refusal(file, ""), HasSubstr("--imager-px has to tell it"));
-  EXPECT_THAT(refusal(file + " other.png", kSize), HasSubstr("give it alone, without images"));
+  EXPECT_THAT(refusal(file, ""),
+              HasSubstr("a file of corners has no image size; give --imager-px"));
+  EXPECT_THAT(refusal(file + " other.png", kSize), HasSubstr("excludes images; give it alone"));
   EXPECT_THAT(refusal(file, std::string(kSize) + " --corners " + (folder / "a.csv").string()),
-              HasSubstr("--corners is for images"));
+              HasSubstr("is a file of corners already; leave --corners out"));
   EXPECT_THAT(
       refusal(file, "--imager-px 120 600"),
       HasSubstr("corners.vnl:3: a corner at (150, 100) is outside an image of 120 x 600 px"));

@@ -626,7 +626,7 @@ const std::string kClearParts =
     "can a run be kept|cannot be computed|cannot be deleted|cannot be drawn|cannot be encoded|"
     "do not fit on|do not have it|does not fit on|effect of print_sd|estimates both|finds it "
     "from|gate '|"
-    "gives no frame|hardly be seen|has a fix|has a frequency_hz|has neither|has no |has to tell|"
+    "gives no frame|hardly be seen|has a fix|has a frequency_hz|has neither|has no |"
     "has two values|have to be equal|holds captures|holds no|holds the images|"
     "is a board of squares|is a folder|is a link|is a pipe or a device|is a video|"
     "is an input, too|is empty| is for |is in the archive|is larger than|is missing|"
@@ -640,7 +640,7 @@ const std::string kClearParts =
     "parameters, not|run writes there|scene has |should|smaller than the square|split off|"
     "stands four times|stands twice|states them|stdin: a line|"
     "string of keywords|stripes, seen from z|takes four|the board's white|the brightest lamp|"
-    "their place|there are no|there is no|too small for|turn on the spot|two are called|"
+    "their place|there are no|there is no|too small for|turn on the spot|"
     "two black bits|views with the board|wants a value|wants RESULTS|was not judged|"
     "weights go up to|where it begins|without the other|works on this camera";
 
