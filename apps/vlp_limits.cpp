@@ -42,7 +42,8 @@ std::string make_title(const Options& options) {
   if (const auto& speed = options.motion.max_speed_m_per_s) {
     title += fmt::format(", up to {} m/s", *speed);
   }
-  if (options.lean_sd_deg > 0) title += fmt::format(", lean to {} deg", options.lean_sd_deg);
+  if (options.lean_sd_deg > 0)
+    title += fmt::format(", roll and pitch sd {} deg", options.lean_sd_deg);
   return title;
 }
 
@@ -51,11 +52,10 @@ UnitErrors stated_errors(const Options& options, const LampMap& lamps,
                          const Calibration& calibration) {
   UnitErrors unit(lamps, calibration);
   if (!unit.common().stated()) {
-    throw InputError(
-        options.calibration,
-        "states no errors of its own, and " + options.lamps +
-            " no sd_m: state them with --principal-point-px, --tilt-deg, --lamp-map-mm in "
-            "place of --from-calibration, or calibrate again");
+    throw InputError(options.calibration,
+                     "has no uncertainties, and " + options.lamps +
+                         " has no sd_m; use --principal-point-px, --tilt-deg and --lamp-map-mm "
+                         "instead of --from-calibration, or calibrate again");
   }
   constexpr std::array<const char*, kCommonErrorSources.size()> names{"lens", "zenith", "offset",
                                                                       "lamp map"};
@@ -65,7 +65,7 @@ UnitErrors stated_errors(const Options& options, const LampMap& lamps,
     unstated.append(unstated.empty() ? "" : ", ").append(names[i]);
   }
   if (!unstated.empty()) {
-    spdlog::warn("{}: the errors are not stated, and count as none", unstated);
+    spdlog::warn("{}: the uncertainties are missing and count as zero", unstated);
   }
   if (const int elsewhere = unit.common().lamps_elsewhere(); elsewhere > 0) {
     spdlog::warn(describe_lamps_elsewhere(elsewhere));
@@ -114,14 +114,14 @@ void run(const Options& options) {
         return one.lamps > 1;
       })) {
     throw Undetermined(
-        "the lamps in view tell motion and lean nowhere on this floor: a lean that is not known "
-        "needs four lamps, or three that leave one place only; lower the camera, widen the lens, "
-        "add lamps, or state what is known (--roll-pitch-sd-deg, --max-speed-m-per-s)");
+        "motion and tilt cannot be estimated at any position of this floor: an unknown tilt needs "
+        "four visible lamps, or three with a unique solution; lower the camera, widen the lens, "
+        "add lamps, or limit the unknowns (--roll-pitch-sd-deg, --max-speed-m-per-s)");
   }
   if (!summary) {
     throw Undetermined(
-        "two lamps are in view nowhere on this floor: is it under the lamps, and the camera below "
-        "them? Otherwise lower the camera, widen the lens, or add lamps");
+        "two lamps are visible from no position on this floor: is it under the lamps, and the "
+        "camera below them? Otherwise lower the camera, widen the lens, or add lamps");
   }
   if (!options.map.empty()) write_limits(options.map, limits);
   if (!options.picture.empty()) {
@@ -135,49 +135,56 @@ void add_options(CLI::App& app, Options& options) {
   app.add_option("--lamps", options.lamps, "Lamp map, lamps.yaml")->required();
   add_room_option(app, options.room);
   app.add_option("--calibration", options.calibration,
-                 "Calibration; its camera part is used, with --from-calibration all of it")
+                 "Calibration. Only its camera part is used, with --from-calibration all parts")
       ->required();
-  app.add_option("--height-m", options.height_m, "Height of the camera in the world")
+  app.add_option("--height-m", options.height_m, "Height of the camera in the world, in m")
       ->required()
       ->check(finite());
   app.add_option("--noise-px", options.noise_px,
-                 "Standard deviation of each lamp's pixel, per axis")
+                 "Standard deviation of lamp positions in the image, per axis, in px")
       ->required()
       ->check(make_finite_positive_validator());
-  auto* center = app.add_option("--principal-point-px", options.center_px,
-                                "... of the image center, per axis (default 0)")
-                     ->check(finite_not_negative());
-  auto* tilt = app.add_option("--tilt-deg", options.tilt_deg,
-                              "... of the camera's tilt, per axis (default 0)")
-                   ->check(finite_not_negative());
-  auto* lamp_map = app.add_option("--lamp-map-mm", options.lamp_map_mm,
-                                  "... of each lamp's position, per axis (default 0)")
-                       ->check(finite_not_negative());
+  auto* center =
+      app.add_option("--principal-point-px", options.center_px,
+                     "Standard deviation of the principal point, per axis, in px (default: 0)")
+          ->check(finite_not_negative());
+  auto* tilt =
+      app.add_option("--tilt-deg", options.tilt_deg,
+                     "Standard deviation of the camera tilt, per axis, in degrees (default: 0)")
+          ->check(finite_not_negative());
+  auto* lamp_map =
+      app.add_option(
+             "--lamp-map-mm", options.lamp_map_mm,
+             "Standard deviation of lamp positions in the map, per axis, in mm (default: 0)")
+          ->check(finite_not_negative());
   app.add_flag("--from-calibration", options.stated,
-               "In place of these three: what the calibration states of lens, zenith and offset, "
-               "and the map (sd_m) or the calibration of the lamps")
+               "Use the uncertainties of lens, zenith and dispersion offset in the calibration "
+               "instead of these three options. Those of the lamps are sd_m of the map, or from "
+               "the adjustment in the calibration")
       ->excludes(center)
       ->excludes(tilt)
       ->excludes(lamp_map);
-  add_motion_options(app, options.motion,
-                     "What it costs that the camera may drive, so fast at most, and that its "
-                     "velocity is estimated "
-                     "(default: it stands; odometry good to S m/s: twice S)");
+  add_motion_options(
+      app, options.motion,
+      "Maximum speed of the camera, in m/s. Adds the contribution of estimating velocity and yaw "
+      "rate (default: 0). With odometry of standard deviation S m/s, use 2 S");
   app.add_option("--roll-pitch-sd-deg", options.lean_sd_deg,
-                 "What it costs that roll and pitch are known to this standard deviation, and "
-                 "estimated; 90: not at all (default: known)")
+                 "Standard deviation of roll and pitch, in degrees. Adds the contribution of "
+                 "estimating both (default: 0, known); 90: unknown")
       ->check(finite_not_negative());
-  app.add_option("--yaw-deg", options.yaw_deg, "Yaw of the camera (default 0)")->check(finite());
+  app.add_option("--yaw-deg", options.yaw_deg, "Yaw of the camera, in degrees (default: 0)")
+      ->check(finite());
   app.add_option("--floor-m", options.floor_m,
-                 "The floor (default: the rectangle around the lamps)")
+                 "Limits of the floor, in m (default: rectangle around the lamps)")
       ->expected(4)
       ->check(finite())
       ->option_text("X_MIN X_MAX Y_MIN Y_MAX");
-  app.add_option("--step-m", options.step_m, "Distance between places on the floor (default 0.05)")
+  app.add_option("--step-m", options.step_m, "Grid spacing on the floor, in m (default: 0.05)")
       ->check(make_finite_positive_validator());
-  app.add_option("--map", options.map, "Write the figures of every place to this CSV file");
-  app.add_option("--picture", options.picture,
-                 "Draw the horizontal standard deviation over the floor, .png or .svg")
+  app.add_option("--map", options.map, "Output file of the error budget at each position, CSV");
+  app.add_option(
+         "--picture", options.picture,
+         "Output file of a plot of the horizontal standard deviation over the floor, .png or .svg")
       ->check(is_plot_file());
 }
 
@@ -186,12 +193,10 @@ void add_options(CLI::App& app, Options& options) {
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "The theoretical limit of positioning over a floor, and the error budget: what pixel noise,\n"
-      "image center, tilt and lamp map each do to a fix; or, with --from-calibration, what a "
-      "calibration "
-      "and\n"
-      "its lamp map say of their own errors, and so what to improve first. With that pixel noise\n"
-      "no method reaches better from one image of a level camera.\n\n"
+      "Computes the theoretical limit of positioning (CRLB) over a floor, and the error budget. "
+      "The budget has the contributions of pixel noise, principal point, tilt and lamp map. With "
+      "--from-calibration, the contributions follow from the uncertainties reported by calibration "
+      "and lamp map. The limit holds for unbiased fixes from one image of a level camera.\n\n"
       "Example, from the project's folder:\n"
       "  build/bin/vlp-limits --lamps datasets/example/lamps.yaml \\\n"
       "    --calibration datasets/example/calibration.yaml --height-m 0 \\\n"

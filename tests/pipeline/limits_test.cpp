@@ -67,7 +67,7 @@ TEST(VlpLimits, ReportsEffectOfMotionAndTilt) {
     EXPECT_THAT(output, HasSubstr(row));
   }
   EXPECT_THAT(TemporaryFolder::read_content(folder / "map.svg"),
-              HasSubstr("up to 2 m/s, lean to 90 deg"));
+              HasSubstr("up to 2 m/s, roll and pitch sd 90 deg"));
   const auto [standing_output, standing] = compute_map("");
   EXPECT_THAT(standing_output, Not(HasSubstr("motion")));
   ASSERT_EQ(map.rows(), standing.rows());
@@ -101,7 +101,7 @@ TEST(VlpLimits, RequiresRowTimeOfMovingCamera) {
   EXPECT_THAT(result.errors, HasSubstr("a camera that moves needs row_time_s and readout"));
   const auto leaning = run_program(two_lamps + "--roll-pitch-sd-deg 90");
   EXPECT_EQ(leaning.exit_code, 3);
-  EXPECT_THAT(leaning.errors, HasSubstr("the lamps in view tell motion and lean nowhere"));
+  EXPECT_THAT(leaning.errors, HasSubstr("motion and tilt cannot be estimated at any position"));
 }
 
 /// A calibration of the tests' rig that states its zenith, and a map that states its survey.
@@ -131,7 +131,7 @@ TEST_F(VlpLimitsFromCalibration, NamesLargestErrorSource) {
   ASSERT_EQ(result.exit_code, 0) << result.errors;
   EXPECT_THAT(result.output, HasSubstr("improve     lamp map first, 99 % of the horizontal"));
   EXPECT_THAT(result.output, HasSubstr("vlp-adjust --refine-map"));
-  EXPECT_THAT(result.errors, HasSubstr("lens: the errors are not stated, and count as none"));
+  EXPECT_THAT(result.errors, HasSubstr("lens: the uncertainties are missing and count as zero"));
   const CsvTable map(folder / "map.csv");
   ASSERT_GT(map.rows(), 0U);
   for (std::size_t row = 0; row < map.rows(); ++row) {
@@ -154,7 +154,7 @@ TEST_F(VlpLimitsFromCalibration, IncludeOnlyLensWithoutRotationCenter) {
   ASSERT_EQ(result.exit_code, 0) << result.errors;
   EXPECT_THAT(result.output, HasSubstr("\nlens  "));
   EXPECT_THAT(result.output, HasSubstr("improve     lens first"));
-  EXPECT_THAT(result.errors, HasSubstr("zenith, lamp map: the errors are not stated"));
+  EXPECT_THAT(result.errors, HasSubstr("zenith, lamp map: the uncertainties are missing"));
 }
 
 TEST_F(VlpLimitsFromCalibration, WarnOfLampsAdjustedElsewhere) {
@@ -178,13 +178,13 @@ TEST_F(VlpLimitsFromCalibration, RejectErrorsGivenTwice) {
   for (Lamp& lamp : lamps.lamps) lamp.sd_m.reset();
   const auto result = run("--from-calibration");
   EXPECT_EQ(result.exit_code, 2);
-  EXPECT_THAT(result.errors, HasSubstr("calibration.yaml: states no errors of its own, and"));
+  EXPECT_THAT(result.errors, HasSubstr("calibration.yaml: has no uncertainties, and"));
 }
 
 TEST(VlpLimits, ReturnsThreeWithoutTwoVisibleLamps) {
   const auto result = run_program(kLimits + "--floor-m 50 51 50 51");
   EXPECT_EQ(result.exit_code, 3);
-  EXPECT_THAT(result.errors, HasSubstr("two lamps are in view nowhere"));
+  EXPECT_THAT(result.errors, HasSubstr("two lamps are visible from no position"));
 }
 
 TEST(VlpLimits, WritesNothingForInvalidPlotName) {
