@@ -56,7 +56,7 @@ CapturesTable read_captures_table(const Options& options) {
        options.yaw_rate_sd_deg_per_s || options.window_size > 1)) {
     throw std::invalid_argument(
         "--one-lamp, --inclination-sigma-deg, --height-sd-m, --yaw-rate-sd-deg-per-s and --window "
-        "need captures.csv: give --captures");
+        "need captures.csv; give --captures");
   }
   const auto any_capture = [&](const auto& has) {
     return std::any_of(captures.begin(), captures.end(),
@@ -149,68 +149,63 @@ void run(Options options) {
 
 /// Adds the options of motion, roll and pitch, mount, and of the values in captures.csv.
 void add_sensor_options(CLI::App& app, Options& options) {
-  app.add_option(
-         "--inclination-sigma-deg", options.inclination_sigma_deg,
-         "Standard deviation of the inclination sensor's angles: roll and pitch are then estimated "
-         "about them (default: exact)")
+  app.add_option("--inclination-sigma-deg", options.inclination_sigma_deg,
+                 "Standard deviation of each angle of the inclination sensor, in degrees. Roll and "
+                 "pitch are then estimated together with the position (default: 0, exact)")
       ->check(finite_not_negative());
-  app.add_option(
-         "--camera-on-robot", options.camera_on_robot,
-         "The camera's place and yaw on the robot: the fixes are then of the robot's center")
+  app.add_option("--camera-on-robot", options.camera_on_robot,
+                 "Position and yaw of the camera in the frame of the robot, in m and degrees. "
+                 "Fixes are then of the robot center")
       ->check(finite())
       ->option_text("X_M Y_M Z_M YAW_DEG");
   CLI::Option* const one_lamp =
       app.add_flag("--one-lamp", options.one_lamp,
-                   "Where one lamp is seen, take z_m and yaw_rad from captures.csv");
+                   "Use z_m and yaw_rad of captures.csv for captures with one visible lamp");
   app.add_option("--yaw-sd-deg", options.yaw_sd_deg,
-                 "Standard deviation of yaw_rad in captures.csv, for --one-lamp (default: exact); "
-                 "that of z_m is --height-sd-m")
+                 "Standard deviation of yaw_rad in captures.csv for --one-lamp, in degrees "
+                 "(default: 0, exact). For z_m use --height-sd-m")
       ->check(finite_not_negative())
       ->needs(one_lamp);
-  add_motion_options(
-      app, options.motion,
-      "The camera drives, so fast at most: its velocity is estimated from each image (default: as "
-      "captures.csv says, or else it stands)");
+  add_motion_options(app, options.motion,
+                     "Maximum speed of the camera or robot, in m/s. Estimates the motion of each "
+                     "capture unless captures.csv has it (default: motion of captures.csv, or 0)");
   add_yaw_rate_sd_option(app, options.yaw_rate_sd_deg_per_s);
-  app.add_option(
-         "--roll-pitch-sd-deg", options.lean_sd_deg,
-         "The camera leans by an unknown angle, of this standard deviation about level: roll "
-         "and pitch are estimated from each image of three lamps or more; 90: by any "
-         "(default: level, or as captures.csv says)")
+  app.add_option("--roll-pitch-sd-deg", options.lean_sd_deg,
+                 "Standard deviation of roll and pitch about level, in degrees, for captures "
+                 "without inclination. Estimates both from each image; 90: unknown, needs three "
+                 "lamps or more (default: 0, level)")
       ->check(finite_not_negative());
-  app.add_option(
-         "--height-sd-m", options.height_sd_m,
-         "Standard deviation of z_m in captures.csv, which then counts in all fixes: it tells "
-         "apart where three lamps fit several leans, and is the error of the height for "
-         "--one-lamp")
+  app.add_option("--height-sd-m", options.height_sd_m,
+                 "Standard deviation of z_m in captures.csv, in m. All fixes then use z_m, which "
+                 "also selects among several solutions for three lamps (default: only --one-lamp "
+                 "uses z_m, as exact)")
       ->check(make_finite_positive_validator());
-  app.add_option(
-         "--window", options.window_size,
-         "Captures to fix together, with one velocity, where captures.csv has time_s within "
-         "0.2 s (default: 1)")
+  app.add_option("--window", options.window_size,
+                 "Number of captures in a joint fix with one velocity (default: 1). 2 includes the "
+                 "previous capture if its time_s in captures.csv is within 0.2 s")
       ->check(CLI::Range(1, 2));
 }
 
 void add_options(CLI::App& app, Options& options) {
   add_capture_options(
       app, options.images,
-      {"detections.csv: image, lamp, u_px, v_px [, sigma_px]; or a folder of images",
-       "Calibration of the camera", "Where to write fixes.csv"});
+      {"Detections, detections.csv: image, lamp, u_px, v_px [, sigma_px]; or a folder of images",
+       "Calibration of the camera", "Output file of fixes, CSV"});
   app.add_option("--correction", options.correction,
-                 "Parts of the calibration to apply (default: all that it has)")
+                 "Parts of the calibration to apply (default: all existing parts)")
       ->check(CLI::IsMember({"none", "rotation", "dispersion", "all"}))
       ->option_text("none|rotation|dispersion|all");
-  app.add_option(
-         "--sigma-px", options.sigma_px,
-         "Standard deviation of the lamps' pixels, raised if the residuals are larger; taken from "
-         "the residuals if neither it nor a column states it")
+  app.add_option("--sigma-px", options.sigma_px,
+                 "Standard deviation of lamp positions in the image, per axis, in px. Overrides "
+                 "the column sigma_px (default: sigma_px, or estimated from the residuals). Larger "
+                 "residuals increase it")
       ->check(CLI::Range(kMinSigma_px, kMaxSigma_px));
   app.add_option(
       "--captures", options.captures,
-      "captures.csv: image, time_s, roll_rad, pitch_rad (inclination of the robot, or of "
-      "the camera when there is no --camera-on-robot), vx_m_per_s, vy_m_per_s, "
-      "yaw_rate_rad_per_s, velocity_sd_m_per_s (odometry, along the axes of the same), "
-      "z_m, yaw_rad; default: captures.csv in the folder");
+      "Table of captures, captures.csv: image, time_s; roll_rad, pitch_rad (inclination); "
+      "vx_m_per_s, vy_m_per_s, yaw_rate_rad_per_s, velocity_sd_m_per_s (odometry); z_m, yaw_rad. "
+      "Inclination and odometry are those of the robot with --camera-on-robot, otherwise of the "
+      "camera (default: captures.csv in the folder)");
   add_sensor_options(app, options);
 }
 
@@ -219,9 +214,8 @@ void add_options(CLI::App& app, Options& options) {
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Positions from the lamps seen in images: fixes.csv from detections.csv, or from a folder "
-      "of\n"
-      "images.\n\n"
+      "Estimates camera positions from the lamps in images. Reads detections.csv or a folder of "
+      "images, and writes fixes.csv.\n\n"
       "Example, from the project's folder:\n"
       "  build/bin/vlp-locate datasets/example/detections.csv \\\n"
       "    --lamps datasets/example/lamps.yaml \\\n"
