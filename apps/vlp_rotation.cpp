@@ -22,7 +22,8 @@ struct Options {
 
 void run(const CLI::App& app, const Options& options) {
   if (options.method == "lamps") {
-    if (!options.plot.empty()) throw std::invalid_argument("--plot is of a turn on the spot");
+    if (!options.plot.empty())
+      throw std::invalid_argument("--plot: not available with --method lamps; leave it out");
     return run_rotation_by_lamps(app, options.images, options.level);
   }
   for (const char* of_lamps : {"--refine-map", "--captures", "--max-speed-m-per-s",
@@ -38,13 +39,11 @@ void run(const CLI::App& app, const Options& options) {
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Finds the rotation center of a camera, and so its tilt, from captures while it turns on "
-      "the\n"
-      "spot about a vertical axis: at least three over 90 degrees, better twelve over a full "
-      "turn,\n"
-      "by angles that need not be known. At one height, under lamps at one height, a camera that\n"
-      "sits beside the axis cannot be told from one that leans; captures at two heights or more,\n"
-      "in the same folder, tell both.\n\n"
+      "Estimates the rotation center of a camera, and from it the tilt, from captures while it "
+      "rotates in place about a vertical axis. Needs at least three captures over 90 degrees, "
+      "better twelve over a full turn. The angles may be unknown. With camera and lamps at one "
+      "height each, lever arm and tilt cannot be separated. Captures at two heights or more, in "
+      "the same folder, separate them.\n\n"
       "Example, from the project's folder:\n"
       "  build/bin/vlp-rotation datasets/example/turning.csv \\\n"
       "    --lamps datasets/example/lamps.yaml \\\n"
@@ -54,32 +53,31 @@ int main(int argc, char** argv) {
   vlp::Options options;
   vlp::add_capture_options(
       app, options.images,
-      {"detections.csv: image, lamp, u_px, v_px [, sigma_px]; or a folder of images",
-       "Calibration of the camera; a rotation center in it is replaced",
-       "Where to write the calibration with its rotation center"});
-  app.add_option(
-         "--method", options.method,
-         "axis (default): the direction about which all lamp rays turn, exact with tilt and "
-         "lens; joint: one center in the undistorted image for all lamps; circle: the mean "
-         "of a circle per lamp; lamps: level the camera from captures taken anywhere, while "
-         "driving, that see three lamps or more")
+      {"Detections, detections.csv: image, lamp, u_px, v_px [, sigma_px]; or a folder of images",
+       "Calibration of the camera. Its rotation center, if any, is replaced",
+       "Output file of the calibration with its rotation center, YAML"});
+  app.add_option("--method", options.method,
+                 "Method. axis (default): common rotation axis of all lamp rays, exact for tilt "
+                 "and lens. joint: one center for all lamps in the undistorted image. circle: mean "
+                 "center of one circle per lamp. lamps: tilt from captures at any position, also "
+                 "while driving, with three visible lamps or more")
       ->check(CLI::IsMember({"axis", "joint", "circle", "lamps"}))
       ->option_text("axis|joint|circle|lamps");
-  app.add_option(
-         "--refine-map", options.level.refined_map,
-         "With --method lamps: correct the lamp map, too, and write it to this file; place, "
-         "turn about the vertical and size of the map as a whole stay")
+  app.add_option("--refine-map", options.level.refined_map,
+                 "Output file of the corrected lamp map, YAML. Position, yaw and scale of the map "
+                 "as a whole stay fixed. Only with --method lamps")
       ->option_text("FILE");
   app.add_option("--captures", options.level.captures,
-                 "With --method lamps: captures.csv: image, vx_m_per_s, vy_m_per_s, "
-                 "yaw_rate_rad_per_s, velocity_sd_m_per_s (odometry, in the level camera); "
-                 "default: captures.csv in the folder");
+                 "Table of captures, captures.csv: image, vx_m_per_s, vy_m_per_s, "
+                 "yaw_rate_rad_per_s, velocity_sd_m_per_s (odometry in the level frame of the "
+                 "camera). Only with --method lamps (default: captures.csv in the folder)");
   vlp::add_motion_options(
       app, options.level.motion,
-      "With --method lamps: the camera drives, so fast at most: its velocity is estimated from "
-      "each image (default: as captures.csv says, or else it stands)");
+      "Maximum speed of the camera, in m/s. Estimates the motion of each capture unless "
+      "captures.csv has it. Only with --method lamps (default: motion of captures.csv, or 0)");
   vlp::add_yaw_rate_sd_option(app, options.level.yaw_rate_sd_deg_per_s);
   app.add_option("--plot", options.plot,
-                 "Where to draw lamps, circles, rotation center and principal point, .png or .svg");
+                 "Output file of a plot of lamps, circles, rotation center and principal point, "
+                 ".png or .svg. Not with --method lamps");
   return vlp::run_app(app, argc, argv, [&] { vlp::run(app, options); });
 }
