@@ -60,29 +60,29 @@ void run(const Options& options) {
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Renders what a rolling-shutter camera sees of modulated lamps and of calibration boards, "
-      "with\n"
-      "the truth beside the images. An interrupted run goes on where it stopped.\n\n"
+      "Renders images of modulated lamps and calibration boards as a rolling-shutter camera "
+      "records them, with ground truth. An interrupted run continues.\n\n"
       "Example, from the project's folder:\n"
       "  build/bin/vlp-simulate datasets/paper-rig/scene.yaml --only sample \\\n"
       "    -o out/paper-rig\n",
       "vlp-simulate");
   vlp::Options options;
   app.add_option("scene", options.scene, "Scene file, .yaml")->required();
-  app.add_option("-o,--output", options.output, "Folder for the captures")->required();
-  auto* only = app.add_option("--only", options.folders,
-                              "Render these folders of the scene alone (commas between, no spaces)")
-                   ->delimiter(',')
-                   ->allow_extra_args(false)
-                   ->option_text("FOLDER[,FOLDER...]");
-  app.add_option(
-         "--archive", options.archive,
-         "Render so many sessions of different cameras into OUTPUT/CAMERA/SESSION, some with\n"
-         "faults or damaged; archive.csv tells which")
+  app.add_option("-o,--output", options.output, "Output folder of the captures")->required();
+  auto* only =
+      app.add_option(
+             "--only", options.folders,
+             "Folders of the scene to render, separated by commas without spaces (default: all)")
+          ->delimiter(',')
+          ->allow_extra_args(false)
+          ->option_text("FOLDER[,FOLDER...]");
+  app.add_option("--archive", options.archive,
+                 "Number of sessions of different cameras to render into OUTPUT/CAMERA/SESSION. "
+                 "Some have faults or damage, which archive.csv lists")
       ->check(CLI::Range(1, 10'000'000))
       ->excludes(only);
-  app.add_option("--seed", options.seed, "Another seed than the scene's")
+  app.add_option("--seed", options.seed, "Random seed (default: that of the scene)")
       ->check(CLI::Range(0, std::numeric_limits<int>::max()));
-  vlp::add_threads_option(app, options.threads, "Captures at a time");
+  vlp::add_threads_option(app, options.threads, "Number of captures to render in parallel");
   return vlp::run_app(app, argc, argv, [&] { vlp::run(options); });
 }
