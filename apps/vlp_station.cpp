@@ -16,60 +16,63 @@ namespace vlp {
 namespace {
 
 void add_operator(CLI::App& command, StationRunOptions& options) {
-  command.add_option("--operator", options.operator_name,
-                     "Who measures, for the record (a shift asks when it is not said)");
-  command.add_option("--shift", options.shift, "In which shift, for the record");
+  command.add_option(
+      "--operator", options.operator_name,
+      "Name of the operator, for the record (default: asked at the beginning of a shift)");
+  command.add_option("--shift", options.shift,
+                     "Name of the work shift, for the record (default: asked at its beginning)");
 }
 
 void add_run(CLI::App& app, StationRunOptions& options) {
   CLI::App* run = app.add_subcommand(
-      "run", "Take a unit to its verdict, or, without --camera-id, unit after unit");
-  run->add_option("--station", options.station, "The station, station.yaml")->required();
+      "run",
+      "Measure a unit up to its verdict or, without --camera-id, one unit after another (a shift)");
+  run->add_option("--station", options.station, "Station configuration, station.yaml")->required();
   auto* camera =
-      run->add_option("--camera-id", options.camera_id,
-                      "The unit's camera (default: those that a scanner or the operator types, a "
-                      "line each, until q)")
+      run->add_option(
+             "--camera-id", options.camera_id,
+             "Camera id of the unit (default: scanned or typed ids, one per line, until q)")
           ->check([](const std::string& id) { return camera_id_problem(id); });
   auto* batch =
       run->add_option("--batch", options.batch,
-                      "A folder whose folders boards, rotation, dispersion and check are full: no "
-                      "questions asked (default: the images that arrive in the station's folder)")
+                      "Folder with complete folders boards, rotation, dispersion and check. Runs "
+                      "without interaction (default: waits for images in the station's folder)")
           ->needs(camera);
   run->add_option("--source", options.sources,
-                  "A V4L2 camera or a video file whose frames are taken for the present step, or "
-                  "STEP=SOURCE for one step; frames that are refused are not kept")
+                  "V4L2 camera or video file with the images of the current step; STEP=SOURCE for "
+                  "one step only. Rejected frames are deleted")
       ->excludes(batch)
       ->option_text("[STEP=]SOURCE ...");
   run->add_option("--idle-s", options.idle_s,
-                  "Give the verdict when no image came for so long, of a source none that could be "
-                  "used")
+                  "Time without a new image until the verdict, in s. With --source, rejected "
+                  "frames do not count as new")
       ->check(make_finite_positive_validator());
   add_operator(*run, options);
   add_threads_option(*run, options.threads);
 }
 
 void add_verify(CLI::App& app, StationRunOptions& options) {
-  CLI::App* verify =
-      app.add_subcommand("verify", "Measure the golden unit: has the station itself moved?");
-  verify->add_option("--station", options.station, "The station, station.yaml")->required();
-  verify->add_option("--batch", options.batch,
-                     "Its images: a folder with check and, maybe, dispersion and boards (default: "
-                     "those that are in the station's folder, which are put away)");
+  CLI::App* verify = app.add_subcommand("verify", "Measure the golden unit to check the station");
+  verify->add_option("--station", options.station, "Station configuration, station.yaml")
+      ->required();
+  verify->add_option(
+      "--batch", options.batch,
+      "Folder with images of the golden unit: check and, optionally, dispersion and boards "
+      "(default: images in the station's folder, which are moved away afterwards)");
   add_operator(*verify, options);
   add_threads_option(*verify, options.threads);
 }
 
 void add_hook(CLI::App& app, StationRunOptions& options) {
-  CLI::App* hook = app.add_subcommand(
-      "hook", "Run the hook again for runs whose hook failed or was not run to its end");
-  hook->add_option("--station", options.station, "The station, station.yaml")->required();
+  CLI::App* hook =
+      app.add_subcommand("hook", "Run the hook again for runs whose hook failed or did not finish");
+  hook->add_option("--station", options.station, "Station configuration, station.yaml")->required();
 }
 
 /// Refuses a password: all users of the machine see command lines.
 std::string find_password(const std::string& where) {
-  return contains_password(where) ? "a password on the command line is shown to all users of the "
-                                    "machine: give it in the "
-                                    "variable PGPASSWORD, or in the file that PGPASSFILE names"
+  return contains_password(where) ? "a password on the command line is visible to all users of the "
+                                    "machine; set the variable PGPASSWORD, or PGPASSFILE to a file"
                                   : "";
 }
 
@@ -77,10 +80,11 @@ std::string find_password(const std::string& where) {
 CLI::App* add_records_location(CLI::App& app, const char* name, const char* what,
                                StationRecordsOptions& options) {
   CLI::App* command = app.add_subcommand(name, what);
-  command->add_option("--station", options.station, "The station, station.yaml");
+  command->add_option("--station", options.station, "Station configuration, station.yaml");
   command
-      ->add_option("--records", options.records,
-                   "Or its records: a file of SQLite, or postgresql://USER@HOST/NAME")
+      ->add_option(
+          "--records", options.records,
+          "Database of records, instead of --station: SQLite file, or postgresql://USER@HOST/NAME")
       ->check(find_password);
   return command;
 }
@@ -89,132 +93,135 @@ CLI::App* add_records_location(CLI::App& app, const char* name, const char* what
 CLI::App* add_records_command(CLI::App& app, const char* name, const char* what,
                               StationRecordsOptions& options) {
   CLI::App* command = add_records_location(app, name, what, options);
-  command->add_option("--camera-id", options.filter.camera, "Only of this camera");
-  command->add_option(
-      "--of-station", options.filter.station,
-      "Only of the station of this name, or any (default: that of --station; of a study "
-      "any)");
-  command->add_option("--verdict", options.filter.verdict, "Only with this verdict")
+  command->add_option("--camera-id", options.filter.camera, "Only runs of this camera");
+  command->add_option("--of-station", options.filter.station,
+                      "Only runs of the station with this name; any: all stations (default: name "
+                      "of --station; study without --reference: any)");
+  command->add_option("--verdict", options.filter.verdict, "Only runs with this verdict")
       ->check(CLI::IsMember({"PASS", "FAIL", "INVALID", "any"}));
-  command->add_option("--kind", options.filter.kind, "Only units, or only golden units")
+  command->add_option("--kind", options.filter.kind, "Only runs of units, or of golden units")
       ->check(CLI::IsMember({"unit", "golden", "any"}));
-  command->add_option("--operator", options.filter.operator_name, "Only of this operator");
-  command->add_option("--shift", options.filter.shift, "Only of this shift");
+  command->add_option("--operator", options.filter.operator_name, "Only runs of this operator");
+  command->add_option("--shift", options.filter.shift, "Only runs of this work shift");
   command
-      ->add_option("--since", options.filter.since,
-                   "Only those that ended at this UTC or later, 2026-11-21 or 2026-11-21T13:45")
+      ->add_option(
+          "--since", options.filter.since,
+          "Only runs that ended at or after this time, in UTC, as 2026-11-21 or 2026-11-21T13:45")
       ->check(utc_problem);
-  command->add_option("--until", options.filter.until, "Only those that ended before this UTC")
+  command
+      ->add_option("--until", options.filter.until, "Only runs that ended before this time, in UTC")
       ->check(utc_problem);
-  command->add_option("--last", options.filter.last, "Only the last so many")
+  command->add_option("--last", options.filter.last, "Maximum number of runs, the latest ones")
       ->check(CLI::Range(1, 1'000'000));
   return command;
 }
 
 /// Adds the commands that print or write the record of a run.
 void add_commands_of_a_run(CLI::App& app, StationRecordsOptions& options) {
-  add_records_command(app, "list", "A line for each run", options);
-  auto* show =
-      add_records_command(app, "show", "All of one run, the last unless it is named", options);
-  show->add_option("run", options.run, "Name of the run");
-  auto* restore = add_records_command(
-      app, "restore", "Write the calibration and the report of a run again, from its record",
-      options);
-  restore->add_option("run", options.run, "Name of the run")->required();
+  add_records_command(app, "list", "List runs, one per line", options);
+  auto* show = add_records_command(app, "show", "Print all data of a run", options);
+  show->add_option("run", options.run, "Id of the run (default: the last run)");
+  auto* restore =
+      add_records_command(app, "restore",
+                          "Write the missing files of a run again, and replace its report, from "
+                          "its record. An existing report is kept as replaced-report.html",
+                          options);
+  restore->add_option("run", options.run, "Id of the run")->required();
   restore->add_option("-o,--output", options.output,
-                      "The folder of results (default: the station's); in it CAMERA/RUN/");
+                      "Output folder (default: results of the station). Files go to CAMERA/RUN/");
   auto* certified = add_records_command(
       app, "certificate",
       "Write the certificate of a run, certificate.html: values with expanded uncertainty, "
       "conformity, traceability",
       options);
-  certified->add_option("run", options.run, "Name of the run")->required();
+  certified->add_option("run", options.run, "Id of the run")->required();
   certified->add_option("-o,--output", options.output,
-                        "The folder of results (default: the station's); in it CAMERA/RUN/");
+                        "Output folder (default: results of the station). Files go to CAMERA/RUN/");
 }
 
 /// Adds the commands that check or change records and results.
 void add_upkeep(CLI::App& app, StationRecordsOptions& options) {
   CLI::App* clean = app.add_subcommand("clean",
-                                       "Lists or deletes images and results of old runs "
-                                       "('retention' in station.yaml); records stay");
-  clean->add_option("--station", options.station, "The station, station.yaml")->required();
-  clean->add_flag("--delete", options.remove, "Delete it (default: only tell)");
-  CLI::App* verify_records = add_records_location(
-      app, "verify-records",
-      "Whether the records are as they were kept: what was changed, removed or added by hand, by "
-      "name; exit code 1 when there is any",
-      options);
-  verify_records->add_option("--expected-digest", options.expected_digest,
-                             "The last digest that an earlier verify-records told: the trail has "
-                             "to have it still");
+                                       "List or delete images and results of old runs ('retention' "
+                                       "in station.yaml). Records are kept");
+  clean->add_option("--station", options.station, "Station configuration, station.yaml")
+      ->required();
+  clean->add_flag("--delete", options.remove, "Delete the folders (default: only list them)");
+  CLI::App* verify_records =
+      add_records_location(app, "verify-records",
+                           "Check that the records are unchanged. Lists runs that were changed, "
+                           "removed or added by hand; exit code 1 if there are any",
+                           options);
+  verify_records->add_option(
+      "--expected-digest", options.expected_digest,
+      "Last digest printed by an earlier verify-records. The trail must still contain it");
   CLI::App* voided = add_records_location(
       app, "void",
-      "A run counts no more: in no yield, trend or study; it stays in the records, with who voided "
-      "it and why, its files are renamed, and it is done again",
+      "Exclude a run from yield, trends and studies. The record stays, with operator and reason, "
+      "and files of the run are renamed. Measure the unit again",
       options);
-  voided->add_option("run", options.run, "Name of the run")->required();
-  voided->add_option("--operator", options.operator_name, "Who")->required();
-  voided->add_option("--reason", options.reason, "Why")->required();
+  voided->add_option("run", options.run, "Id of the run")->required();
+  voided->add_option("--operator", options.operator_name, "Name of the operator")->required();
+  voided->add_option("--reason", options.reason, "Reason for the exclusion")->required();
 }
 
 /// Adds the commands that move runs into and out of records.
 void add_transfer(CLI::App& app, StationRecordsOptions& options) {
-  auto* exported = add_records_command(app, "export", "Write runs as CSV or JSON", options);
-  exported->add_option("-o,--output", options.output, "Where to: .csv or .json")->required();
+  auto* exported = add_records_command(app, "export", "Write runs to a CSV or JSON file", options);
+  exported->add_option("-o,--output", options.output, "Output file, .csv or .json")->required();
   CLI::App* imported = app.add_subcommand(
       "import",
-      "Take the sessions of a reprocessed archive into records, as runs of a station that has the "
-      "results' name: for trend, capability and study. Those that are there already stay");
-  imported->add_option("results", options.archive, "RESULTS of scripts/reprocess.sh")->required();
+      "Add the sessions of a reprocessed archive to records, for trend, capability and study. They "
+      "become runs of a station with the name of the results folder. Existing runs stay unchanged");
+  imported->add_option("results", options.archive, "Results folder of scripts/reprocess.sh")
+      ->required();
   imported
-      ->add_option("--records", options.records,
-                   "A file of SQLite, made when it is not there, or postgresql://USER@HOST/NAME")
+      ->add_option(
+          "--records", options.records,
+          "Database of records: SQLite file, created if missing, or postgresql://USER@HOST/NAME")
       ->required()
       ->check(find_password);
 }
 
-constexpr const char* kFigureHelp = "Which: rms_px, check_mean_mm, ...";
+constexpr const char* kMetricHelp = "Metric, such as rms_px or check_mean_mm";
 
 /// Adds the statistics over runs: trend, capability, study.
 void add_statistics(CLI::App& app, StationRecordsOptions& options) {
   auto* trend = add_records_command(
       app, "trend",
-      "A figure over the runs, with the limits of a control chart; exit code 1 for an alarm. Of "
-      "units "
-      "of the station that passed, unless --verdict, --kind or --of-station says otherwise",
+      "Print the control chart of a metric over the runs; exit code 1 if there is an alarm. Uses "
+      "units of the station that passed, unless --verdict, --kind or --of-station is given",
       options);
-  trend->add_option("figure", options.metric, kFigureHelp)->required();
-  trend->add_option("-o,--output", options.output, "Draw it, .png or .svg");
+  trend->add_option("metric", options.metric, kMetricHelp)->required();
+  trend->add_option("-o,--output", options.output, "Output file of a plot, .png or .svg");
   trend
-      ->add_option(
-          "--rules", options.rules,
-          "What is an alarm: western-electric (four rules), nelson (eight), one of them as "
-          "nelson-3, ewma (default: western-electric)")
+      ->add_option("--rules", options.rules,
+                   "Alarm rules: western-electric (four rules, default), nelson (eight rules), a "
+                   "single rule as nelson-3, or ewma")
       ->option_text("RULE ...");
-  auto* capable =
-      add_records_command(app, "capability",
-                          "How figures scatter compared with their gates: Cpk, Ppk, with "
-                          "95 % intervals. Of units of the "
-                          "station that were judged",
-                          options);
-  capable->add_option("figure", options.metric, "Only this: rms_px, check_mean_mm, ...");
-  auto* study = add_records_command(app, "study",
-                                    "What measuring adds to a figure: repeatability and "
-                                    "reproducibility (%GRR, ndc) of units that "
-                                    "were run as often on each station; with --reference bias and "
-                                    "linearity",
-                                    options);
-  study->add_option("figure", options.metric, kFigureHelp)->required();
-  study->add_option("--units", options.units, "Its cameras (default: those with two runs or more)")
+  auto* capable = add_records_command(app, "capability",
+                                      "Print Cpk and Ppk, with 95 % intervals, of metrics that "
+                                      "have gates. Uses judged units of the station",
+                                      options);
+  capable->add_option("metric", options.metric,
+                      "Metric, such as rms_px or check_mean_mm (default: all with gates)");
+  auto* study = add_records_command(
+      app, "study",
+      "Print repeatability and reproducibility (%GRR, ndc) of a metric. Needs units with equally "
+      "many runs on each station. With --reference, print bias and linearity",
+      options);
+  study->add_option("metric", options.metric, kMetricHelp)->required();
+  study
+      ->add_option("--units", options.units,
+                   "Camera ids of the units (default: all with two runs or more)")
       ->option_text("ID ...");
   study
       ->add_option("--reference", options.references,
-                   "Units whose figure is known from elsewhere, and what it is: bias and linearity "
-                   "of the station")
+                   "Reference values of units, for bias and linearity of the station")
       ->option_text("UNIT=VALUE ...")
       ->excludes("--units");
-  study->add_option("-o,--output", options.output, "Draw the bias, .png or .svg")
+  study
+      ->add_option("-o,--output", options.output, "Output file of a plot of the bias, .png or .svg")
       ->needs("--reference");
 }
 
@@ -249,22 +256,12 @@ void run_command(const CLI::App& app, const StationRunOptions& run,
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "A factory's calibration station. 'run' takes a camera through boards, rotation, dispersion "
-      "and\n"
-      "check to PASS, FAIL (exit code 1: the camera) or INVALID (3: the station, the operator, an "
-      "early\n"
-      "end: do it again), as its images arrive or from full folders (--batch);\n"
-      "'verify' measures a reference camera; 'list', 'show', 'export', 'trend', 'capability' and "
-      "'study'\n"
-      "tell of the records, 'restore' writes a run's files again, 'certificate' a page for who "
-      "gets the\n"
-      "unit; 'void' takes a run out of all that is counted, 'verify-records' finds what was "
-      "changed in\n"
-      "the records. Runs wait in the station's 'spool' while the records cannot be reached; 'hook' "
-      "runs the\n"
-      "station's hook again where it failed, 'clean' deletes what is kept no longer,\n"
-      "'import' takes a reprocessed archive into records.\n"
-      "vlp-station COMMAND --help tells more.\n\n"
+      "Calibrates cameras at a station of a factory, gives verdicts and keeps records. 'run' "
+      "processes the images of boards, rotation, dispersion and check as they arrive, or from "
+      "complete folders (--batch). The verdict is PASS, FAIL (exit code 1, camera fault) or "
+      "INVALID (exit code 3, station fault, operator error or aborted run; repeat it). 'verify' "
+      "measures a reference camera, the golden unit. Runs wait in the station's 'spool' while the "
+      "records cannot be reached. vlp-station COMMAND --help describes a command.\n\n"
       "Example, from the project's folder:\n"
       "  mkdir -p out && cp -rT datasets/station out/station\n"
       "  build/bin/vlp-simulate datasets/station/scene.yaml -o out/station/unit\n"

@@ -197,7 +197,7 @@ INSTANTIATE_TEST_SUITE_P(
               "stdout cannot be written", 5, 300},
         Trial{"PasswordOnTheCommandLine", "true",
               "vlp-station list --records postgresql://u:secret@localhost/vlp", 2,
-              "a password on the command line is shown", 5, 300, "! grep secret stderr"}),
+              "a password on the command line is visible", 5, 300, "! grep secret stderr"}),
     name_of_trial);
 
 INSTANTIATE_TEST_SUITE_P(
