@@ -49,7 +49,8 @@ std::vector<Frame> read_labels(const fs::path& folder, const std::string& table,
     if (fs::exists(folder / name)) return read_detections(folder / name);
   }
   throw InputError(folder,
-                   "has no detections.csv that says which lamp is where (image, lamp, u_px, v_px)");
+                   "detections.csv is missing; add this table of the lamps in the images: image, "
+                   "lamp, u_px, v_px");
 }
 
 Inputs read_inputs(const Options& options) {
@@ -87,7 +88,8 @@ void train(const Options& options) {
 
 void train_row_time(const CLI::App& app, const Options& options) {
   if (!options.output.empty() && options.calibration.empty()) {
-    throw std::invalid_argument("-o with --row-time: needs --calibration, which it completes");
+    throw std::invalid_argument(
+        "--output: with --row-time it needs a calibration to complete; add --calibration");
   }
   const Inputs inputs = read_inputs(options);
   std::vector<std::string> files = options.folders;
@@ -106,9 +108,8 @@ void train_row_time(const CLI::App& app, const Options& options) {
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Trains the lamp classifier on images whose lamps a table beside them names; or, with\n"
-      "--row-time, finds the row time of the camera from images of lamps with known "
-      "frequencies.\n\n"
+      "Trains a lamp classifier from images with a table of their lamps. With --row-time, "
+      "estimates the row time of a camera from images of lamps with known frequencies.\n\n"
       "Example, from the project's folder:\n"
       "  build/bin/vlp-train datasets/paper-rig/rendered/sample --row-time \\\n"
       "    --lamps datasets/paper-rig/rendered/lamps.yaml \\\n"
@@ -116,25 +117,25 @@ int main(int argc, char** argv) {
       "    -o calibration.yaml\n",
       "vlp-train");
   vlp::Options options;
-  app.add_option(
-         "folders", options.folders,
-         "Folders of images: PNG, JPEG, BMP, TIFF or PGM; the more places and distances they "
-         "show, the better")
+  app.add_option("folders", options.folders,
+                 "Folders of images: PNG, JPEG, BMP, TIFF or PGM. More positions and distances "
+                 "improve the result")
       ->required();
   app.add_option("--lamps", options.lamps, "Lamp map, lamps.yaml")->required();
   vlp::add_room_option(app, options.frontend.room);
-  app.add_option("--calibration", options.calibration,
-                 "Calibration: its lens and read-out, when they are known");
+  app.add_option(
+      "--calibration", options.calibration,
+      "Calibration of the camera, for lens, readout direction and, without --row-time, row time");
   auto* row_time =
       app.add_flag("--row-time", options.row_time,
-                   "Find the row time; labels are not needed, the map's frequencies are");
+                   "Estimate the row time. Needs frequencies in the lamp map, but no labels");
   auto* output =
       app.add_option("-o,--output", options.output,
-                     "Where to write the classifier; with --row-time the calibration with its row "
-                     "time (default there: only print it)");
+                     "Output file of the classifier, YAML; with --row-time of the calibration with "
+                     "its row time (default with --row-time: only print it)");
   app.add_option("--labels", options.labels,
-                 "Table in each folder: image, lamp, u_px, v_px (default: detections.csv or "
-                 "true_detections.csv; with --row-time none)")
+                 "File name of the table of lamps in each folder: image, lamp, u_px, v_px "
+                 "(default: detections.csv or true_detections.csv; with --row-time none)")
       ->option_text("NAME");
   vlp::add_readout_option(app, options.frontend.readout);
   vlp::add_threads_option(app, options.frontend.threads);

@@ -101,8 +101,7 @@ TEST_F(VlpTrain, RequiresLabels) {
   fs::copy(kRig + "/sample/0000.png", folder / "bare/0000.png");
   const auto result = train((folder / "bare").string() + kLamps);
   EXPECT_EQ(result.exit_code, 2);
-  EXPECT_THAT(result.errors,
-              HasSubstr("bare: has no detections.csv that says which lamp is where"));
+  EXPECT_THAT(result.errors, HasSubstr("bare: detections.csv is missing; add this table"));
   folder.file("bare/mine.csv", "image,lamp,u_px,v_px\n0000.png,77,174.7,302.1\n");
   const auto unknown = train((folder / "bare").string() + kLamps + " --labels mine.csv");
   EXPECT_EQ(unknown.exit_code, 2);
