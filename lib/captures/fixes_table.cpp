@@ -20,10 +20,10 @@ struct FixColumns {
   explicit FixColumns(const CsvTable& csv)
       : pose{csv.required("x_m"), csv.required("y_m"), csv.required("z_m"),
              csv.required("yaw_rad")},
-        sd{csv.optional("sd_x_m"), csv.optional("sd_y_m"), csv.optional("sd_z_m"),
-           csv.optional("sd_yaw_rad")},
-        noise_sd{csv.optional("noise_sd_x_m"), csv.optional("noise_sd_y_m"),
-                 csv.optional("noise_sd_z_m"), csv.optional("noise_sd_yaw_rad")},
+        sd{csv.optional("x_sd_m"), csv.optional("y_sd_m"), csv.optional("z_sd_m"),
+           csv.optional("yaw_sd_rad")},
+        noise_sd{csv.optional("x_noise_sd_m"), csv.optional("y_noise_sd_m"),
+                 csv.optional("z_noise_sd_m"), csv.optional("yaw_noise_sd_rad")},
         residual_px(csv.optional("residual_px")),
         time_s(csv.optional("time_s")),
         velocity{csv.optional("vx_m_per_s"), csv.optional("vy_m_per_s")},
@@ -131,10 +131,10 @@ std::string format_ids(const FixRow& row) {
 
 constexpr std::array<AddedColumn, 11> kAddedColumns{
     {{"time_s", format_time},
-     {"noise_sd_x_m", format_noise_sd<0>},
-     {"noise_sd_y_m", format_noise_sd<1>},
-     {"noise_sd_z_m", format_noise_sd<2>},
-     {"noise_sd_yaw_rad", format_noise_sd<3>},
+     {"x_noise_sd_m", format_noise_sd<0>},
+     {"y_noise_sd_m", format_noise_sd<1>},
+     {"z_noise_sd_m", format_noise_sd<2>},
+     {"yaw_noise_sd_rad", format_noise_sd<3>},
      {"vx_m_per_s", format_velocity<0>},
      {"vy_m_per_s", format_velocity<1>},
      {"roll_rad", format_lean<&Inclination::roll_rad>},
@@ -156,8 +156,8 @@ std::vector<AddedColumn> find_used_columns(const std::vector<FixRow>& rows) {
 
 void write_fixes(const std::filesystem::path& file, const std::vector<FixRow>& rows) {
   std::vector<std::string> header{"image",  "status",     "x_m",    "y_m",
-                                  "z_m",    "yaw_rad",    "sd_x_m", "sd_y_m",
-                                  "sd_z_m", "sd_yaw_rad", "lamps",  "residual_px"};
+                                  "z_m",    "yaw_rad",    "x_sd_m", "y_sd_m",
+                                  "z_sd_m", "yaw_sd_rad", "lamps",  "residual_px"};
   const auto added = find_used_columns(rows);
   for (const AddedColumn& column : added) header.emplace_back(column.name);
   CsvWriter csv(file, header);

@@ -47,9 +47,9 @@ struct FixRow {
 /// Writes `fixes.csv` atomically. Missing values are empty fields. Throws InputError if it cannot
 /// be written.
 ///
-/// Columns: image, status, x_m, y_m, z_m, yaw_rad, sd_x_m, sd_y_m, sd_z_m, sd_yaw_rad, lamps,
-/// residual_px. Further columns, if any row has a value: time_s, noise_sd_x_m, noise_sd_y_m,
-/// noise_sd_z_m, noise_sd_yaw_rad, vx_m_per_s, vy_m_per_s, roll_rad, pitch_rad, rejected and
+/// Columns: image, status, x_m, y_m, z_m, yaw_rad, x_sd_m, y_sd_m, z_sd_m, yaw_sd_rad, lamps,
+/// residual_px. Further columns, if any row has a value: time_s, x_noise_sd_m, y_noise_sd_m,
+/// z_noise_sd_m, yaw_noise_sd_rad, vx_m_per_s, vy_m_per_s, roll_rad, pitch_rad, rejected and
 /// outside_region (ids, separated by blanks).
 void write_fixes(const std::filesystem::path& file, const std::vector<FixRow>& rows);
 

@@ -14,7 +14,7 @@ namespace vlp {
 void write_limits(const std::filesystem::path& file, const FloorLimits& limits) {
   constexpr int digits = 6;
   std::vector<std::string> header{"x_m",    "y_m",    "z_m",    "yaw_rad",   "lamps",
-                                  "sd_x_m", "sd_y_m", "sd_z_m", "sd_yaw_rad"};
+                                  "x_sd_m", "y_sd_m", "z_sd_m", "yaw_sd_rad"};
   for (const auto& [name, key] : limits.sources) header.push_back(std::string(key) + "_m");
   header.emplace_back("horizontal_m");
   CsvWriter csv(file, header);

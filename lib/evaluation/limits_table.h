@@ -9,7 +9,7 @@
 namespace vlp {
 
 /// Writes the achievable accuracy at each position of a floor as CSV. Columns:
-///   x_m, y_m, z_m, yaw_rad, lamps, sd_x_m, sd_y_m, sd_z_m, sd_yaw_rad
+///   x_m, y_m, z_m, yaw_rad, lamps, x_sd_m, y_sd_m, z_sd_m, yaw_sd_rad
 ///   for each source its horizontal standard deviation, named by its key and _m
 ///   horizontal_m, the standard deviation of all sources together
 /// Cells of positions without a fix are empty.

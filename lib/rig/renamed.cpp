@@ -48,6 +48,15 @@ constexpr std::array kRenamings{
     Renaming{NameKind::column, "bow_square_px", "edge_quadratic_px"},
     Renaming{NameKind::column, "bow_cube_px", "edge_cubic_px"},
     Renaming{NameKind::column, "bow_reach", "edge_half_extent"},
+    // fixes.csv
+    Renaming{NameKind::column, "sd_x_m", "x_sd_m"},
+    Renaming{NameKind::column, "sd_y_m", "y_sd_m"},
+    Renaming{NameKind::column, "sd_z_m", "z_sd_m"},
+    Renaming{NameKind::column, "sd_yaw_rad", "yaw_sd_rad"},
+    Renaming{NameKind::column, "noise_sd_x_m", "x_noise_sd_m"},
+    Renaming{NameKind::column, "noise_sd_y_m", "y_noise_sd_m"},
+    Renaming{NameKind::column, "noise_sd_z_m", "z_noise_sd_m"},
+    Renaming{NameKind::column, "noise_sd_yaw_rad", "yaw_noise_sd_rad"},
     // metrics and their gates
     Renaming{NameKind::metric, "center_px", "principal_point_px"},
     Renaming{NameKind::metric, "nominal_px", "nominal_difference_px"},

@@ -20,7 +20,7 @@ TEST(WriteFixes, WritesDocumentedColumns) {
                {"b.png", "ok", FixRow::Fix{pose, {}, 0}, 2},
                {"c,d.png", "too_few_lamps", {}, 0}});
   EXPECT_EQ(TemporaryFolder::read_content(folder / "fixes.csv"),
-            "image,status,x_m,y_m,z_m,yaw_rad,sd_x_m,sd_y_m,sd_z_m,sd_yaw_rad,lamps,residual_px\n"
+            "image,status,x_m,y_m,z_m,yaw_rad,x_sd_m,y_sd_m,z_sd_m,yaw_sd_rad,lamps,residual_px\n"
             "a.png,ok,1.500000000,-0.250000000,0.123456789,3.000000000,0.1,0.2,0.3,0.4,4,0.05\n"
             "b.png,ok,1.500000000,-0.250000000,0.123456789,3.000000000,,,,,2,0\n"
             "\"c,d.png\",too_few_lamps,,,,,,,,,0,\n");
@@ -59,7 +59,7 @@ TEST(WriteFixes, WritesMotionLeanAndTimeWhenGiven) {
   lost.time_s = 0.75;
   write_fixes(folder / "fixes.csv", {moving, lost});
   EXPECT_EQ(TemporaryFolder::read_content(folder / "fixes.csv"),
-            "image,status,x_m,y_m,z_m,yaw_rad,sd_x_m,sd_y_m,sd_z_m,sd_yaw_rad,lamps,residual_px,"
+            "image,status,x_m,y_m,z_m,yaw_rad,x_sd_m,y_sd_m,z_sd_m,yaw_sd_rad,lamps,residual_px,"
             "time_s,vx_m_per_s,vy_m_per_s,roll_rad,pitch_rad\n"
             "a.png,ok,1.500000000,-0.250000000,0.125000000,3.000000000,,,,,4,0.05,0.500000000,"
             "1.000000000,-0.500000000,0.250000000,-0.125000000\n"
@@ -82,7 +82,7 @@ TEST(WriteFixes, WritesMotionLeanAndTimeWhenGiven) {
 TEST(ReadFixes, ReportsLineOfInvalidRow) {
   const TemporaryFolder folder;
   const auto refusal = [&](const std::string& rows) {
-    const std::string header = "image,status,x_m,y_m,z_m,yaw_rad,sd_x_m,sd_y_m,sd_z_m,sd_yaw_rad\n";
+    const std::string header = "image,status,x_m,y_m,z_m,yaw_rad,x_sd_m,y_sd_m,z_sd_m,yaw_sd_rad\n";
     return rejection_message([&] { read_fixes(folder.file("fixes.csv", header + rows)); });
   };
   using testing::HasSubstr;
@@ -95,10 +95,26 @@ TEST(ReadFixes, ReportsLineOfInvalidRow) {
               HasSubstr("fixes.csv:3: y_m: should be within 1,000 km, in meters, not '-1e308'"));
   EXPECT_THAT(refusal("a,ok,1000001,0,0,0,,,,\n"), HasSubstr("fixes.csv:2: x_m"));
   EXPECT_THAT(refusal("a,ok,0,0,1e7,0,,,,\n"), HasSubstr("fixes.csv:2: z_m"));
-  EXPECT_THAT(refusal("a,ok,0,0,0,0,1,1,1,-1\n"), HasSubstr("fixes.csv:2: sd_yaw_rad"));
+  EXPECT_THAT(refusal("a,ok,0,0,0,0,1,1,1,-1\n"), HasSubstr("fixes.csv:2: yaw_sd_rad"));
   EXPECT_THAT(refusal("a,,0,0,0,0,,,,\n"), HasSubstr("fixes.csv:2: status: is empty"));
   EXPECT_THAT(refusal("a,ok,0,0\n"), HasSubstr("fixes.csv:2: has 4 fields"));
   EXPECT_THAT(refusal(""), HasSubstr("fixes.csv: holds no fix"));
+}
+
+TEST(ReadFixes, NamesThePresentColumns) {
+  const TemporaryFolder folder;
+  for (const std::string axis : {"x", "y", "z", "yaw"}) {
+    const std::string unit = axis == "yaw" ? "_rad" : "_m";
+    for (const std::string statistic : {"sd", "noise_sd"}) {
+      const std::string former = statistic + "_" + axis + unit;
+      const std::string present = axis + "_" + statistic + unit;
+      const auto file = folder.file(
+          "fixes.csv", "image,status,x_m,y_m,z_m,yaw_rad," + former + "\na,ok,0,0,0,0,1\n");
+      EXPECT_THAT(
+          rejection_message([&] { read_fixes(file); }),
+          HasSubstr("fixes.csv:1: column '" + former + "' is now called '" + present + "'"));
+    }
+  }
 }
 
 TEST(WriteFixes, WritesNoisePartAndRejectedLampsWhenGiven) {
@@ -111,10 +127,10 @@ TEST(WriteFixes, WritesNoisePartAndRejectedLampsWhenGiven) {
   whole.outside_region = {3, 5};
   write_fixes(folder / "plain.csv", {plain});
   EXPECT_THAT(folder.read_content(folder / "plain.csv"),
-              testing::Not(testing::HasSubstr("noise_sd_x_m")));
+              testing::Not(testing::HasSubstr("x_noise_sd_m")));
   write_fixes(folder / "whole.csv", {plain, whole});
   EXPECT_THAT(folder.read_content(folder / "whole.csv"),
-              HasSubstr("residual_px,noise_sd_x_m,noise_sd_y_m,noise_sd_z_m,noise_sd_yaw_rad,"
+              HasSubstr("residual_px,x_noise_sd_m,y_noise_sd_m,z_noise_sd_m,yaw_noise_sd_rad,"
                         "rejected,outside_region\n"));
   EXPECT_THAT(folder.read_content(folder / "whole.csv"), HasSubstr("7 12"));
   const auto read = read_fixes(folder / "whole.csv");

@@ -19,7 +19,7 @@ TEST(WriteLimits, HasColumnForEachSourceAndEmptyCellsWithoutFix) {
   write_limits(folder / "limits.csv", limits);
   EXPECT_EQ(
       TemporaryFolder::read_content(folder / "limits.csv"),
-      "x_m,y_m,z_m,yaw_rad,lamps,sd_x_m,sd_y_m,sd_z_m,sd_yaw_rad,noise_m,tilt_m,horizontal_m\n"
+      "x_m,y_m,z_m,yaw_rad,lamps,x_sd_m,y_sd_m,z_sd_m,yaw_sd_rad,noise_m,tilt_m,horizontal_m\n"
       "0.5,1,0,0.25,3,0.003,0.004,0.002,0.001,0.003,0.004,0.005\n"
       "1,1,0,0.25,1,,,,,,,\n");
 }

@@ -105,8 +105,8 @@ TEST_F(VlpAdjust, RefinesMapAndReportsUncertaintyOfFixes) {
                   "--calibration " + path("adjusted.yaml") + "-o " + path("fixes.csv"));
   ASSERT_EQ(located.exit_code, 0) << located.errors;
   const CsvTable fixes(folder / "fixes.csv");
-  EXPECT_GT(fixes.number(0, fixes.required("sd_x_m")),
-            fixes.number(0, fixes.required("noise_sd_x_m")));
+  EXPECT_GT(fixes.number(0, fixes.required("x_sd_m")),
+            fixes.number(0, fixes.required("x_noise_sd_m")));
 }
 
 /// Turns that do not stop for their captures: 60 degrees a second, 9 degrees an image.

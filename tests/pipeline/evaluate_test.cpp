@@ -15,7 +15,7 @@ using testing::HasSubstr;
 using testing::StartsWith;
 
 const std::string kFixes =
-    "image,status,x_m,y_m,z_m,yaw_rad,sd_x_m,sd_y_m,sd_z_m,sd_yaw_rad,lamps,residual_px\n";
+    "image,status,x_m,y_m,z_m,yaw_rad,x_sd_m,y_sd_m,z_sd_m,yaw_sd_rad,lamps,residual_px\n";
 
 /// Six captures at two places, off by 1 to 4 mm along x and y; one has no fix.
 class VlpEvaluate : public testing::Test {
@@ -248,7 +248,7 @@ TEST_F(VlpEvaluate, NamesFileAndLineOfBadInput) {
   EXPECT_THAT(refused(kFixes + "a.png,ok,1e308,0,0,0,,,,,3,0\n"),
               HasSubstr("fixes.csv:2: x_m: should be within 1,000 km"));
   EXPECT_THAT(refused(kFixes + "a.png,ok,0,0,0,0,-1,1,1,1,3,0\n"),
-              HasSubstr("fixes.csv:2: sd_x_m: should not be negative"));
+              HasSubstr("fixes.csv:2: x_sd_m: should not be negative"));
   EXPECT_THAT(refused(kFixes), HasSubstr("fixes.csv: holds no fix"));
   EXPECT_THAT(refused(""), HasSubstr("fixes.csv: is empty"));
   folder.file("truth.csv", "image,x_m,y_m\na.png,0,0\na.png,0,0\n");

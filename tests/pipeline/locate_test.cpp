@@ -68,9 +68,9 @@ TEST_F(VlpLocate, WritesRowForEveryImage) {
 
 TEST_F(VlpLocate, UsesNoiseOfColumnOptionOrResiduals) {
   locate({{"a", seen(4, 0.1)}});
-  const double stated_m = figure(0, "sd_x_m");
+  const double stated_m = figure(0, "x_sd_m");
   locate({{"a", seen(4, 0.1)}}, "--sigma-px 0.3");
-  EXPECT_NEAR(figure(0, "sd_x_m"), 3 * stated_m, 1e-4 * stated_m);
+  EXPECT_NEAR(figure(0, "x_sd_m"), 3 * stated_m, 1e-4 * stated_m);
 
   Random random(5);
   std::vector<Frame> frames;
@@ -84,13 +84,13 @@ TEST_F(VlpLocate, UsesNoiseOfColumnOptionOrResiduals) {
   for (std::size_t i = 0; i < frames.size(); ++i) {
     scatter += std::pow(figure(i, "x_m") - 0.1, 2) / static_cast<double>(frames.size());
   }
-  EXPECT_NEAR(figure(0, "sd_x_m"), std::sqrt(scatter), 0.1 * std::sqrt(scatter));
+  EXPECT_NEAR(figure(0, "x_sd_m"), std::sqrt(scatter), 0.1 * std::sqrt(scatter));
 }
 
 TEST_F(VlpLocate, LeavesSdEmptyForUnknownNoise) {
   const auto result = locate({{"a", seen(2, std::nullopt)}});
   ASSERT_EQ(result.exit_code, 0);
-  EXPECT_EQ(word(0, "sd_x_m"), "");
+  EXPECT_EQ(word(0, "x_sd_m"), "");
   EXPECT_THAT(result.errors, HasSubstr("sd columns are empty"));
 }
 
@@ -100,9 +100,9 @@ TEST_F(VlpLocate, UsesInclinationSensor) {
   const auto seen_leaning = seen(4);
   ASSERT_EQ(locate({{"a", seen_leaning}}, "--captures " + captures.string()).exit_code, 0);
   EXPECT_NEAR(figure(0, "x_m"), 0.1, 1e-5);
-  const double sd_m = figure(0, "sd_x_m");
+  const double sd_m = figure(0, "x_sd_m");
   locate({{"a", seen_leaning}}, "--captures " + captures.string() + " --inclination-sigma-deg 0.1");
-  EXPECT_GT(figure(0, "sd_x_m"), 2 * sd_m);
+  EXPECT_GT(figure(0, "x_sd_m"), 2 * sd_m);
   locate({{"a", seen_leaning}});
   EXPECT_GT(std::hypot(figure(0, "x_m") - 0.1, figure(0, "y_m") + 0.2), 0.02);
 }

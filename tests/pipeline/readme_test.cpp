@@ -370,7 +370,7 @@ constexpr Question kQuestions[] = {
     {"Does it work while driving, or in a hand?", "apps/vlp-locate.md", "Inclination and motion",
      "hand-held camera"},
     {"What do exit codes mean?", "apps/README.md", "Conventions", "Exit code 0: done"},
-    {"What is in fixes.csv?", "datasets/README.md", "Formats", "sd_yaw_rad"},
+    {"What is in fixes.csv?", "datasets/README.md", "Formats", "yaw_sd_rad"},
     {"Where is pixel (0, 0), and how is yaw counted?", "datasets/README.md", "Formats",
      "counter-clockwise"},
     {"How do I read session.json?", "datasets/README.md", "Documents of JSON",

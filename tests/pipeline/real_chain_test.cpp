@@ -133,9 +133,9 @@ TEST_F(VlpIntrinsics, YieldsCrlbOfPhoneUnderRealLamps) {
   // up to 3 k1 r^2 = 2 % there, which makes them smaller.
   const double h_m = 2.45, at_ceiling_m = rms_px * h_m / found.camera.focal_px().x();
   EXPECT_EQ(figure("lamps"), 5);
-  EXPECT_NEAR(figure("sd_x_m") * std::sqrt(5) / at_ceiling_m, 0.99, 0.01);
+  EXPECT_NEAR(figure("x_sd_m") * std::sqrt(5) / at_ceiling_m, 0.99, 0.01);
   const double apart_m = 2 * std::hypot(0.3556, 0.3683);  // sqrt(S), of four
-  EXPECT_NEAR(figure("sd_z_m") * apart_m / (at_ceiling_m * h_m), 0.99, 0.01);
+  EXPECT_NEAR(figure("z_sd_m") * apart_m / (at_ceiling_m * h_m), 0.99, 0.01);
 }
 
 }  // namespace

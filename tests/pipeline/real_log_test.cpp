@@ -233,8 +233,8 @@ TEST_F(RealLog, ContradictsGivenLens) {
   const CsvTable fixes(folder / "fixes.csv");
   double variance_m2 = 0;
   for (std::size_t row = 0; row < fixes.rows(); ++row) {
-    const double x_m = fixes.number(row, fixes.required("sd_x_m"));
-    const double y_m = fixes.number(row, fixes.required("sd_y_m"));
+    const double x_m = fixes.number(row, fixes.required("x_sd_m"));
+    const double y_m = fixes.number(row, fixes.required("y_sd_m"));
     variance_m2 += (x_m * x_m + y_m * y_m) / 2 / static_cast<double>(fixes.rows());
   }
   const double ratio = after.mean_distance_m / (0.798 * std::sqrt(variance_m2));

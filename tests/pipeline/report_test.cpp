@@ -47,7 +47,7 @@ class VlpEvaluateReport : public testing::Test {
                                                             2,
                                                             {0.1, 0.2, 0.3, 0.4}}));
     folder.file("track.csv",
-                "image,status,x_m,y_m,z_m,yaw_rad,sd_x_m,sd_y_m,sd_z_m,sd_yaw_rad,"
+                "image,status,x_m,y_m,z_m,yaw_rad,x_sd_m,y_sd_m,z_sd_m,yaw_sd_rad,"
                 "lamps,residual_px\n0,ok,0,0.001,0,0,,,,,3,0.1\n"
                 "1,ok,0.5,0.0015,0,0,,,,,3,0.1\n2,ok,1,0.001,0,0,,,,,3,0.1\n");
   }
