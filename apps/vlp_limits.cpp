@@ -32,7 +32,7 @@ struct Options {
   double noise_px = 0, center_px = 0, tilt_deg = 0, lamp_map_mm = 0;
   bool stated = false;
   MotionOptions motion;
-  double lean_sd_deg = 0;
+  double roll_pitch_sd_deg = 0;
   double step_m = 0.05;
   std::vector<double> floor_m;  // x_min x_max y_min y_max
 };
@@ -42,8 +42,8 @@ std::string make_title(const Options& options) {
   if (const auto& speed = options.motion.max_speed_m_per_s) {
     title += fmt::format(", up to {} m/s", *speed);
   }
-  if (options.lean_sd_deg > 0)
-    title += fmt::format(", roll and pitch sd {} deg", options.lean_sd_deg);
+  if (options.roll_pitch_sd_deg > 0)
+    title += fmt::format(", roll and pitch sd {} deg", options.roll_pitch_sd_deg);
   return title;
 }
 
@@ -81,7 +81,7 @@ BodyPrior make_body_prior(const Options& options, const Camera& camera) {
     prior.velocity_sd_m_per_s = motion->velocity_sd_m_per_s;
     prior.yaw_rate_sd_rad_per_s = motion->yaw_rate_sd_rad_per_s;
   }
-  prior.inclination_sd_rad = rad_from_deg(options.lean_sd_deg);
+  prior.inclination_sd_rad = rad_from_deg(options.roll_pitch_sd_deg);
   return prior;
 }
 
@@ -109,7 +109,7 @@ void run(const Options& options) {
   }
   const FloorLimits limits = find_floor_limits(options, lamps, grid);
   const auto summary = summarize(limits);
-  const bool is_free = options.motion.max_speed_m_per_s || options.lean_sd_deg > 0;
+  const bool is_free = options.motion.max_speed_m_per_s || options.roll_pitch_sd_deg > 0;
   if (!summary && is_free && std::any_of(limits.places.begin(), limits.places.end(), [](auto& one) {
         return one.lamps > 1;
       })) {
@@ -168,7 +168,7 @@ void add_options(CLI::App& app, Options& options) {
       app, options.motion,
       "Maximum speed of the camera, in m/s. Adds the contribution of estimating velocity and yaw "
       "rate (default: 0). With odometry of standard deviation S m/s, use 2 S");
-  app.add_option("--roll-pitch-sd-deg", options.lean_sd_deg,
+  app.add_option("--roll-pitch-sd-deg", options.roll_pitch_sd_deg,
                  "Standard deviation of roll and pitch, in degrees. Adds the contribution of "
                  "estimating both (default: 0, known); 90: unknown")
       ->check(finite_not_negative());

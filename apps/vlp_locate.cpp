@@ -41,7 +41,7 @@ struct Options {
   bool one_lamp = false;
   MotionOptions motion;
   std::optional<double> yaw_rate_sd_deg_per_s;
-  std::optional<double> lean_sd_deg, height_sd_m, yaw_sd_deg;
+  std::optional<double> roll_pitch_sd_deg, height_sd_m, yaw_sd_deg;
   int window_size = 1;
 };
 
@@ -103,7 +103,7 @@ LocateInput make_input(const Options& options, const CapturesTable& captures) {
   input.yaw_sd_rad = rad_from_deg(options.yaw_sd_deg.value_or(0));
   input.motion = options.motion.motion();
   input.yaw_rate_sd_rad_per_s = rad_from_deg(options.yaw_rate_sd_deg_per_s.value_or(0));
-  input.roll_pitch_sd_rad = rad_from_deg(options.lean_sd_deg.value_or(0));
+  input.roll_pitch_sd_rad = rad_from_deg(options.roll_pitch_sd_deg.value_or(0));
   input.height_sd_m = options.height_sd_m;
   input.window_size = options.window_size;
   return input;
@@ -170,7 +170,7 @@ void add_sensor_options(CLI::App& app, Options& options) {
                      "Maximum speed of the camera or robot, in m/s. Estimates the motion of each "
                      "capture unless captures.csv has it (default: motion of captures.csv, or 0)");
   add_yaw_rate_sd_option(app, options.yaw_rate_sd_deg_per_s);
-  app.add_option("--roll-pitch-sd-deg", options.lean_sd_deg,
+  app.add_option("--roll-pitch-sd-deg", options.roll_pitch_sd_deg,
                  "Standard deviation of roll and pitch about level, in degrees, for captures "
                  "without inclination. Estimates both from each image; 90: unknown, needs three "
                  "lamps or more (default: 0, level)")

@@ -76,7 +76,7 @@ std::optional<BodyLimit> compute_body_limit(std::span<const Eigen::Vector3d> lam
   if (!noise || !moving) return std::nullopt;
   limit.noise = *noise;
   limit.motion = *moving - *noise;
-  limit.lean = fix.covariance.topLeftCorner<4, 4>() - *moving;
+  limit.roll_pitch = fix.covariance.topLeftCorner<4, 4>() - *moving;
   return limit;
 }
 
@@ -170,7 +170,7 @@ std::optional<ErrorBudget> compute_error_budget(std::span<const Eigen::Vector3d>
                      by_tilt * by_tilt.transpose(),
                      sources.lamp_map_m * sources.lamp_map_m * of_lamps,
                      limit->motion,
-                     limit->lean};
+                     limit->roll_pitch};
 }
 
 }  // namespace vlp

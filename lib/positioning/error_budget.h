@@ -23,8 +23,8 @@ bool may_move(const BodyPrior& prior);
 /// Cramer-Rao lower bound of a camera that may move and be tilted, predicted from the pixel noise.
 struct BodyLimit {
   /// Covariances of (X, Y, Z, yaw): `noise` for known motion, roll and pitch; `motion` is the
-  /// increase due to unknown motion; `lean` the increase due to unknown roll and pitch.
-  Matrix4 noise, motion, lean;
+  /// increase due to unknown motion; `roll_pitch` the increase due to unknown roll and pitch.
+  Matrix4 noise, motion, roll_pitch;
   /// Exact observations of the lamps, and the fix from these and the prior.
   BodyObservations frame;
   BodyFix fix;
@@ -70,9 +70,9 @@ struct ErrorBudget {
   Matrix4 lamp_map;
   /// Increase of `noise` due to unknown motion, and the further increase due to unknown roll and
   /// pitch (BodyLimit). Zero if they are known.
-  Matrix4 motion = Matrix4::Zero(), lean = Matrix4::Zero();
+  Matrix4 motion = Matrix4::Zero(), roll_pitch = Matrix4::Zero();
 
-  Matrix4 total() const { return noise + center + tilt + lamp_map + motion + lean; }
+  Matrix4 total() const { return noise + center + tilt + lamp_map + motion + roll_pitch; }
 };
 
 /// Computes the error budget of a fix at `level`, the pose of a level camera that observes

@@ -58,7 +58,7 @@ constexpr Source kLampMap{"lamp map", "lamp_map"};
 std::vector<Source> image_sources(const BodyPrior& prior) {
   std::vector<Source> sources{{"noise", "noise"}};
   if (may_move(prior)) sources.push_back({"motion", "motion"});
-  if (prior.inclination_sd_rad > 0) sources.push_back({"lean", "lean"});
+  if (prior.inclination_sd_rad > 0) sources.push_back({"roll and pitch", "roll_pitch"});
   return sources;
 }
 
@@ -66,7 +66,7 @@ template <typename Budget>
 std::vector<Matrix4> parts_of_image(const Budget& budget, const BodyPrior& prior) {
   std::vector<Matrix4> parts{budget.noise};
   if (may_move(prior)) parts.push_back(budget.motion);
-  if (prior.inclination_sd_rad > 0) parts.push_back(budget.lean);
+  if (prior.inclination_sd_rad > 0) parts.push_back(budget.roll_pitch);
   return parts;
 }
 

@@ -57,8 +57,8 @@ std::vector<Eigen::Vector3d> find_visible_lamps(const LampMap& map, const Camera
                                                 const Pose& pose);
 
 /// Computes the error budget at every position of the grid, for a level camera at height `z_m` and
-/// yaw `yaw_rad`. Sources: noise, center, tilt, lamp map. Motion and lean follow the noise if the
-/// prior leaves them free; its mean is at rest and level.
+/// yaw `yaw_rad`. Sources: noise, center, tilt, lamp map. Motion, then roll and pitch follow the
+/// noise if the prior leaves them free; its mean is at rest and level.
 /// @throws std::invalid_argument if the step is not positive, if the grid has no extent or more
 /// than ten million positions, or if the intrinsics do not match the lens model
 /// @pre the camera has row time and readout direction if it may move
@@ -67,8 +67,8 @@ FloorLimits compute_floor_limits(const LampMap& map, const Camera& camera, const
                                  const BodyPrior& prior = {});
 
 /// Computes the same for a calibrated camera with its tilt, from the reported uncertainties of
-/// calibration and lamp map. Sources: noise, motion, lean, lens, zenith, offset if there is one,
-/// lamp map.
+/// calibration and lamp map. Sources: noise, motion, roll and pitch, lens, zenith, offset if there
+/// is one, lamp map.
 FloorLimits compute_floor_limits(const UnitErrors& unit, const FloorGrid& grid, double z_m,
                                  double yaw_rad, double noise_px, const BodyPrior& prior = {});
 

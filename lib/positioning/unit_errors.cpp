@@ -98,7 +98,7 @@ std::optional<UnitBudget> UnitErrors::budget(const Pose& level, std::span<const 
                     part(CommonErrorSource::offset),
                     part(CommonErrorSource::lamps),
                     limit->motion,
-                    limit->lean};
+                    limit->roll_pitch};
 }
 
 }  // namespace vlp

@@ -34,10 +34,10 @@ struct UnitBudget {
   Matrix4 noise, lens, zenith, offset, lamp_map;
   /// Increase of `noise` due to unknown motion, and the further increase due to unknown roll and
   /// pitch (BodyLimit). Independent between images, too.
-  Matrix4 motion = Matrix4::Zero(), lean = Matrix4::Zero();
+  Matrix4 motion = Matrix4::Zero(), roll_pitch = Matrix4::Zero();
 
   Matrix4 common() const { return lens + zenith + offset + lamp_map; }
-  Matrix4 total() const { return noise + motion + lean + common(); }
+  Matrix4 total() const { return noise + motion + roll_pitch + common(); }
 };
 
 /// Predicts the covariance of a calibrated camera's fixes from pixel noise and from the reported

@@ -63,7 +63,7 @@ TEST(VlpLimits, ReportsEffectOfMotionAndTilt) {
   };
   const auto [output, map] = compute_map(
       " --max-speed-m-per-s 2 --roll-pitch-sd-deg 90 --picture " + (folder / "map.svg").string());
-  for (const char* row : {"\nmotion ", "\nlean ", ", a fix at "}) {
+  for (const char* row : {"\nmotion ", "\nroll and pitch ", ", a fix at "}) {
     EXPECT_THAT(output, HasSubstr(row));
   }
   EXPECT_THAT(TemporaryFolder::read_content(folder / "map.svg"),
@@ -81,9 +81,9 @@ TEST(VlpLimits, ReportsEffectOfMotionAndTilt) {
     EXPECT_NEAR(noise_m, standing.number(row, standing.required("noise_m")), 1e-3 * noise_m);
     EXPECT_NEAR(map.number(row, map.required("horizontal_m")),
                 std::hypot(noise_m, map.number(row, map.required("motion_m")),
-                           map.number(row, map.required("lean_m"))),
+                           map.number(row, map.required("roll_pitch_m"))),
                 1e-8);  // six digits
-    EXPECT_GT(map.number(row, map.required("lean_m")), noise_m);
+    EXPECT_GT(map.number(row, map.required("roll_pitch_m")), noise_m);
   }
   EXPECT_GT(with_fix, 0);
 }

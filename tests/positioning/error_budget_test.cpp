@@ -198,11 +198,11 @@ TEST_P(ErrorBudgetWithPrior, MatchesReportedCovarianceOfFix) {
   ASSERT_TRUE(fix.ok());
   const auto found = budget(prior(GetParam()));
   ASSERT_TRUE(found);
-  expect_close(found->noise + found->motion + found->lean, fix.noise_covariance, 1e-6);
+  expect_close(found->noise + found->motion + found->roll_pitch, fix.noise_covariance, 1e-6);
   const auto& [drive, turn, lean] = GetParam();
   EXPECT_EQ(found->motion.diagonal().minCoeff() > 0, drive || turn);
-  EXPECT_EQ(found->lean.diagonal().maxCoeff() > 1e-12, lean);
-  EXPECT_THAT(found->total(), IsNear(Matrix4(found->noise + found->motion + found->lean +
+  EXPECT_EQ(found->roll_pitch.diagonal().maxCoeff() > 1e-12, lean);
+  EXPECT_THAT(found->total(), IsNear(Matrix4(found->noise + found->motion + found->roll_pitch +
                                              found->center + found->tilt + found->lamp_map),
                                      1e-15));
 }

@@ -79,7 +79,7 @@ TEST(ComputeFloorLimits, IncludesMotionAndLeanWhenFree) {
   const auto limits = compute_floor_limits(synthetic_lamps(), camera, grid, 0.2, 0, kNoise, prior);
   ASSERT_EQ(limits.sources.size(), 6);
   EXPECT_EQ(limits.sources[1].key, "motion");
-  EXPECT_EQ(limits.sources[2].key, "lean");
+  EXPECT_EQ(limits.sources[2].key, "roll_pitch");
   ASSERT_EQ(standing.places.size(), limits.places.size());
   int with_fix = 0, without = 0;
   for (std::size_t i = 0; i < limits.places.size(); ++i) {
@@ -98,7 +98,7 @@ TEST(ComputeFloorLimits, IncludesMotionAndLeanWhenFree) {
     EXPECT_GT(place.total()(0, 0), standing.places[i].total()(0, 0));
   }
   EXPECT_GT(with_fix, 0);
-  EXPECT_GT(without, 0) << "some see too few lamps for a lean";
+  EXPECT_GT(without, 0) << "some see too few lamps for roll and pitch";
 }
 
 TEST(ComputeFloorLimits, MatchesScatterWithFisheye) {

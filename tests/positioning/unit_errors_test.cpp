@@ -103,10 +103,11 @@ TEST_P(UnitErrorsParts, BudgetMatchesReportedCovarianceWithFreeMotion) {
   const auto differ = [&](const Eigen::Matrix4d& a, const Eigen::Matrix4d& b) {
     return (a - b).cwiseQuotient(scale).cwiseAbs().maxCoeff();
   };
-  EXPECT_LT(differ(budget->noise + budget->motion + budget->lean, fix.noise_covariance), stopped);
+  EXPECT_LT(differ(budget->noise + budget->motion + budget->roll_pitch, fix.noise_covariance),
+            stopped);
   EXPECT_LT(differ(budget->common(), fix.estimate.covariance - fix.noise_covariance), stopped);
   EXPECT_LT(differ(budget->total(), fix.estimate.covariance), stopped);
-  EXPECT_GT(budget->lean(0, 0), budget->noise(0, 0)) << "a lean that is not known is dear";
+  EXPECT_GT(budget->roll_pitch(0, 0), budget->noise(0, 0)) << "unknown roll and pitch cost much";
 }
 
 TEST_P(UnitErrorsParts, SumToJointCovariance) {
