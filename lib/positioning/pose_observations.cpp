@@ -272,13 +272,13 @@ double compute_residual_limit(const BodyObservations& frame, double max_residual
 bool is_within_prior(const BodyPrior& prior, const BodyMotion& motion) {
   constexpr double sigmas = 5;
   const Inclination &lean = motion.inclination, &mean = prior.mean.inclination;
-  const double lean_rad = std::hypot(wrap_rad(lean.roll_rad - mean.roll_rad),
+  const double tilt_rad = std::hypot(wrap_rad(lean.roll_rad - mean.roll_rad),
                                      wrap_rad(lean.pitch_rad - mean.pitch_rad));
   return (motion.velocity_m_per_s - prior.mean.velocity_m_per_s).norm() <=
              sigmas * prior.velocity_sd_m_per_s &&
          std::abs(motion.yaw_rate_rad_per_s - prior.mean.yaw_rate_rad_per_s) <=
              sigmas * prior.yaw_rate_sd_rad_per_s &&
-         lean_rad <= sigmas * prior.inclination_sd_rad;
+         tilt_rad <= sigmas * prior.inclination_sd_rad;
 }
 
 Agreeing find_agreeing(const BodyState& state, const BodyObservations& frame,

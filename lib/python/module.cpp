@@ -487,7 +487,7 @@ void define_fix(py::module_& m) {
           [](const Fix& fix) { return fix.ok() ? fix.noise_covariance : kUnknown; },
           "The part that is of this frame alone and averages out.")
       .def_property_readonly(
-          "lean_rad",
+          "roll_pitch_rad",
           [](const Fix& fix) -> std::optional<Pair> {
             if (!fix.body) return std::nullopt;
             return Pair{fix.body->inclination.roll_rad, fix.body->inclination.pitch_rad};
@@ -505,7 +505,7 @@ void define_fix(py::module_& m) {
       .def_readonly("lamps", &Fix::lamps, "That the fix rests on.")
       .def_property_readonly(
           "body_covariance", &body_covariance,
-          "Covariance of (x, y, z, yaw, vx, vy, yaw rate, roll, pitch), where motion or lean was "
+          "Covariance of (x, y, z, yaw, vx, vy, yaw rate, roll, pitch), where motion or tilt was "
           "estimated.")
       .def_readonly("rejected_lamps", &Fix::rejected_lamps)
       .def_property_readonly(
@@ -539,7 +539,7 @@ void define_positioner(py::module_& m) {
            "sensors"_a = Sensors(), py::kw_only(), "earlier"_a = std::vector<EarlierArrays>(),
            "The Fix of one frame, from ids (n), pixels (n, 2), their standard deviations (n).\n"
            "earlier: frames from shortly before, (lamps, pixels, sigma_px, before_s) each, which\n"
-           "determine velocity, yaw rate and lean together with this one.")
+           "determine velocity, yaw rate, roll and pitch together with this one.")
       .def(
           "locate_frames", &locate_frames, "frames"_a, "lamps"_a, "pixels"_a,
           "sigma_px"_a = py::none(), "sensors"_a = Sensors(),

@@ -65,10 +65,10 @@ class TiltedCamera : public testing::Test {
   TemporaryFolder folder;
   std::string captures;
 
-  /// Adds captures of a camera tilted by `lean_deg` about x or y, with the lamps in view.
-  void add_set(int lean_deg) {
+  /// Adds captures of a camera tilted by `tilt_deg` about x or y, with the lamps in view.
+  void add_set(int tilt_deg) {
     constexpr double below_m = 1.3;
-    const double aside_m = below_m * std::tan(lean_deg * std::numbers::pi / 180);
+    const double aside_m = below_m * std::tan(tilt_deg * std::numbers::pi / 180);
     const std::array<const char*, 2> axes{"roll", "pitch"};
     for (std::size_t axis = 0; axis < 2; ++axis) {
       const double x_m = axis == 1 ? -aside_m : 0, y_m = axis == 0 ? aside_m : 0;
@@ -76,8 +76,8 @@ class TiltedCamera : public testing::Test {
           "  - {{folder: {}{}, exposure_s: 5.0e-5, spots_m: [[{:.3f}, {:.3f}], [{:.3f}, {:.3f}]], "
           "heights_m: [0.2, 0.4], yaws_deg: [{}], interval_s: 0.5, roll_pitch: {{{}_deg: [{}, "
           "{}]}}}}\n",
-          axes[axis], lean_deg, x_m + 0.1, y_m - 0.05, x_m - 0.1, y_m + 0.1, 0, axes[axis],
-          lean_deg, lean_deg);
+          axes[axis], tilt_deg, x_m + 0.1, y_m - 0.05, x_m - 0.1, y_m + 0.1, 0, axes[axis],
+          tilt_deg, tilt_deg);
     }
   }
   void render(const std::string& scene = kScene) const {
@@ -114,11 +114,11 @@ class TiltedCamera : public testing::Test {
     }
   }
   /// Every capture of both sets has a fix as good as it says.
-  void check(int lean_deg, const std::string& options, const std::string& property) const {
-    SCOPED_TRACE(lean_deg);
+  void check(int tilt_deg, const std::string& options, const std::string& property) const {
+    SCOPED_TRACE(tilt_deg);
     Errors errors;
     for (const char* axis : {"roll", "pitch"}) {
-      const std::string set = fmt::format("{}{}", axis, lean_deg);
+      const std::string set = fmt::format("{}{}", axis, tilt_deg);
       const auto result = locate(set, options);
       EXPECT_EQ(result.exit_code, 0) << result.errors;
       add_errors(set, errors);
@@ -130,28 +130,28 @@ class TiltedCamera : public testing::Test {
 };
 
 TEST_F(TiltedCamera, HasErrorsAsPredictedFromPixelNoise) {
-  for (const int lean_deg : {5, 15, 30, 50}) add_set(lean_deg);
+  for (const int tilt_deg : {5, 15, 30, 50}) add_set(tilt_deg);
   render();
-  for (const int lean_deg : {5, 15, 30, 50})
-    check(lean_deg, "--roll-pitch-sd-deg 90", fmt::format("deg_{}", lean_deg));
+  for (const int tilt_deg : {5, 15, 30, 50})
+    check(tilt_deg, "--roll-pitch-sd-deg 90", fmt::format("deg_{}", tilt_deg));
 }
 
 /// The inclination in captures.csv determines the plane in which lamps are discs.
 TEST_F(TiltedCamera, HasErrorsAsPredictedFromInclinationSensor) {
-  for (const int lean_deg : {5, 15}) add_set(lean_deg);
+  for (const int tilt_deg : {5, 15}) add_set(tilt_deg);
   render();
-  for (const int lean_deg : {5, 15}) {
+  for (const int tilt_deg : {5, 15}) {
     for (const std::string axis : {"roll", "pitch"}) {
-      const std::string set = fmt::format("{}{}", axis, lean_deg);
+      const std::string set = fmt::format("{}{}", axis, tilt_deg);
       std::string table = "image,roll_rad,pitch_rad\n";
       for (const TruthRow& row : read_truth(folder / "out" / set / "truth.csv")) {
-        const double lean_rad = lean_deg * std::numbers::pi / 180;
-        table += fmt::format("{},{},{}\n", row.image, axis == "roll" ? lean_rad : 0,
-                             axis == "pitch" ? lean_rad : 0);
+        const double tilt_rad = tilt_deg * std::numbers::pi / 180;
+        table += fmt::format("{},{},{}\n", row.image, axis == "roll" ? tilt_rad : 0,
+                             axis == "pitch" ? tilt_rad : 0);
       }
       folder.file("out/" + set + "/captures.csv", table);
     }
-    check(lean_deg, "", fmt::format("told_deg_{}", lean_deg));
+    check(tilt_deg, "", fmt::format("told_deg_{}", tilt_deg));
   }
 }
 

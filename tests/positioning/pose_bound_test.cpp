@@ -66,12 +66,12 @@ TEST(BodyLimit, FixErrorsStayNearBoundForAnyTilt) {
     int lamps_seen = 0;
     while (found.fixes + found.refused < 200) {
       BodyRig rig{{}, rolling_calibration(), {}, {}};
-      const double lean_rad = rad_from_deg(random.uniform(min_deg, max_deg));
+      const double tilt_rad = rad_from_deg(random.uniform(min_deg, max_deg));
       rig.body.pose = {{random.uniform(-0.3, 0.3), random.uniform(-0.3, 0.3), 0},
                        random.uniform(-3.1, 3.1)};
       Inclination& lean = rig.body.motion.inclination;
       (random.uniform(0, 1) < 0.5 ? lean.roll_rad : lean.pitch_rad) =
-          random.uniform(0, 1) < 0.5 ? lean_rad : -lean_rad;
+          random.uniform(0, 1) < 0.5 ? tilt_rad : -tilt_rad;
       const std::size_t lamps = 4 + random.index(2);
       rig.map = draw_lamps_in_view(rig, lamps, true, 0.2, random);
       const auto exact = seen_from(rig, kLimitNoise_px);

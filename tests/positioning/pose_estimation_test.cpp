@@ -39,15 +39,15 @@ std::string name_of_combination(const testing::TestParamInfo<Estimated>& info) {
   return name.empty() ? "Given" : name;
 }
 
-BodyState random_state(Random& random, double lean_rad) {
+BodyState random_state(Random& random, double max_tilt_rad) {
   BodyState state;
   for (int i = 0; i < 3; ++i) state.pose.position_m[i] = random.uniform(-0.3, 0.3);
   state.pose.yaw_rad = random.uniform(-3.1, 3.1);
   state.motion.velocity_m_per_s.x() = random.uniform(-2, 2);
   state.motion.velocity_m_per_s.y() = random.uniform(-2, 2);
   state.motion.yaw_rate_rad_per_s = random.uniform(-1.6, 1.6);
-  state.motion.inclination.roll_rad = random.uniform(-lean_rad, lean_rad);
-  state.motion.inclination.pitch_rad = random.uniform(-lean_rad, lean_rad);
+  state.motion.inclination.roll_rad = random.uniform(-max_tilt_rad, max_tilt_rad);
+  state.motion.inclination.pitch_rad = random.uniform(-max_tilt_rad, max_tilt_rad);
   return state;
 }
 

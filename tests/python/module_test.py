@@ -76,7 +76,7 @@ class Module(unittest.TestCase):
         self.assertEqual(fix.lamps, fixes["lamps"][3])
         leaning = self.positioner.locate(*seen, vlp.Sensors(inclination_sigma_rad=0.1, time_s=7))
         self.assertEqual(leaning.time_s, 7)
-        self.assertLess(abs(leaning.lean_rad[0]), 0.01)
+        self.assertLess(abs(leaning.roll_pitch_rad[0]), 0.01)
         mounted = vlp.Positioner(self.lamps, self.calibration, mount=(0, 0, 0.5, 0)).locate(*seen)
         self.assertAlmostEqual(mounted.position_m[2], fix.position_m[2] - 0.5)
 
@@ -120,7 +120,7 @@ class Module(unittest.TestCase):
         self.assertEqual(fix.status, "too_few_lamps")
         for figure in ("position_m", "yaw_rad", "covariance", "noise_covariance", "residual_px"):
             self.assertTrue(np.isnan(getattr(fix, figure)).all(), figure)
-        self.assertIsNone(fix.lean_rad)
+        self.assertIsNone(fix.roll_pitch_rad)
         no_sd = vlp.Sensors(height_m=(0, 0))
         fix = self.positioner.locate([1, 2], [[400.0, 300], [500, 300]], sensors=no_sd)
         self.assertEqual(fix.status, "not_finite")

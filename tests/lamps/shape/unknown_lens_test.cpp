@@ -26,10 +26,10 @@ struct DiscProjection {
   double radius_px;
 };
 
-std::optional<DiscProjection> project_disc(const Lens& lens, double lean_rad,
+std::optional<DiscProjection> project_disc(const Lens& lens, double tilt_rad,
                                            const Eigen::Vector2d& place, double radius) {
   const Eigen::Matrix3d camera_from_level =
-      Eigen::AngleAxisd(lean_rad, Eigen::Vector3d::UnitY()).toRotationMatrix();
+      Eigen::AngleAxisd(tilt_rad, Eigen::Vector3d::UnitY()).toRotationMatrix();
   const auto project_to_pixel = [&](const Eigen::Vector2d& on_ceiling) {
     return lens.project(camera_from_level * on_ceiling.homogeneous());
   };
@@ -84,13 +84,13 @@ TEST(UnknownLensSd, CoversEquidistantLens) {
 
 TEST(UnknownLensSd, CoversTiltedCamera) {
   const Lens pinhole = make_lens(LensModel::pinhole, kHalf_px, {});
-  for (const double lean_deg : {2.0, 5.0, 10.0}) {
-    const double lean_rad = rad_from_deg(lean_deg);
+  for (const double tilt_deg : {2.0, 5.0, 10.0}) {
+    const double tilt_rad = rad_from_deg(tilt_deg);
     // The disc is at the image center.
-    const auto disc = project_disc(pinhole, lean_rad, {-std::tan(lean_rad), 0}, 0.06);
+    const auto disc = project_disc(pinhole, tilt_rad, {-std::tan(tilt_rad), 0}, 0.06);
     ASSERT_TRUE(disc);
     EXPECT_LT(disc->shift_px.norm(), 1.03 * bound_px(*disc));
-    const double expected_px = std::pow(disc->radius_px, 2) * std::tan(lean_rad) / kHalf_px;
+    const double expected_px = std::pow(disc->radius_px, 2) * std::tan(tilt_rad) / kHalf_px;
     EXPECT_NEAR(disc->shift_px.norm() / expected_px, 1, 0.03);
   }
 }
