@@ -91,14 +91,14 @@ Json to_json(const NormalizedErrors& normalized_errors) {
 
 Json to_json(const Comparison& comparison) {
   Json json{{"verdict", comparison.verdict()},       {"pairs", comparison.pairs},
-            {"units", comparison.clusters},          {"only_these", comparison.only_these},
+            {"clusters", comparison.clusters},       {"only_these", comparison.only_these},
             {"only_others", comparison.only_others}, {"smaller_errors", comparison.smaller},
             {"larger_errors", comparison.larger}};
   if (comparison.pairs > 0) {
     json["mean_difference_mm"] = kMmKeys.factor * comparison.mean_difference_m;
   }
-  json["least_mm"] = kMmKeys.factor * comparison.min_relevant_m;
-  if (comparison.too_few()) json["why"] = "too few";
+  json["min_relevant_difference_mm"] = kMmKeys.factor * comparison.min_relevant_m;
+  if (comparison.too_few()) json["reason"] = "too few clusters";
   if (comparison.interval_m) json["interval_95_mm"] = to_json(*comparison.interval_m);
   return json;
 }
@@ -121,7 +121,7 @@ bool failed(const CheckedMetric& gate) { return !gate.passed(); }
 }  // namespace
 
 std::string to_json(const Evaluation& evaluation, const std::vector<CheckedMetric>& gates) {
-  Json json{{"format", "vlp-evaluation/1"},
+  Json json{{"format", "vlp-evaluation/2"},
             {"against", evaluation.reference},
             {"captures", evaluation.captures},
             {"fixes", evaluation.fixes},
@@ -130,7 +130,7 @@ std::string to_json(const Evaluation& evaluation, const std::vector<CheckedMetri
             {"horizontal", to_json(evaluation.horizontal_m, kMmKeys)}};
   if (const auto& intervals = evaluation.intervals_m) {
     json["horizontal"]["intervals_95"] = {{"drawn", evaluation.resampling_unit},
-                                          {"units", intervals->clusters},
+                                          {"clusters", intervals->clusters},
                                           {"mean_mm", to_json(intervals->mean)},
                                           {"median_mm", to_json(intervals->median)}};
     Json& intervals_json = json["horizontal"]["intervals_95"];

@@ -10,12 +10,12 @@
 
 namespace vlp {
 
-/// Formats an evaluation as machine-readable `evaluation.json`, format "vlp-evaluation/1".
+/// Formats an evaluation as machine-readable `evaluation.json`, format "vlp-evaluation/2".
 ///
 /// Every key ends in the unit of its value (_mm, _deg, _m). Fractions and ratios have no unit.
 /// Counts are named after what they count. Missing parts are omitted. Errors have mean, median,
 /// p90, max and rms. Intervals are 95 % confidence intervals. A comparison with too few clusters
-/// has a "why". Objects:
+/// has a "reason". Objects:
 ///   horizontal    with intervals_95 and cdf
 ///   height, yaw   with bias
 ///   repeated      bias and scatter of stations with two fixes or more, and the list of stations

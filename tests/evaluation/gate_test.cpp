@@ -234,7 +234,7 @@ TEST(EvaluationJson, HasUnitsInKeys) {
   const auto json = nlohmann::json::parse(to_json(
       evaluation(),
       check_gates({{"max_mm", 5}, {"missing_fraction", 1}}, collect_metrics(evaluation()))));
-  EXPECT_EQ(json["format"], "vlp-evaluation/1");
+  EXPECT_EQ(json["format"], "vlp-evaluation/2");
   EXPECT_EQ(json["captures"], 4);
   EXPECT_EQ(json["missing"]["degenerate"], 1);
   EXPECT_NEAR(json["horizontal"]["mean_mm"].get<double>(), 3, 1e-9);
@@ -253,12 +253,12 @@ TEST(EvaluationJson, OmitsP90IntervalForFewUnits) {
   const auto json = nlohmann::json::parse(to_json(few, {}));
   EXPECT_FALSE(json["horizontal"]["intervals_95"].contains("p90_mm"));
   EXPECT_NEAR(json["horizontal"]["intervals_95"]["rms_mm"][1].get<double>(), 2, 1e-9);
-  EXPECT_EQ(json["comparison"]["why"], "too few");
+  EXPECT_EQ(json["comparison"]["reason"], "too few clusters");
   few.intervals_m->p90 = interval;
   few.comparison->clusters = 20;
   const auto sufficient = nlohmann::json::parse(to_json(few, {}));
   EXPECT_NEAR(sufficient["horizontal"]["intervals_95"]["p90_mm"][0].get<double>(), 1, 1e-9);
-  EXPECT_FALSE(sufficient["comparison"].contains("why"));
+  EXPECT_FALSE(sufficient["comparison"].contains("reason"));
 }
 
 }  // namespace

@@ -201,7 +201,7 @@ TEST_F(VlpEvaluate, SchemaRejectsChangedDocuments) {
   EXPECT_THAT(problems_with("\"captures\": 6", "\"captures\": 6.5"), HasSubstr("$.captures: 6.5"));
   EXPECT_THAT(problems_with("\"captures\": 6,", ""), HasSubstr("'captures' is a required"));
   EXPECT_THAT(problems_with("\"captures\"", "\"caught\": 0, \"captures\""), HasSubstr("'caught'"));
-  EXPECT_THAT(problems_with("vlp-evaluation/1", "vlp-evaluation/2"), HasSubstr("$.format"));
+  EXPECT_THAT(problems_with("vlp-evaluation/2", "vlp-evaluation/1"), HasSubstr("$.format"));
 }
 
 TEST_F(VlpEvaluate, ComparesExampleWithCrlb) {
@@ -283,7 +283,7 @@ TEST_F(VlpEvaluate, GivesSameBytesForAllThreadCounts) {
   with_truth("--threads 4 --json four.json");
   EXPECT_THAT(content("one.json"), HasSubstr("intervals_95"));
   EXPECT_EQ(content("one.json"), content("four.json"));
-  EXPECT_THAT(content("one.json"), StartsWith("{\n  \"format\": \"vlp-evaluation/1\""));
+  EXPECT_THAT(content("one.json"), StartsWith("{\n  \"format\": \"vlp-evaluation/2\""));
 }
 
 }  // namespace
