@@ -88,11 +88,11 @@ Mount tilted(const Mount& mount, double tilt_rad, double azimuth_rad) {
 void draw_camera(Scene& scene, const ArchiveVariation& variation, cv::RNG random) {
   const auto fraction = [&] { return random.uniform(-1.0, 1.0); };
   std::vector<double>& intrinsics = scene.camera.intrinsics;
-  const double focal = 1 + variation.focal_share * fraction();
+  const double focal = 1 + variation.focal_fraction * fraction();
   for (std::size_t i = 0; i < 2; ++i) intrinsics[i] *= focal;
   for (std::size_t i = 2; i < 4; ++i) intrinsics[i] += variation.center_px * fraction();
   for (std::size_t i = 4; i < intrinsics.size(); ++i) {
-    intrinsics[i] *= 1 + variation.distortion_share * fraction();
+    intrinsics[i] *= 1 + variation.distortion_fraction * fraction();
   }
   const double tilt_rad = variation.tilt_rad * std::abs(fraction());
   scene.mount = tilted(scene.mount, tilt_rad, std::numbers::pi * fraction());
@@ -206,8 +206,8 @@ ArchiveSession make_archive_session(const Scene& scene, std::size_t index) {
   session.scene.camera.id = session.camera;
   draw_camera(session.scene, variation, make_random(scene.seed, "archive camera", camera));
   draw_session(session.scene, variation, make_random(scene.seed, "archive session", index));
-  const auto fault = find_choice(index, variation.fault_share);
-  if (const auto damage_target = find_choice(index, variation.damage_share)) {
+  const auto fault = find_choice(index, variation.fault_fraction);
+  if (const auto damage_target = find_choice(index, variation.damage_fraction)) {
     std::tie(session.damage, session.damaged) =
         kDamageTargets[*damage_target % kDamageTargets.size()];
   } else if (fault) {

@@ -48,9 +48,9 @@ std::string_view to_string(ArchiveDamage damage);
 /// Returns session `index` of an archive, counted from 0. It depends on scene and index only, so
 /// that an archive can grow without changes to existing sessions.
 ///
-/// Among the first n sessions, n damage_share are damaged and n fault_share are chosen for a fault,
-/// to within one. A session chosen for both is damaged only. Kinds of fault and of damage are used
-/// cyclically.
+/// Among the first n sessions, n damage_fraction are damaged and n fault_fraction are chosen for a
+/// fault, to within one. A session chosen for both is damaged only. Kinds of fault and of damage
+/// are used cyclically.
 /// @pre the scene has an `archive`
 ArchiveSession make_archive_session(const Scene& scene, std::size_t index);
 

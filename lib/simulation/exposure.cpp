@@ -63,7 +63,7 @@ int filter_at(int line, int place) {
 }
 
 double filter_transmission(const Bayer& bayer, int line, int place) {
-  const std::array transmissions{bayer.blue_share, 1.0, bayer.red_share};
+  const std::array transmissions{bayer.blue_to_green_ratio, 1.0, bayer.red_to_green_ratio};
   return transmissions[static_cast<std::size_t>(filter_at(line, place))];
 }
 
@@ -72,7 +72,7 @@ std::vector<cv::Mat1f> demosaic(const Bayer& bayer, const Sensor& sensor, const 
   const cv::Matx33f corners(.25F, .5F, .25F, .5F, 1, .5F, .25F, .5F, .25F);
   const cv::Matx33f sides(0, .25F, 0, .25F, 1, .25F, 0, .25F, 0);
   const auto black = static_cast<float>(sensor.black_level_dn);
-  const std::array transmissions{bayer.blue_share, 1.0, bayer.red_share};
+  const std::array transmissions{bayer.blue_to_green_ratio, 1.0, bayer.red_to_green_ratio};
   std::vector<cv::Mat1f> colors(3);
   for (int color = 0; color < 3; ++color) {
     cv::Mat1f channel(levels.size(), 0);

@@ -358,11 +358,11 @@ struct Sharpening {
 /// Mosaic of color filters over the pixels (RGGB): lines of red and green alternate with lines of
 /// green and blue, from the first pixel on.
 ///
-/// The members are the light that red and blue filters pass, as fractions of green ones. The camera
-/// fills in each color by the mean of the nearest pixels that have it, and divides it by that
-/// fraction.
+/// The members are the light that red and blue filters pass, divided by that of green ones. The
+/// camera fills in each color by the mean of the nearest pixels that have it, and divides it by
+/// that ratio.
 struct Bayer {
-  double red_share, blue_share;
+  double red_to_green_ratio, blue_to_green_ratio;
 };
 
 /// In-camera processing of the sensor's levels before they are rounded, in this order:
@@ -406,14 +406,14 @@ struct ArchiveVariation {
   int sessions_per_camera;
   /// Variation of a camera: relative of both focal lengths together, of each coordinate of the
   /// center, and relative of each distortion coefficient.
-  double focal_share, center_px, distortion_share;
+  double focal_fraction, center_px, distortion_fraction;
   /// Variation of a camera: additional tilt in a random direction, and each component of the lever
   /// arm.
   double tilt_rad, lever_arm_m;
   /// Variation of a session: map error of each coordinate of each lamp.
   double map_error_m;
   /// Fractions of the sessions with a fault, and with damage.
-  double fault_share, damage_share;
+  double fault_fraction, damage_fraction;
 };
 
 /// Simulated world: camera, lamps, board, and the captures to render.

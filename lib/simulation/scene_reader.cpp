@@ -109,8 +109,8 @@ Sharpening read_sharpening(YamlMap& map) {
 
 Bayer read_bayer(YamlMap& map) {
   const std::string unit = "(of what green filters pass)";
-  return {map.required("red_share").number_within(0.05, 2, unit),
-          map.required("blue_share").number_within(0.05, 2, unit)};
+  return {map.required("red_to_green_ratio").number_within(0.05, 2, unit),
+          map.required("blue_to_green_ratio").number_within(0.05, 2, unit)};
 }
 
 ImageProcessing read_image_processing(YamlMap& map, const Sensor& sensor) {
@@ -165,14 +165,14 @@ ArchiveVariation read_archive_variation(YamlMap& map) {
     return map.required(key).number_within(0, max_fraction, "");
   };
   return {map.required("sessions_per_camera").integer_within(1, 10'000),
-          fraction("focal_share", 0.5),
+          fraction("focal_fraction", 0.5),
           map.required("center_px").number_within(0, 1e4, "px"),
-          fraction("distortion_share", 0.5),
+          fraction("distortion_fraction", 0.5),
           rad_from_deg(map.required("tilt_deg").number_within(0, 20, "degrees")),
           map.required("lever_arm_m").number_within(0, 1, "m"),
           map.required("map_error_m").number_within(0, 1, "m"),
-          fraction("fault_share", 1),
-          fraction("damage_share", 1)};
+          fraction("fault_fraction", 1),
+          fraction("damage_fraction", 1)};
 }
 
 }  // namespace

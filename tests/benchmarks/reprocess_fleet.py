@@ -68,10 +68,10 @@ class Year:
         self.cameras = []
         for _ in range(CAMERAS):
             intrinsics = list(self.scene["camera"]["intrinsics"])
-            focal = 1 + spreads["focal_share"] * share()
+            focal = 1 + spreads["focal_fraction"] * share()
             intrinsics[:2] = [focal * value for value in intrinsics[:2]]
             intrinsics[2:4] = [value + spreads["center_px"] * share() for value in intrinsics[2:4]]
-            intrinsics[4:] = [value * (1 + spreads["distortion_share"] * share()) for value in intrinsics[4:]]
+            intrinsics[4:] = [value * (1 + spreads["distortion_fraction"] * share()) for value in intrinsics[4:]]
             mount = self.scene["mount"]
             toward = math.radians(mount["tilt_azimuth_deg"])
             lean = [mount["tilt_deg"] * part for part in (math.cos(toward), math.sin(toward))]

@@ -17,9 +17,9 @@ class VlpSimulateArchive : public SmallSimulation {
  protected:
   VlpSimulateArchive() {
     change_scene("captures:",
-                 "archive: {sessions_per_camera: 2, focal_share: 0.01, center_px: 1, "
-                 "distortion_share: 0.05, tilt_deg: 1, lever_arm_m: 0.003, map_error_m: 0.001, "
-                 "fault_share: 0.5, damage_share: 0.25}\ncaptures:");
+                 "archive: {sessions_per_camera: 2, focal_fraction: 0.01, center_px: 1, "
+                 "distortion_fraction: 0.05, tilt_deg: 1, lever_arm_m: 0.003, map_error_m: 0.001, "
+                 "fault_fraction: 0.5, damage_fraction: 0.25}\ncaptures:");
     change_scene("folder: lamps", "folder: rotation");
     change_scene("count: 8", "count: 2");
     change_scene("heights_m: [0, 0.3], turn: {count: 2", "heights_m: [0], turn: {count: 1");

@@ -8,7 +8,7 @@ source "$(dirname "$0")/common.sh"
 rm -rf "$scratch"
 mkdir -p "$scratch"
 # Sessions 2, 5 and 9 are damaged; 3 leans, 8 is out of focus.
-sed 's/fault_share: .*/fault_share: 0.2/; s/damage_share: .*/damage_share: 0.3/' \
+sed 's/fault_fraction: .*/fault_fraction: 0.2/; s/damage_fraction: .*/damage_fraction: 0.3/' \
   "$source_dir/datasets/archive/scene.yaml" >"$scratch/scene.yaml"
 "$bin/vlp-simulate" --quiet "$scratch/scene.yaml" --archive 10 -o "$archive"
 before=$(state_of_archive)

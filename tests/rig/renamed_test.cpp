@@ -14,7 +14,10 @@ namespace {
 
 TEST(FindPresentName, DependsOnTheKind) {
   EXPECT_EQ(find_present_name(NameKind::key, "uncertainty_px"), "expected_max_error_px");
+  EXPECT_EQ(find_present_name(NameKind::key, "fault_share"), "fault_fraction");
+  EXPECT_EQ(find_present_name(NameKind::key, "red_share"), "red_to_green_ratio");
   EXPECT_EQ(find_present_name(NameKind::column, "spot"), "pivot");
+  EXPECT_EQ(find_present_name(NameKind::column, "sd_x_m"), "x_sd_m");
   EXPECT_EQ(find_present_name(NameKind::metric, "center_px"), "principal_point_px");
   EXPECT_EQ(find_present_name(NameKind::option, "--of"), "--position-of");
   EXPECT_EQ(find_present_name(NameKind::value, "paper"), "chen-guan");

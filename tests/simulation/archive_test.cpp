@@ -15,8 +15,9 @@ namespace {
 using testing::HasSubstr;
 
 const std::string kSpreads =
-    "archive: {sessions_per_camera: 2, focal_share: 0.01, center_px: 3, distortion_share: 0.05, "
-    "tilt_deg: 1, lever_arm_m: 0.003, map_error_m: 0.001, fault_share: 0.1, damage_share: 0.05}\n";
+    "archive: {sessions_per_camera: 2, focal_fraction: 0.01, center_px: 3, "
+    "distortion_fraction: 0.05, tilt_deg: 1, lever_arm_m: 0.003, map_error_m: 0.001, "
+    "fault_fraction: 0.1, damage_fraction: 0.05}\n";
 
 Scene archive_scene(const std::string& variation = kSpreads) {
   return read_scene_text(scene_with("captures:", variation + "captures:"));
@@ -28,9 +29,9 @@ TEST(ReadScene, ReadsArchiveVariation) {
   const auto variation = archive_scene().archive;
   ASSERT_TRUE(variation);
   EXPECT_EQ(variation->sessions_per_camera, 2);
-  EXPECT_EQ(variation->focal_share, 0.01);
+  EXPECT_EQ(variation->focal_fraction, 0.01);
   EXPECT_NEAR(variation->tilt_rad, std::numbers::pi / 180, 1e-12);
-  EXPECT_EQ(variation->damage_share, 0.05);
+  EXPECT_EQ(variation->damage_fraction, 0.05);
   EXPECT_FALSE(read_scene_text(kSceneYaml).archive);
 }
 
@@ -40,7 +41,8 @@ TEST(ReadScene, RejectsInvalidArchiveVariation) {
     variation.replace(variation.find(from), from.size(), to);
     return scene_refusal(scene_with("captures:", variation + "captures:"));
   };
-  EXPECT_THAT(refusal("damage_share: 0.05", "damage_share: 1.5"), HasSubstr("damage_share"));
+  EXPECT_THAT(refusal("damage_fraction: 0.05", "damage_fraction: 1.5"),
+              HasSubstr("damage_fraction"));
   EXPECT_THAT(refusal("sessions_per_camera: 2", "sessions_per_camera: 0"),
               HasSubstr("sessions_per_camera"));
   EXPECT_THAT(refusal("tilt_deg: 1, ", ""), HasSubstr("key 'tilt_deg' is missing"));

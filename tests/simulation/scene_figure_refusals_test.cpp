@@ -128,12 +128,12 @@ TEST(ReadScene, RejectsInvalidColorFilters) {
   const auto with = [](const std::string& filters) {
     return refusal_with("jpeg_quality: 90}", "jpeg_quality: 90, bayer: {" + filters + "}}");
   };
-  EXPECT_EQ(with("red_share: 0.6, blue_share: 0.5"), "");
-  EXPECT_THAT(
-      with("red_share: 0, blue_share: 0.5"),
-      testing::HasSubstr("processing.bayer.red_share: 0 (of what green filters pass) is not "
-                         "within 0.05 and 2"));
-  EXPECT_THAT(with("red_share: 0.6"), testing::HasSubstr("blue_share"));
+  EXPECT_EQ(with("red_to_green_ratio: 0.6, blue_to_green_ratio: 0.5"), "");
+  EXPECT_THAT(with("red_to_green_ratio: 0, blue_to_green_ratio: 0.5"),
+              testing::HasSubstr(
+                  "processing.bayer.red_to_green_ratio: 0 (of what green filters pass) is not "
+                  "within 0.05 and 2"));
+  EXPECT_THAT(with("red_to_green_ratio: 0.6"), testing::HasSubstr("blue_to_green_ratio"));
 }
 
 TEST(ReadScene, RejectsInvalidChips) {
