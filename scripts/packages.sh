@@ -27,7 +27,7 @@ while [[ ${1:-} == -* ]]; do
 done
 cd "$project"
 
-# Where Debian has its libraries and zsh looks; nothing has to be compiled anew for it. The build is left as
+# Folders of libraries and zsh completions on Debian; nothing is recompiled. The build is left as
 # it was: cmake --install goes where it went before.
 before=()
 for name in CMAKE_INSTALL_PREFIX CMAKE_INSTALL_LIBDIR; do

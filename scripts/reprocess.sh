@@ -22,8 +22,8 @@
 #   changes.json           that comparison for programs, and the gates
 #   sessions/, failed/     per session its results, or why there are none:
 #                          session.json
-# What is current is not run again; an interrupted run goes on. A session
-# without a result does not stop the others.
+# Results that are up to date are not computed again; an interrupted run
+# continues. A session without a result does not stop the others.
 #
 # --cores N        shards at a time on this machine (default: one more than it
 #                  has cores, so that none is idle while one waits)

@@ -38,7 +38,7 @@ vlp() {  # PROGRAM ARGUMENT...
 }
 
 vlp simulate "$scene/scene.yaml" --only "$(IFS=,; echo "${folders[*]}")" -o "$out"
-# Of the true calibration the camera alone.
+# Extracts the camera from the true calibration.
 awk '/^[a-z]/ { part = $1 } part != "rotation_center:"' "$out/true_calibration.yaml" \
   >"$out/camera.yaml"
 # Centers as far off as those of bounding boxes, 1.7 px rms: normal noise of 1.2 px per axis.

@@ -32,7 +32,7 @@ while [[ ${1:-} == -* ]]; do
   esac
 done
 cd "$project"
-# What is asked for has to be there; python3-vlp is made where pybind11 is.
+# The requested packages must exist; python3-vlp is built only if pybind11 is installed.
 declare -A package_of=([positioning]=libvlp-positioning0 [development]=libvlp-positioning-dev [tools]=vlp-tools
                        [python]=python3-vlp)
 asked=()
@@ -68,7 +68,7 @@ tests/bare_root.sh "${root[@]}" --bind "$scratch" /packages "$release" '
     vlp-evaluate /packages/fixes.csv --truth truth.csv --gate mean_mm=1 --report /packages/report.html
     grep -q "<strong>PASS</strong>" /packages/report.html
     echo "a first report $((SECONDS - begin)) s after the first command"
-    # What README.md begins with, of what is in the package alone.
+    # Runs the first commands of README.md with nothing but the files of the package.
     mkdir /packages/first
     sed -n "/^    mkdir -p out && cp/p; s/^    \(vlp-.*\)/\1/p" ../../README.md >/packages/first/commands
     (cd /packages/first && bash -euo pipefail commands >>/packages/install.log && test -s out/chain-results/report.html)

@@ -9,14 +9,14 @@ import os
 import re
 from pathlib import Path
 
-# What vlp-calibrate reads of a session (lib/session/session_folder.h), but for drives, which are for its report.
+# Inputs of vlp-calibrate in a session (lib/session/session_folder.h), except line drives, which only its report uses.
 INPUTS = ["board.yaml", "boards", "camera.yaml", "check", "classifier.yaml", "dispersion", "gates.yaml", "lamps.yaml"]
 INPUTS += ["rotation"]
-# Of a session that are looked at: links that lead to each other's folders have more ways through them than can be gone.
+# Maximum number of folders examined per session: links between folders can make the number of paths unlimited.
 MOST_FOLDERS = 1000
 
 
-# What a spreadsheet takes for a formula at the beginning of a field, and for text behind an apostrophe: OWASP's
+# Characters at the start of a field that a spreadsheet reads as a formula, and as text after an apostrophe: OWASP's
 # "CSV injection". lib/captures/csv_writer.cpp writes the same.
 FIRST_CHARACTERS = tuple("'=+-@\t\r")
 FORMULA = re.compile(r"'*[=+\-@\t\r].", re.DOTALL)

@@ -11,7 +11,7 @@ import signal
 FIGURES = ["captures", "fixes", "missing_fraction", "mean_mm", "median_mm", "p90_mm", "max_mm", "rms_px"]
 TOLD = ["warnings", "images_skipped", "rejected_lamps", "remarks"]
 COLUMNS = ["camera", "session", "verdict", *FIGURES, *TOLD, "date", "reason", "version", "inputs", "key", "cpu_s"]
-# Of a calibration, over time: each along x and y with its standard deviation, and its name in session.json.
+# Calibration values tracked over time: along x and y, with standard deviations, by their names in session.json.
 TWO = {"focal": "px", "center": "px", "zenith": "deg", "rotation_center": "px"}
 TWO |= {"lever_arm": "mm", "dispersion_offset": "px"}
 TRACKED = [f"{name}_{axis}_{unit}" for name, unit in TWO.items() for axis in "xy"]

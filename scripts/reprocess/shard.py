@@ -22,7 +22,7 @@ from outcome import ALL, KEPT, outcome_of
 
 STATE = Path(".state")
 LONGEST_S = 3600
-# What an image took is there for the next one: given back, its pages are cleared again. Either of the two alone would
+# Keeps the memory of an image for the next one: returned pages would be cleared again. Either of the two alone would
 # keep glibc from learning how large a buffer it need not map anew.
 ENVIRONMENT = {"MALLOC_TRIM_THRESHOLD_": str(256 << 20), "MALLOC_MMAP_THRESHOLD_": str(32 << 20), **os.environ}
 

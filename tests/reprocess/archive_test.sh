@@ -37,7 +37,7 @@ done <"$archive/archive.csv"
 as_its_schema_says row "$baseline"/*/*/*/row.json
 as_its_schema_says changes "$baseline/changes.json"
 as_its_schema_says plan "$baseline"/.state/{run,compare}.json
-# What reprocessing gives is what vlp-calibrate gives, byte for byte, and its report is of the same.
+# The results of reprocessing equal those of vlp-calibrate byte for byte, and its report shows the same values.
 name=camera-00001/session-01 alone=$scratch/alone
 "$bin/vlp-calibrate" "$archive/$name" -o "$alone" --camera-id camera-00001 "${options[@]}" >"$said"
 cmp "$alone/check-fixes.csv" "$baseline/sessions/$name/fixes.csv"

@@ -123,7 +123,7 @@ reprocess "$results" --shard-size 3 --previous "$previous" --gates "$scratch/gat
   reprocess "$moved" >"$said"
   grep -q '^camera-00001,by-3-mm,look,.*the residuals show' "$moved/summary.csv" || fail "$(cat "$moved/summary.csv")"
   # By 30 mm the others contradict it in each capture of the check, and in most of the six at the place of the dispersion.
-  # Whether one keeps it hangs on tenths of a pixel: either the offset is found without that, or that there is none is told.
+  # Rejection of a lamp depends on tenths of a pixel: either the offset is found without it, or its absence is reported.
   grep -q '^camera-00001,by-30-mm,look,.*lamp 2 hangs 3[0-2] mm from where the map has it' \
     "$moved/summary.csv" || fail "$(cat "$moved/summary.csv")"
   awk -F, '$5 == "by-3-mm" { off = sqrt($10 ^ 2 + $11 ^ 2); if (off > most) { most = off; lamp = $3 } }

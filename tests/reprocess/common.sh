@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
 #
-# What the tests of scripts/reprocess.sh have in common: SOURCE BIN SCRATCH are their arguments.
+# Common part of the tests of scripts/reprocess.sh; arguments: SOURCE BIN SCRATCH.
 set -euo pipefail
 source_dir=$1 bin=$2 scratch=$3
 export VLP_PROGRAMS_DIR=$bin

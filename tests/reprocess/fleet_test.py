@@ -52,7 +52,7 @@ def steps_and_drifts(seed):
 
 
 class OverTime(unittest.TestCase):
-    # Of 20 cameras with 10 sessions each in a year: 0.1 % of the focal length, 0.02 degrees of tilt, 0.3 px.
+    # Drifts in a year of 20 cameras with 10 sessions each: 0.1 % of the focal length, 0.02 degrees of tilt, 0.3 px.
     DRIFTS = {
         3: {"focal": (0.26, 0.26)},
         8: {"zenith": (0.02, 0), "rotation_center": (0.0908, 0)},

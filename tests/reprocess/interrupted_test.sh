@@ -2,7 +2,7 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
 #
-# What is current is not run again, what is stale is, and a run that is killed goes on.
+# Up-to-date results are not computed again, outdated ones are, and a killed run continues.
 source "$(dirname "$0")/common.sh"
 results=$scratch/interrupted
 rm -rf "$results" "$results-bin" "$results-mark"
@@ -21,7 +21,7 @@ for moment in '*/work/*/steps/corners/*.csv' '*/work/*/rotated.yaml' '*/sessions
   kill -9 -- -$!
   wait $! 2>/dev/null || true
   [ ! -e "$results/summary.csv" ] || fail "killed too late"
-  # What stands there is whole.
+  # Every session that exists is complete.
   for session in "$results"/sessions/*/* "$results"/failed/*/*; do
     [ ! -e "$session" ] || [ -s "$session/row.json" ] || fail "$session is not whole"
   done

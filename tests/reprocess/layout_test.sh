@@ -23,7 +23,7 @@ mkdir -p "$scratch/layout-empty/camera/session"
 incomplete 3 'none of its 1 sessions has any input; the layout is ARCHIVE/CAMERA/SESSION/' "$scratch/layout-empty" "$results"
 [ ! -e "$results" ] || fail "something is left of an archive that has no session"
 
-# What another program keeps there is neither written into nor deleted.
+# Files of another program in the folder are neither changed nor deleted.
 mkdir -p "$results/.state"
 echo precious >"$results/.state/notes"
 before=$(find "$results" | sort)

@@ -5,7 +5,7 @@ import datetime
 import math
 import random
 
-# What sessions of datasets/archive state, and how many times as much they scatter.
+# Standard deviations reported by the sessions of datasets/archive, and the ratio of the actual scatter to them.
 SDS = {"focal": ("px", 0.025, 1.7), "center": ("px", 0.029, 1.7), "zenith": ("deg", 0.006, 1.5)}
 SDS |= {"rotation_center": ("px", 0.013, 1.2), "lever_arm": ("mm", 0.075, 1.1), "dispersion_offset": ("px", 0.003, 5)}
 NOISY = 3
