@@ -23,7 +23,7 @@ struct Options {
   std::optional<int> cols, rows;
   int first_id = 0;
   std::optional<double> tag_mm, square_mm, spacing;
-  double marker_share = 0.75;
+  double marker_to_square_ratio = 0.75;
   bool kalibr = false, chessboard = false, charuco = false;
 };
 
@@ -80,7 +80,8 @@ void run(const Options& options) {
   }
   if (options.charuco) {
     constexpr double um_per_m = 1e6;
-    board.tag_size_m = std::round(options.marker_share * board.square_size_m * um_per_m) / um_per_m;
+    board.tag_size_m =
+        std::round(options.marker_to_square_ratio * board.square_size_m * um_per_m) / um_per_m;
   }
   const std::string pdf = render_board_pdf(board, paper);
   const std::string yaml =
@@ -160,7 +161,7 @@ int main(int argc, char** argv) {
   app.add_option("--dictionary", options.dictionary,
                  "OpenCV dictionary of the markers (default: DICT_5X5_100)")
       ->needs(charuco);
-  app.add_option("--marker-share", options.marker_share,
+  app.add_option("--marker-to-square-ratio", options.marker_to_square_ratio,
                  "Marker width as a fraction of the square width (default: 0.75)")
       ->check(CLI::Range(0.3, 0.9))
       ->needs(charuco);

@@ -86,6 +86,7 @@ constexpr std::array kRenamings{
     Renaming{NameKind::option, "--center-px", "--principal-point-px"},
     Renaming{NameKind::option, "--station", "--reference-point"},
     Renaming{NameKind::option, "--place-sd-m", "--position-sd-m"},
+    Renaming{NameKind::option, "--marker-share", "--marker-to-square-ratio"},
     Renaming{NameKind::value, "paper", "chen-guan"},
 };
 

@@ -20,6 +20,7 @@ TEST(FindPresentName, DependsOnTheKind) {
   EXPECT_EQ(find_present_name(NameKind::column, "sd_x_m"), "x_sd_m");
   EXPECT_EQ(find_present_name(NameKind::metric, "center_px"), "principal_point_px");
   EXPECT_EQ(find_present_name(NameKind::option, "--of"), "--position-of");
+  EXPECT_EQ(find_present_name(NameKind::option, "--marker-share"), "--marker-to-square-ratio");
   EXPECT_EQ(find_present_name(NameKind::value, "paper"), "chen-guan");
   EXPECT_EQ(find_present_name(NameKind::key, "spot"), "");
   EXPECT_EQ(find_present_name(NameKind::key, "rms_px"), "");
