@@ -50,10 +50,10 @@
 #                  that of other results
 #
 # Exit code: 0 done; 1 done, but a gate of the archive is not met, or a gate of
-# a session if the archive has no gate_share. By default the archive has one
+# a session if the archive has no gate_fraction. By default the archive has one
 # gate, vanished: 0: each session of RESULTS and of --previous is still there.
 # 2 bad input; 3 incomplete: the run could not finish, no session has a result,
-# or more than no_result or no_result_share of --gates allow have none.
+# or more than no_result or no_result_fraction of --gates allow have none.
 set -euo pipefail
 scripts=$(cd "$(dirname "$0")" && pwd)/reprocess
 bin=${VLP_PROGRAMS_DIR:-}

@@ -113,7 +113,7 @@ def newly_failed(changes):
     return len(changes["newly_failed"]) if changes and changes["in_both"] else None
 
 
-def worse_share(changes):
+def worse_fraction(changes):
     return changes["worse"] / changes["pairs"] if changes and changes["pairs"] else None
 
 
@@ -124,9 +124,9 @@ def listed_in(name):
 # Gates, all upper limits: smallest and largest valid limit, and the function that returns the value (None: unknown).
 GATES = {
     "no_result": (0, math.inf, lambda counts, changes, items: counts["no_result"] + counts["crashed"]),
-    "no_result_share": (0, 1, lambda counts, changes, items: fraction(counts, "no_result", "crashed")),
-    "look_share": (0, 1, lambda counts, changes, items: fraction(counts, "look")),
-    "gate_share": (0, 1, lambda counts, changes, items: fraction(counts, "gate")),
+    "no_result_fraction": (0, 1, lambda counts, changes, items: fraction(counts, "no_result", "crashed")),
+    "look_fraction": (0, 1, lambda counts, changes, items: fraction(counts, "look")),
+    "gate_fraction": (0, 1, lambda counts, changes, items: fraction(counts, "gate")),
     "mean_mm": (0, math.inf, lambda counts, changes, items: counts.get("mean_mm")),
     "median_mm": (0, math.inf, lambda counts, changes, items: counts.get("median_mm")),
     "p90_mm": (0, math.inf, lambda counts, changes, items: counts.get("p90_mm")),
@@ -135,15 +135,16 @@ GATES = {
     "cameras_changed": (0, math.inf, listed_in("cameras_changed")),
     "lamps_moved": (0, math.inf, listed_in("lamps_moved")),
     "newly_failed": (0, math.inf, lambda counts, changes, items: newly_failed(changes)),
-    "worse_share": (0, 1, lambda counts, changes, items: worse_share(changes)),
+    "worse_fraction": (0, 1, lambda counts, changes, items: worse_fraction(changes)),
     "mean_difference_mm": (
         -math.inf,
         math.inf,
         lambda counts, changes, items: changes and changes.get("interval_95_mm", [None, None])[1],
     ),
 }
+FORMER_GATES = {f"{name}_share": f"{name}_fraction" for name in ("no_result", "look", "gate", "worse")}
 DEFAULT_GATES = {"vanished": 0}
-COMPLETENESS_GATES = ("no_result", "no_result_share")  # exit code 3 if one is not met
+COMPLETENESS_GATES = ("no_result", "no_result_fraction")  # exit code 3 if one is not met
 
 
 def fraction(counts, *verdicts):
@@ -205,6 +206,8 @@ def read_gates(file):
     if set(document) != {"format", "gates"} or not isinstance(gates, dict) or not gates:
         raise ValueError(f"{file}: should hold format and gates: {{NAME: LIMIT}}")
     for name, limit in gates.items():
+        if name in FORMER_GATES:
+            raise ValueError(f"{file}: gate '{name}' is now called '{FORMER_GATES[name]}'")
         if name not in GATES:
             raise ValueError(f"{file}: gate '{name}' is unknown; there are: {', '.join(GATES)}")
         if isinstance(limit, bool) or not isinstance(limit, (int, float)) or not math.isfinite(limit):
@@ -228,7 +231,7 @@ def check_gates(gates, counts, changes, items):
 
 def sessions_beyond_gates(counts, gates):
     """Returns how many sessions miss a gate of their own; 0 if `gates` has a limit for their fraction."""
-    return 0 if any(gate["name"] == "gate_share" for gate in gates) else counts["gate"]
+    return 0 if any(gate["name"] == "gate_fraction" for gate in gates) else counts["gate"]
 
 
 def is_incomplete(counts, gates):

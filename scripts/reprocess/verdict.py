@@ -82,7 +82,7 @@ def main():
             print(describe_missed_gate(gate, items), file=sys.stderr)
     if beyond := sessions_beyond_gates(counts, document["gates"]):
         many = f"{beyond} of {counts['sessions']} sessions"
-        print(f"reprocess.sh: {many} miss a gate of their own; gate_share of --gates allows more", file=sys.stderr)
+        print(f"reprocess.sh: {many} miss a gate of their own; gate_fraction of --gates allows more", file=sys.stderr)
     if is_incomplete(counts, document["gates"]):
         archive = Path(load(results / ".state/run.json")["archive"])
         print(f"reprocess.sh: error: {describe_incomplete(archive, rows)}", file=sys.stderr)

@@ -164,7 +164,7 @@ def render(year, archive, programs):
 
 def calibrate(archive, results, programs):
     gates = archive.parent / "gates.yaml"
-    gates.write_text("format: vlp-archive-gates/1\ngates: {gate_share: 1}\n")  # gate of lenses; irrelevant here
+    gates.write_text("format: vlp-archive-gates/1\ngates: {gate_fraction: 1}\n")  # gate of lenses; irrelevant here
     command = [SOURCE / "scripts/reprocess.sh", archive, results, "--row-time-s", "3e-5", "--readout", "rows"]
     environment = {**os.environ, "VLP_PROGRAMS_DIR": str(programs)}
     subprocess.run([*command, "--gates", gates], check=True, env=environment)

@@ -173,7 +173,7 @@ def run(options, folder):
         sys.exit(f"reprocess_scale.py: {len(left)} shards are to do, and nothing has changed")
     session_gates = folder / "session_gates.yaml"
     files.write_whole(session_gates, "format: vlp-gates/1\ngates: {mean_mm: 0.25}\n")
-    files.write_whole(folder / "gates.yaml", "format: vlp-archive-gates/1\ngates: {gate_share: 1}\n")
+    files.write_whole(folder / "gates.yaml", "format: vlp-archive-gates/1\ngates: {gate_fraction: 1}\n")
     took["other session gates"] = measured("reprocess.sh, other session gates", *whole, "--session-gates", session_gates,
                                            "--gates", folder / "gates.yaml")
     counts = json.loads(Path("changes.json").read_text())["counts"]

@@ -11,12 +11,12 @@ cp -a "$baseline" "$previous"
 
 # As if an earlier version had been better by half in the first session that has a figure.
 awk -F, -v OFS=, 'NR > 1 && $7 && !done { $7 /= 2; done = 1 } 1' "$baseline/summary.csv" >"$previous/summary.csv"
-printf 'format: vlp-archive-gates/1\ngates: {no_result: 3, newly_failed: 0, worse_share: 0.1}\n' >"$scratch/gates.yaml"
+printf 'format: vlp-archive-gates/1\ngates: {no_result: 3, newly_failed: 0, worse_fraction: 0.1}\n' >"$scratch/gates.yaml"
 code=0
 reprocess "$results" --shard-size 3 --previous "$previous" --gates "$scratch/gates.yaml" >"$said" 2>"$scratch/errors" || code=$?
 [ "$code" = 1 ] || fail "exit code $code"
 grep -q '^changed     0 better, 1 worse, 6 the same, 0 newly without' "$said" || fail "$(cat "$said")"
-grep -q 'gate worse_share: is 0.1429, at most 0.1 is allowed' "$scratch/errors" || fail "$(cat "$scratch/errors")"
+grep -q 'gate worse_fraction: is 0.1429, at most 0.1 is allowed' "$scratch/errors" || fail "$(cat "$scratch/errors")"
 [ "$(wc -l <"$scratch/errors")" = 1 ] || fail "the other gates are met"
 grep -q '>FAIL<' "$results/overview.html" || fail "the overview says nothing"
 as_its_schema_says changes "$results/changes.json"
@@ -38,7 +38,7 @@ reprocess "$results" --shard-size 3 --previous "$previous" --gates "$scratch/gat
   reprocess "$scratch/gates-results" --session-gates "$scratch/session-gates.yaml" >"$said" 2>"$scratch/errors" || code=$?
   [ "$code" = 1 ] || fail "exit code $code, and two sessions miss their gates"
   grep -q '2 of 2 sessions miss a gate of their own' "$scratch/errors" || fail "$(cat "$scratch/errors")"
-  printf 'format: vlp-archive-gates/1\ngates: {gate_share: 1}\n' >"$scratch/gates.yaml"
+  printf 'format: vlp-archive-gates/1\ngates: {gate_fraction: 1}\n' >"$scratch/gates.yaml"
   reprocess "$scratch/gates-results" --session-gates "$scratch/session-gates.yaml" --gates "$scratch/gates.yaml" >"$said"
   grep -q '^this run    ran 0, of them 0 without a result; reused 2; ' "$said" || fail "$(cat "$said")"
   grep -q '^gates       2 with a result that misses a gate' "$said" || fail "$(cat "$said")"

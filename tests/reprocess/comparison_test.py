@@ -59,7 +59,7 @@ class Changes(unittest.TestCase):
 
     def test_gates_hold_what_they_say(self):
         counts = changes.counts_of([row(0, "pass", 1), row(1, "gate", 3), row(2, "no result", None), row(3, "crashed", None)])
-        gates = {"no_result": 2, "no_result_share": 0.4, "gate_share": 0.25, "mean_mm": 2, "p90_mm": 2, "newly_failed": 0}
+        gates = {"no_result": 2, "no_result_fraction": 0.4, "gate_fraction": 0.25, "mean_mm": 2, "p90_mm": 2, "newly_failed": 0}
         passed = [gate["passed"] for gate in changes.check_gates(gates, counts, None, {})]
         self.assertEqual(passed, [True, False, True, True, False, False])
 
@@ -90,7 +90,7 @@ class Changes(unittest.TestCase):
         for verdicts, limits, expected in (
             (["no result", "crashed"], {}, True),
             (["no result", "pass"], {}, False),
-            (["no result", "gate"], {"no_result_share": 0.4}, True),
+            (["no result", "gate"], {"no_result_fraction": 0.4}, True),
             (["no result", "look"], {"no_result": 1, "mean_mm": 0}, False),
         ):
             counts = changes.counts_of([row(i, verdict, None) for i, verdict in enumerate(verdicts)])
@@ -98,7 +98,7 @@ class Changes(unittest.TestCase):
             self.assertEqual(changes.is_incomplete(counts, checked), expected, (verdicts, limits))
 
     def test_gates_without_a_pair_are_not_met(self):
-        gates = {"newly_failed": 0, "worse_share": 1, "mean_difference_mm": 1}
+        gates = {"newly_failed": 0, "worse_fraction": 1, "mean_difference_mm": 1}
 
         def passed(now, before):
             found, _ = changes.changes_of(now, before)
@@ -122,7 +122,7 @@ class Changes(unittest.TestCase):
         counts = changes.counts_of([row(0, "pass", 1), row(1, "gate", 1), row(2, "look", 1)])
         self.assertEqual((counts["pass"], counts["look"], counts["gate"]), (1, 1, 1))
         self.assertEqual(changes.sessions_beyond_gates(counts, []), 1)
-        gates = changes.check_gates({"gate_share": 0.5}, counts, None, {})
+        gates = changes.check_gates({"gate_fraction": 0.5}, counts, None, {})
         self.assertEqual(changes.sessions_beyond_gates(counts, gates), 0)
 
     def test_less_than_a_micrometer_is_the_same(self):
@@ -142,9 +142,10 @@ class Changes(unittest.TestCase):
                 ("format: vlp-archive-gates/1\n", "should hold"),
                 ("format: vlp-archive-gates/1\ngates: {}\n", "should hold"),
                 ("format: vlp-archive-gates/1\ngates: {odd: 1}\n", "gate 'odd' is unknown; there are: no_result, .*cameras_changed, "),
+                ("format: vlp-archive-gates/1\ngates: {look_share: 0}\n", "gate 'look_share' is now called 'look_fraction'"),
                 ("format: vlp-archive-gates/1\ngates: {mean_mm: .inf}\n", "should be a number"),
                 ("format: vlp-archive-gates/1\ngates: {mean_mm: true}\n", "should be a number"),
-                ("format: vlp-archive-gates/1\ngates: {worse_share: 7}\n", "a share from 0 to 1, not 7"),
+                ("format: vlp-archive-gates/1\ngates: {worse_fraction: 7}\n", "a share from 0 to 1, not 7"),
                 ("format: vlp-archive-gates/1\ngates: {mean_mm: -1}\n", "should be 0 or more, not -1"),
                 ("format: [", "is not YAML"),
             ):

@@ -60,11 +60,11 @@ rm -r "$results"
 # One of two has no rotation: that passes unless a fraction is given. With both, nothing could be done.
 rm -r "$archive/camera-00002/session-01/rotation"
 reprocess "$results" >"$said"
-printf 'format: vlp-archive-gates/1\ngates: {no_result_share: 0.4}\n' >"$gates"
+printf 'format: vlp-archive-gates/1\ngates: {no_result_fraction: 0.4}\n' >"$gates"
 missing='1 of 2 sessions have no result; 1 of them: rotation: is missing; rotation is missing in 1 session; the layout'
 incomplete 3 "$missing" "$archive" "$results" --gates "$gates"
 grep -q '>INCOMPLETE<' "$results/overview.html" || fail "the overview has another verdict"
-printf 'format: vlp-archive-gates/1\ngates: {no_result_share: 0.5}\n' >"$gates"
+printf 'format: vlp-archive-gates/1\ngates: {no_result_fraction: 0.5}\n' >"$gates"
 reprocess "$results" --gates "$gates" >"$said"
 rm -r "$archive/camera-00001/session-01/rotation"
 incomplete 3 '2 of 2 sessions have no result; 2 of them: rotation: is missing' "$archive" "$results"

@@ -48,7 +48,7 @@ class Overview(unittest.TestCase):
         html = overview.verdict_part(document, items, rows)
         self.assertTrue(html.startswith('<p class="verdict">FAIL</p>'))
         self.assertLess(html.index("c/9"), html.index("c: focal"))
-        document = document_of(rows, items, {"no_result_share": 0.1})
+        document = document_of(rows, items, {"no_result_fraction": 0.1})
         self.assertEqual(overview.list_actions(document, items, rows)[0][1], "failed")
         self.assertIn("INCOMPLETE", overview.verdict_part(document, items, rows))
         good = [row("1", "pass", "1")]
