@@ -15,7 +15,7 @@ namespace {
 using Cell = Eigen::Array3d;  // whole numbers
 
 /// First positions of the reference points, by the hash of their cell in a cubic grid. Cells of one
-/// hash are told apart by the distance.
+/// hash differ by the distance.
 class StationTable {
  public:
   StationTable(std::size_t max_stations, double radius_m)
