@@ -77,13 +77,13 @@ CapturesTable read_captures(const std::filesystem::path& file) {
       }
       if (!capture.velocity_m_per_s) {
         throw csv.error(row, *velocity_sd,
-                        "is of no velocity: vx_m_per_s and vy_m_per_s are empty");
+                        "has no velocity: vx_m_per_s and vy_m_per_s are empty; add them");
       }
     }
     const std::string name(csv.text(row, image));
     if (name.empty()) throw csv.error(row, image, "is empty");
     if (!table.emplace(name, capture).second) {
-      throw csv.error(row, image, "'" + name + "' stands twice");
+      throw csv.error(row, image, "'" + name + "' occurs twice");
     }
   }
   return table;

@@ -79,12 +79,12 @@ struct CsvParsing {
       content.remove_prefix(text.size());
       ++line;
       if (csv_parse(&parser, text.data(), text.size(), on_field, on_row, this) != text.size()) {
-        error = InputError(table.file_, line, "", "a quote stands where none may");
+        error = InputError(table.file_, line, "", "a quote is not allowed here");
       }
     }
     if (!error && csv_fini(&parser, on_field, on_row, this) != 0) {
       error = InputError(table.file_, row_fields > 0 ? row_line : row_line + 1, "",
-                         "a quote opens that is never closed");
+                         "a quote is not closed");
     }
     if (error) throw *error;
   }
@@ -100,7 +100,7 @@ CsvTable::CsvTable(const std::filesystem::path& file) : file_(file) {
   CsvParsing(*this).parse(text);
   std::unordered_set<std::string_view> names;
   for (const std::string& name : header_) {
-    if (!names.insert(name).second) throw InputError(file_, 1, name, "this column stands twice");
+    if (!names.insert(name).second) throw InputError(file_, 1, name, "this column occurs twice");
   }
 }
 
@@ -175,7 +175,7 @@ std::string_view read_unique_name(const CsvTable& csv, std::size_t row, CsvTable
   const std::string_view name = csv.text(row, column);
   if (name.empty()) throw csv.error(row, column, "is empty");
   if (!names.insert(name)) {
-    throw csv.error(row, column, "'" + std::string(name) + "' stands twice");
+    throw csv.error(row, column, "'" + std::string(name) + "' occurs twice");
   }
   return name;
 }

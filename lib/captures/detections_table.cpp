@@ -33,12 +33,12 @@ std::vector<Frame> read_detections(const std::filesystem::path& file) {
     for (const Detection& other : detections) {
       if (other.lamp == detection.lamp) {
         throw csv.error(row, lamp,
-                        std::to_string(other.lamp) + " stands twice in image '" + name + "'");
+                        std::to_string(other.lamp) + " occurs twice in image '" + name + "'");
       }
     }
     detections.push_back(detection);
   }
-  if (frames.empty()) throw InputError(file, "holds no detection");
+  if (frames.empty()) throw InputError(file, "contains no detection");
   return frames;
 }
 

@@ -205,7 +205,7 @@ std::vector<FixRow> read_fixes(const std::filesystem::path& file) {
     if (columns.outside_region) read.outside_region = read_ids(csv, row, *columns.outside_region);
     read.time_s = csv.optional_number(row, columns.time_s);
   }
-  if (rows.empty()) throw InputError(file, "holds no fix");
+  if (rows.empty()) throw InputError(file, "contains no fix");
   return rows;
 }
 

@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 constexpr int kFolderFlags = O_RDONLY | O_DIRECTORY | O_CLOEXEC;
 constexpr const char* kLink =
     "is a symbolic link, which is not followed in a folder that others can write to: remove it if "
-    "it is not yours, else use a bind mount in its place";
+    "it is not yours, otherwise use a bind mount";
 
 /// Reports the system's reason, errno.
 [[noreturn]] void fail(const fs::path& file, const std::string& what) {

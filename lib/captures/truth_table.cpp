@@ -26,7 +26,7 @@ std::vector<TruthRow> read_truth(const std::filesystem::path& file) {
     read.yaw_rad = csv.optional_number(row, yaw_rad);
     read.line = csv.line(row);
   }
-  if (rows.empty()) throw InputError(file, "holds no place");
+  if (rows.empty()) throw InputError(file, "contains no position");
   return rows;
 }
 
@@ -66,7 +66,8 @@ Path read_path(const std::filesystem::path& file) {
   const bool leads_somewhere =
       std::any_of(path.waypoints_m.begin(), path.waypoints_m.end(),
                   [&](const auto& waypoint) { return waypoint != path.waypoints_m.front(); });
-  if (!leads_somewhere) throw InputError(file, "needs two waypoints or more at different places");
+  if (!leads_somewhere)
+    throw InputError(file, "needs two or more waypoints at different positions");
   return path;
 }
 

@@ -32,12 +32,12 @@ std::string with_unit(double value, const std::string& unit) {
 std::string describe_invalid_limit(const MetricKind& kind, double limit) {
   constexpr int digits = 6;
   const std::string text = significant(limit, digits);
-  if (limit < 0) return "should not be negative, as no figure is to be below zero: " + text;
+  if (limit < 0) return "should not be negative, as no metric is below zero: " + text;
   if (limit <= kind.largest) return "";
   if (kind.largest > 1) {
     return "should be at most " + with_unit(kind.largest, kind.unit) + ", not " + text;
   }
-  return "should be a share from 0 to 1, not " + text +
+  return "should be a fraction from 0 to 1, not " + text +
          (limit > 100 ? "" : ": for " + text + " % say " + significant(limit / 100, digits));
 }
 
@@ -109,7 +109,7 @@ std::vector<Gate> parse_gates(const std::vector<std::string>& texts,
     Gate gate = parse_gate(text, known);
     for (const Gate& other : gates) {
       if (other.metric != gate.metric) continue;
-      throw std::invalid_argument("gate '" + gate.metric + "' stands twice");
+      throw std::invalid_argument("gate '" + gate.metric + "' occurs twice");
     }
     gates.push_back(std::move(gate));
   }
@@ -127,7 +127,7 @@ std::vector<Gate> read_gates(const YamlValue& value, const std::vector<MetricKin
     if (!problem.empty()) throw limit->error(problem);
   }
   map.finish();
-  if (gates.empty()) throw value.error("holds no gate; the gates are: " + join_names(known));
+  if (gates.empty()) throw value.error("contains no gate; the gates are: " + join_names(known));
   return gates;
 }
 

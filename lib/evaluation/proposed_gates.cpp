@@ -75,10 +75,8 @@ std::vector<Gate> propose_gates(const EvaluationInput& input, const Evaluation& 
 std::string format_gates(const std::vector<Gate>& gates, const Evaluation& evaluation) {
   std::string text = fmt::format(
       "# Proposed from {} fixes of {} captures. A run of the same accuracy exceeds the limit of "
-      "an\n"
-      "# error in about 1 of 200 cases (40 places; of fewer more often); the limit of missing is "
-      "the fraction of this run.\n"
-      "format: vlp-gates/1\ngates:\n",
+      "an\n# error in about 1 of 200 cases (40 reference points; more often with fewer). The limit "
+      "of missing_fraction is\n# the fraction of this run.\nformat: vlp-gates/1\ngates:\n",
       evaluation.fixes, evaluation.captures);
   const std::vector<Metric> metrics = collect_metrics(evaluation);
   for (const Gate& gate : gates) {

@@ -28,7 +28,7 @@ std::string make_missing_fixes_warning(const Evaluation& evaluation,
   if (gates.empty() || missing == 0 || has_gate) return "";
   return std::to_string(missing) + " of " + std::to_string(evaluation.captures) +
          (missing == 1 ? " captures has" : " captures have") +
-         " no fix, and no gate 'missing_fraction' asks";
+         " no fix, and there is no gate 'missing_fraction'";
 }
 
 std::string make_limit_warning(const Evaluation& evaluation) {
@@ -36,9 +36,9 @@ std::string make_limit_warning(const Evaluation& evaluation) {
   if (!limit || !limit->is_below_limit()) return "";
   constexpr int digits = 3;
   return "the errors are " + significant(limit->horizontal, digits) +
-         " times the theoretical limit: either the noise of a lamp's pixel is stated too large, or "
-         "the fixes use more than one image of a level camera shows of lamps that are whole in it "
-         "(other frames, a known height, lamps partly in view, a camera that leans)";
+         " times the theoretical limit: either the stated pixel noise is too large, or the fixes "
+         "use more information than one image of a level camera with completely visible lamps "
+         "(other frames, a known height, partly visible lamps, a tilted camera)";
 }
 
 std::vector<std::string> make_sample_size_warnings(const Evaluation& evaluation) {
@@ -50,7 +50,7 @@ std::vector<std::string> make_sample_size_warnings(const Evaluation& evaluation)
              (evaluation.reference == "truth" ? kSufficientClusters : kPathRuns)) {
     const std::string p90 =
         intervals->p90 ? ", that of p90 most"
-                       : ", and p90 has none, which takes " + std::to_string(kMinClustersForP90);
+                       : ", and p90 has none, which needs " + std::to_string(kMinClustersForP90);
     warnings.push_back(describe_few(intervals->clusters, resampling_unit) +
                        "intervals are somewhat too narrow" + p90);
   }
@@ -58,7 +58,7 @@ std::vector<std::string> make_sample_size_warnings(const Evaluation& evaluation)
     return warnings;
   } else if (comparison->too_few()) {
     warnings.push_back(describe_few(comparison->clusters, resampling_unit) +
-                       "with a fix in both files a comparison is no evidence, which takes " +
+                       "with a fix in both files a comparison is no evidence, which needs " +
                        std::to_string(kMinClustersCompared));
   } else if (comparison->clusters < kSufficientClusters) {
     warnings.push_back(describe_few(comparison->clusters, resampling_unit) +

@@ -47,7 +47,7 @@ bool are_tags_overexposed(const BoardDetection& seen) {
 
 std::string describe_too_few_corners(const Board& board, const BoardDetection& seen) {
   if (board.kind == BoardKind::chessboard && seen.points.empty()) {
-    return "the chessboard is not seen as a whole";
+    return "the chessboard is not completely visible";
   }
   if (board.has_squares() || !seen.points.empty()) {
     return fmt::format("only {} corners of the board can be used, or too many of them in a line",
@@ -95,14 +95,15 @@ bool is_upside_down(const BoardView& view) {
 void note_orientation(const Board& board, Observations& result) {
   if (board.kind == BoardKind::chessboard) {
     result.details.emplace_back(
-        "a chessboard looks the same after half a turn; the lens does not depend on it");
+        "a chessboard has the same appearance after a rotation by 180 degrees; this does not "
+        "affect the lens");
   }
   const auto turned = std::count_if(
       result.images.begin(), result.images.end(),
       [](const Observation& image) { return image.board && is_upside_down(*image.board); });
   if (turned == 0) return;
   result.details.push_back(
-      fmt::format("{} views show the board upside down; that does no harm", turned));
+      fmt::format("{} views show the board upside down; this is harmless", turned));
 }
 
 std::vector<BoardView> collect_views(const std::vector<Observation>& images) {
@@ -160,10 +161,10 @@ IntakeFailure explain_no_chessboard(const std::vector<fs::path>& images, const B
     return {true, std::move(message), board_file};
   }
   std::string message = fmt::format(
-      "no chessboard of {} x {} squares is seen in {} images: is all of it in them, with white "
-      "around it, sharp, well lit, and each square wider than 10 px?",
+      "no chessboard of {} x {} squares is visible in {} images: is it complete, with a white "
+      "margin, sharp, well lit, and each square wider than 10 px?",
       board.cols, board.rows, num_views);
-  if (cols > 0) message += fmt::format(" At most {} x {} squares are seen", cols, rows);
+  if (cols > 0) message += fmt::format(" At most {} x {} squares are visible", cols, rows);
   return {false, std::move(message)};
 }
 
@@ -200,17 +201,18 @@ IntakeFailure explain_no_board(const std::vector<fs::path>& images, const Board&
   }
   if (!description.empty()) return {true, described_file.string() + ": " + description, board_file};
   if (unusable > 0) {
-    return {false, fmt::format(
-                       "{} tags of the board are seen in {} images, but none with all four corners "
-                       "sharp: are they blurred, hidden, cut by the image's edge, or seen twice?",
-                       unusable, views.size())};
+    return {false,
+            fmt::format(
+                "{} tags of the board are visible in {} images, but none with four sharp corners: "
+                "are they blurred, covered, cut off by the image border, or visible twice?",
+                unusable, views.size())};
   }
   const auto foreign = std::find_if(views.begin(), views.end(),
                                     [](const auto& view) { return !view.seen.foreign.empty(); });
   if (foreign != views.end()) {
     const std::string layout = check_board(board, views, {}).problem;
     return {true,
-            fmt::format("the images show tags of {}, but with other ids than the board has, "
+            fmt::format("the images show tags of {}, but with other ids than those of the board, "
                         "{} to {} ({} of them in {}){}",
                         board.family, board.first_id,
                         board.first_id + static_cast<int>(list_board_tags(board).size()) - 1,
@@ -219,8 +221,8 @@ IntakeFailure explain_no_board(const std::vector<fs::path>& images, const Board&
             board_file};
   }
   const char* tag = board.has_squares() ? "marker" : "tag";
-  return {false, fmt::format("no {} of {} is seen in {} images: is the board in them, sharp, well "
-                             "lit, and each {} wider than 20 px?",
+  return {false, fmt::format("no {} of {} is visible in {} images: is the board in them, sharp, "
+                             "well lit, and each {} wider than 20 px?",
                              tag, board.family, views.size(), tag)};
 }
 
@@ -231,10 +233,10 @@ void remove_blunders(const BoardLattice& lattice, BoardView& view,
   if (blunders.empty()) return;
   const auto corners = collect_corners(view.seen);
   const Eigen::Vector2d first = corners[blunders.front()].pixel;
-  warnings.push_back(fmt::format(
-      "{}: {} of its {} corners are not where their neighbors predict them, the first at "
-      "({:.1f}, {:.1f}); left out",
-      view.image, blunders.size(), corners.size(), first.x(), first.y()));
+  warnings.push_back(
+      fmt::format("{}: {} of its {} corners are not where their neighbors predict them, the first "
+                  "at ({:.1f}, {:.1f}); rejected",
+                  view.image, blunders.size(), corners.size(), first.x(), first.y()));
   for (auto i = blunders.rbegin(); i != blunders.rend(); ++i) {
     if (!view.seen.points.empty()) {
       view.seen.points.erase(view.seen.points.begin() + static_cast<std::ptrdiff_t>(*i));

@@ -236,10 +236,10 @@ cv::Mat read_image(const fs::path& file, double max_mpx) {
   // Other formats are rejected, because the memory that they need is unknown before decoding.
   const auto size = read_header_size(bytes);
   if (!size) {
-    throw InputError(file, has_image_signature(bytes)
-                               ? "cannot be read as an image: it is cut short or damaged"
-                               : "cannot be read as an image: is no PNG, JPEG, BMP, TIFF, PBM, PGM "
-                                 "or PPM");
+    throw InputError(
+        file, has_image_signature(bytes)
+                  ? "cannot be read as an image: it is cut short or damaged"
+                  : "cannot be read as an image: it is not PNG, JPEG, BMP, TIFF, PBM, PGM or PPM");
   }
   check_size(file, (*size)[0], (*size)[1], max_mpx);
   if (is_cut_png(bytes)) throw InputError(file, cut);

@@ -34,7 +34,7 @@ std::vector<fs::path> list_images(const fs::path& folder) {
   }
   if (error) throw InputError(folder, "cannot be read: " + error.message());
   if (images.empty()) {
-    throw InputError(folder, "holds no image (.png, .jpg, .bmp, .tif or .pgm)");
+    throw InputError(folder, "contains no image (.png, .jpg, .bmp, .tif or .pgm)");
   }
   std::sort(images.begin(), images.end());
   return images;

@@ -85,13 +85,14 @@ void reject_few_lamps(const cv::Mat& image, Observation& result) {
   if (white > 0) {
     return result.reject(
         RejectionReason::overexposed,
-        fmt::format("overexposed: {} of {} lights are at full scale all over, {} of the lamps seen",
-                    white, unknown, lamps));
+        fmt::format(
+            "overexposed: {} of {} lights are completely at full scale, {} of the visible lamps",
+            white, unknown, lamps));
   }
   result.reject(
       RejectionReason::too_few_lamps,
-      fmt::format("too few lamps: {} seen, {} cut by the image's edge, {} lights unlike any", lamps,
-                  count(is_kind(LightKind::cut)), unknown));
+      fmt::format("too few lamps: {} visible, {} cut off by the image border, {} lights unlike any",
+                  lamps, count(is_kind(LightKind::cut)), unknown));
 }
 
 LampClassifier read_classifier(const LampImages& images, const fs::path& file,
@@ -140,8 +141,8 @@ void warn_of_map(const LampImages& images, const DetectorCamera& camera,
   for (std::size_t i = 0; i < std::min(alike.size(), kMaxLines); ++i) {
     const auto& [first, second, gap, needed] = alike[i];
     warnings.push_back(fmt::format(
-        "lamps {} and {} may be left unknown, seen from z = 0: their frequencies differ by {:.1f} "
-        "%, {:.1f} % would be enough; change one of the two frequencies, or a duty by 0.3",
+        "lamps {} and {} may remain unidentified from z = 0: their frequencies differ by {:.1f} %, "
+        "{:.1f} % are needed; change one of the frequencies, or a duty by 0.3",
         first, second, 100 * gap, 100 * needed));
   }
   warn_of_rest(alike.size(), "pairs of lamps with frequencies that are too near", warnings);
@@ -150,13 +151,13 @@ void warn_of_map(const LampImages& images, const DetectorCamera& camera,
     const auto& [lamp, period_lines, periods, contrast] = unreadable[i];
     if (period_lines < kMinPeriod_lines) {
       warnings.push_back(fmt::format(
-          "lamp {} has stripes of {:.2g} lines, too fine to be seen: a lower frequency shows them",
+          "lamp {} has stripes of {:.2g} lines, too fine to be seen: choose a lower frequency",
           lamp, period_lines));
     } else if (periods < kMinPeriods) {
-      warnings.push_back(fmt::format(
-          "lamp {} shows only {:.1f} stripes, seen from z = 0: a higher frequency, a larger lamp "
-          "or a camera nearer to it shows more",
-          lamp, periods));
+      warnings.push_back(
+          fmt::format("lamp {} shows only {:.1f} stripes from z = 0: choose a higher frequency or "
+                      "a larger lamp, or move the camera nearer",
+                      lamp, periods));
     } else {
       constexpr double microseconds = 1e6;
       warnings.push_back(fmt::format(
@@ -164,7 +165,7 @@ void warn_of_map(const LampImages& images, const DetectorCamera& camera,
           lamp, 100 * contrast, microseconds * *exposure_s));
     }
   }
-  warn_of_rest(unreadable.size(), "lamps with stripes that can hardly be seen", warnings);
+  warn_of_rest(unreadable.size(), "lamps with barely visible stripes", warnings);
 }
 
 /// Returns the pairs of lamps that have one frequency, for example "1 and 7, 2 and 8"; empty if
@@ -213,7 +214,7 @@ void create_annotate_folder(const fs::path& folder, const fs::path& images) {
   fs::create_directories(folder, error);
   if (error) throw InputError(folder, "cannot be made: " + error.message());
   if (fs::equivalent(folder, images, error)) {
-    throw InputError(folder, "holds the images: the pictures go into another folder");
+    throw InputError(folder, "contains the images: choose another folder for --annotate");
   }
 }
 
@@ -229,8 +230,8 @@ LightDetector make_detector(const LampImages& images, const FrontendOptions& opt
     if (!camera.row_time_s) {
       throw InputError(
           images.calibration_file,
-          "camera.row_time_s is missing: without it no stripe tells its lamp; --row-time-s of "
-          "vlp-intrinsics states it, vlp-train --row-time finds it");
+          "camera.row_time_s is missing, which is needed to identify lamps: give it with "
+          "--row-time-s of vlp-intrinsics, or estimate it with vlp-train --row-time");
     }
   } else {
     classifier = read_classifier(images, options.classifier, camera.row_time_s, result.warnings);
@@ -397,8 +398,8 @@ Readout find_readout(const std::vector<fs::path>& images, const std::optional<Re
   });
   if (!found) {
     result.warnings.emplace_back(
-        "the read-out is not stated and the images do not show it: rows are taken; --readout "
-        "states it");
+        "the read-out is not stated and not visible in the images: rows are assumed; give "
+        "--readout");
     return Readout::rows;
   }
   result.notes.push_back(fmt::format("the read-out is not stated: the images show stripes along {}",
@@ -411,7 +412,8 @@ void check_frequencies(const LampMap& lamps, const fs::path& lamps_file) {
                   [](const Lamp& lamp) { return lamp.frequency_hz.has_value(); })) {
     return;
   }
-  throw InputError(lamps_file, "no lamp has a frequency_hz: none could be told from another");
+  throw InputError(lamps_file,
+                   "no lamp has a frequency_hz, which is needed to identify lamps; add it");
 }
 
 void check_lamps(std::span<const Frame> frames, const LampMap& lamps, const fs::path& lamps_file) {
@@ -420,7 +422,7 @@ void check_lamps(std::span<const Frame> frames, const LampMap& lamps, const fs::
       if (find_lamp(lamps.lamps, detection.lamp) != nullptr) return;
     }
   }
-  throw InputError(lamps_file, "has none of the lamps that the captures show");
+  throw InputError(lamps_file, "has none of the lamps in the captures");
 }
 
 }  // namespace vlp

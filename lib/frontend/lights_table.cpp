@@ -90,32 +90,29 @@ std::string_view to_string(LightReason reason) {
 std::string describe(LightReason reason) {
   switch (reason) {
     case LightReason::identified:
-      return "its stripes are that lamp's";
+      return "its stripes match this lamp";
     case LightReason::overexposed:
-      return "most of it is overexposed, which hides stripes: if it is a lamp, expose shorter";
+      return "most of it is overexposed: if it is a lamp, expose shorter";
     case LightReason::steady:
       return fmt::format("its lines differ by less than {:.0f} %: if it is a lamp, expose shorter",
                          100 * kMinContrast);
     case LightReason::too_few_periods:
       return fmt::format(
-          "it shows less than {} periods, or less than {} and no lamp with more is in the image: "
-          "if "
-          "it is a lamp, go nearer, or modulate it faster",
+          "it shows less than {} periods, or less than {} without a lamp of more periods in the "
+          "image: if it is a lamp, move nearer, or use a higher frequency",
           kMinPeriods, kMinReliablePeriods);
     case LightReason::no_clear_period:
-      return "it shows no clear period: if it is a lamp, see that nothing hides a part, and that "
-             "the read-out is right";
+      return "it shows no clear period: if it is a lamp, uncover it, and check the readout "
+             "direction";
     case LightReason::unknown_period:
-      return "its period is that of no lamp, or of several: check frequencies, row time and "
-             "read-out, and the classifier, if there is one";
+      return "its period matches no lamp, or several: check frequencies, row time, readout "
+             "direction and, if used, the classifier";
     case LightReason::reflection:
-      return "it is softer than the lamps, or another light has its period: if it is a lamp, "
-             "focus, "
-             "cover what mirrors it, or give each lamp a frequency of its own";
+      return "it is more blurred than the lamps, or another light has the same period: if it is a "
+             "lamp, focus, cover the mirror, or use separate frequencies";
     case LightReason::wrong_shape:
-      return "its outline is not that of a lamp of the map: if it is a lamp, see that nothing "
-             "hides "
-             "a part or joins it, and check its shape in the map";
+      return "its outline matches no lamp of the map: if it is a lamp, uncover it, separate it "
+             "from other lights, and check its shape in the map";
     case LightReason::incomplete:
       return "the image's edge cuts it, or it is too small for an outline: if it is a lamp, aim so "
              "that it is in view, or go nearer";

@@ -43,7 +43,8 @@ void check(const ImageView& image, const ImageSize& size) {
 LampDetector::LampDetector(const LampMap& lamps, const Calibration& calibration)
     : size_{calibration.camera.imager_px[0], calibration.camera.imager_px[1]} {
   if (!calibration.camera.row_time_s) {
-    throw std::invalid_argument("the calibration has no row_time_s, by which lamps are told apart");
+    throw std::invalid_argument(
+        "the calibration has no row_time_s, which is needed to identify lamps");
   }
   detector_ = std::make_shared<const LightDetector>(lamps, make_detector_camera(calibration));
 }

@@ -46,7 +46,7 @@ std::vector<Lamp> sorted_by_id(std::vector<Lamp> lamps) {
   std::ranges::sort(lamps, {}, &Lamp::id);
   for (std::size_t i = 1; i < lamps.size(); ++i) {
     if (lamps[i].id == lamps[i - 1].id) {
-      throw std::invalid_argument("lamp " + std::to_string(lamps[i].id) + " stands twice");
+      throw std::invalid_argument("lamp " + std::to_string(lamps[i].id) + " occurs twice");
     }
   }
   return lamps;
@@ -156,7 +156,7 @@ class Positioner::Impl {
     for (Lamp& lamp : lamps_) lamp.position_m -= origin_m_;
     nearest_m_ = distances_to_nearest(lamps_);
     if (!(mount_.position_in_robot_m.allFinite() && std::isfinite(mount_.yaw_in_robot_rad))) {
-      throw std::invalid_argument("the camera's place on the robot is not finite");
+      throw std::invalid_argument("the position of the camera on the robot is not finite");
     }
     if (!(max_residual_share_ > 0))
       throw std::invalid_argument("max_residual_share is not positive");

@@ -231,7 +231,7 @@ int32_t vlp_detect(const vlp_positioner* positioner, const vlp_image* image,
   }
   if (!positioner->detector) {
     return failed(VLP_ROW_TIME_UNKNOWN,
-                  "the calibration has no row_time_s, by which lamps are told apart");
+                  "the calibration has no row_time_s, which is needed to identify lamps");
   }
   if (!positioner->room_error.empty()) return failed(VLP_BAD_FILE, positioner->room_error);
   try {
@@ -287,15 +287,15 @@ int32_t vlp_locate_with_earlier(const vlp_positioner* positioner, const vlp_dete
 const char* vlp_explanation(int32_t code) {
   switch (code) {
     case VLP_BAD_FILE:
-      return "a file cannot be read or holds what it should not; see vlp_last_error()";
+      return "a file cannot be read or has invalid content; see vlp_last_error()";
     case VLP_BAD_ARGUMENT:
-      return "a pointer is null or a figure out of range";
+      return "a pointer is null or a value is out of range";
     case VLP_NO_MEMORY:
       return "there is not enough memory";
     case VLP_TOO_SMALL:
-      return "an array has no room for all; the count says how many there are";
+      return "an array is too small; see the returned count";
     case VLP_FAILED:
-      return "an error of the library; see vlp_last_error()";
+      return "an internal error; see vlp_last_error()";
     default:
       break;
   }

@@ -169,14 +169,15 @@ CLI::Validator present_value() {
 }
 
 void add_threads_option(CLI::App& app, int& threads, const std::string& what) {
-  app.add_option("--threads", threads, what + " (default: one a core)")->check(CLI::Range(1, 1024));
+  app.add_option("--threads", threads, what + " (default: one per core)")
+      ->check(CLI::Range(1, 1024));
 }
 
 void check_output(const std::string& output, const std::vector<std::string>& inputs) {
   for (const std::string& input : inputs) {
     std::error_code missing;
     if (std::filesystem::equivalent(output, input, missing)) {
-      throw std::invalid_argument(output + ": is an input, too, and would be overwritten");
+      throw std::invalid_argument(output + ": is also an input and would be overwritten");
     }
   }
 }
@@ -188,7 +189,8 @@ void check_outputs(const std::vector<std::pair<std::string, std::string>>& outpu
     check_output(file, inputs);
     for (std::size_t k = 0; k < i; ++k) {
       if (!same_file(file, outputs[k].second)) continue;
-      throw std::invalid_argument(fmt::format("{} and {} name one file", outputs[k].first, option));
+      throw std::invalid_argument(
+          fmt::format("{} and {} are the same file; use another name", outputs[k].first, option));
     }
   }
 }
@@ -199,8 +201,9 @@ int run_app(CLI::App& app, int argc, char** argv, const std::function<void()>& r
   app.formatter(formatter);
   const std::function<bool(CLI::App*)> every = [](CLI::App*) { return true; };
   for (CLI::App* command : app.get_subcommands(every)) command->formatter(formatter);
-  auto* quiet_flag = app.add_flag("-q,--quiet", quiet, "Only errors on stderr, nothing on stdout");
-  app.add_flag("-v,--verbose", verbose, "Details on stderr")->excludes(quiet_flag);
+  auto* quiet_flag =
+      app.add_flag("-q,--quiet", quiet, "Print errors only, to stderr, and nothing to stdout");
+  app.add_flag("-v,--verbose", verbose, "Print details to stderr")->excludes(quiet_flag);
   app.set_version_flag("--version", app.get_name() + " " + VLP_VERSION);
   log_to_stderr(app.get_name(), false, false);
   std::signal(SIGXFSZ,

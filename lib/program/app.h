@@ -46,7 +46,8 @@ CLI::Validator make_ending_validator(const std::string& ending);
 CLI::Validator is_plot_file();
 
 /// Adds --threads. `what` describes the parallel items in --help.
-void add_threads_option(CLI::App& app, int& threads, const std::string& what = "Images at a time");
+void add_threads_option(CLI::App& app, int& threads,
+                        const std::string& what = "Number of images to process in parallel");
 
 /// Throws std::invalid_argument if `output` is one of the input files.
 void check_output(const std::string& output, const std::vector<std::string>& inputs);

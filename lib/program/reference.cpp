@@ -238,11 +238,9 @@ std::string format_manual_page(const CLI::App& app) {
     page.append(".SH FURTHER\n").append(format_roff_paragraphs(app.get_footer(), true));
   }
   page.append(
-      ".SH EXIT STATUS\n"
-      ".TP\n0\nDone.\n"
-      ".TP\n1\nDone, and a gate is not met.\n"
-      ".TP\n2\nBad input or usage; a line on stderr tells file, line and key.\n"
-      ".TP\n3\nThe data do not determine the answer; a line on stderr tells what to add.\n");
+      ".SH EXIT STATUS\n.TP\n0\nDone.\n.TP\n1\nDone, but a gate failed.\n.TP\n2\nBad input or "
+      "usage; a line on stderr names file, line and key.\n.TP\n3\nThe data do not determine the "
+      "result; a line on stderr states what to add.\n");
   return page;
 }
 

@@ -88,14 +88,14 @@ std::string run_request(const char* name, const Request& request,
                         const std::function<int(int, char**)>& program) {
   const int memory = ::memfd_create("said", MFD_CLOEXEC);
   const File output(memory < 0 ? nullptr : ::fdopen(memory, "w+"), &std::fclose);
-  if (!output) throw std::runtime_error("there is no memory left for what a process says");
+  if (!output) throw std::runtime_error("there is not enough memory for the output of a process");
   const pid_t parent = ::getpid(), process = ::fork();
-  if (process < 0) throw std::runtime_error("no process can be split off");
+  if (process < 0) throw std::runtime_error("a process cannot be started");
   if (process == 0) run_in_child(name, request, output.get(), parent, program);
   int status = 0;
   rusage used{};
   while (::wait4(process, &status, 0, &used) < 0) {
-    if (errno != EINTR) throw std::runtime_error("a process that was split off is lost");
+    if (errno != EINTR) throw std::runtime_error("the exit code of a process is not available");
   }
   const nlohmann::json answer{
       {"exit_code", WIFSIGNALED(status) ? -WTERMSIG(status) : WEXITSTATUS(status)},

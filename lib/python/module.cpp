@@ -340,7 +340,8 @@ py::tuple detect(const ImageDetector& of_camera, const py::array& array) {
 ImageDetector make_detector(const LampMapFile& lamps, const Calibration& calibration,
                             const std::optional<std::filesystem::path>& classifier) {
   if (!calibration.camera.row_time_s) {
-    throw std::invalid_argument("the calibration has no row_time_s, by which lamps are told apart");
+    throw std::invalid_argument(
+        "the calibration has no row_time_s, which is needed to identify lamps");
   }
   std::optional<LampClassifier> trained;
   if (classifier) {
@@ -430,7 +431,7 @@ void define_statuses(py::module_& m) {
         if (status < 0 || status >= kStatuses) throw std::invalid_argument("no such status");
         return describe(static_cast<FixStatus>(status));
       },
-      "status"_a, "What a status, an index of STATUSES, means and what to do.");
+      "status"_a, "Description of a status (index in STATUSES), with its remedy.");
 }
 
 /// Defines lamp map, lens and calibration.
@@ -449,7 +450,7 @@ void define_calibration(py::module_& m) {
       .def("unproject", &unproject, "pixels"_a,
            "Unit directions (n, 3) in the camera of pixels (n, 2); NaN where the lens has none.");
 
-  py::class_<Calibration>(m, "Calibration", "All that is known of a camera, calibration.yaml.")
+  py::class_<Calibration>(m, "Calibration", "Calibration of a camera, calibration.yaml.")
       .def(py::init(&read_calibration), "file"_a)
       .def_property_readonly("camera_id", [](const Calibration& c) { return c.camera.id; })
       .def_property_readonly(
@@ -469,7 +470,7 @@ void define_calibration(py::module_& m) {
 
 /// Defines the fix of a frame.
 void define_fix(py::module_& m) {
-  py::class_<Fix>(m, "Fix", "The answer to one frame; figures are NaN where it is not ok.")
+  py::class_<Fix>(m, "Fix", "Result for one frame; values are NaN if it is not ok.")
       .def_property_readonly("ok", &Fix::ok)
       .def_property_readonly("status", [](const Fix& fix) { return to_string(fix.status); })
       .def_property_readonly("explanation", [](const Fix& fix) { return describe(fix.status); })
@@ -481,7 +482,7 @@ void define_fix(py::module_& m) {
       .def_property_readonly(
           "covariance",
           [](const Fix& fix) { return fix.ok() ? fix.estimate.covariance : kUnknown; },
-          "(4, 4), of x, y, z, yaw: all that is known of the error.")
+          "(4, 4), covariance of x, y, z, yaw from all known error sources.")
       .def_property_readonly(
           "noise_covariance",
           [](const Fix& fix) { return fix.ok() ? fix.noise_covariance : kUnknown; },
@@ -499,10 +500,10 @@ void define_fix(py::module_& m) {
             if (!fix.body) return std::nullopt;
             return Pair{fix.body->velocity_m_per_s.x(), fix.body->velocity_m_per_s.y()};
           },
-          "In the world, where it was estimated.")
+          "In the world, if estimated.")
       .def_property_readonly("residual_px",
                              [](const Fix& fix) { return fix.ok() ? fix.residual_px : kNone; })
-      .def_readonly("lamps", &Fix::lamps, "That the fix rests on.")
+      .def_readonly("lamps", &Fix::lamps, "Used for the fix.")
       .def_property_readonly(
           "body_covariance", &body_covariance,
           "Covariance of (x, y, z, yaw, vx, vy, yaw rate, roll, pitch), where motion or tilt was "
@@ -518,7 +519,7 @@ void define_fix(py::module_& m) {
 
 /// Defines sensors, positioner and lamp detector.
 void define_positioner(py::module_& m) {
-  py::class_<Sensors>(m, "Sensors", "What a robot knows of a frame besides the image.")
+  py::class_<Sensors>(m, "Sensors", "Sensor readings of the robot for a frame.")
       .def(py::init(&make_sensors), py::kw_only(), "inclination_rad"_a = py::none(),
            "inclination_sigma_rad"_a = 0.0, "height_and_yaw"_a = py::none(),
            "height_and_yaw_sd"_a = Pair{0, 0}, "velocity_m_per_s"_a = py::none(),

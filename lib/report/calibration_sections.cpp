@@ -68,7 +68,7 @@ std::string intrinsics_table(const IntrinsicsReport& report) {
                           significant(*report.expected_max_error_px, 3) + " px"});
   }
   if (!report.region_px.empty()) {
-    table.rows.push_back({"known", "where the board was seen, valid_region_px; elsewhere not"});
+    table.rows.push_back({"known", "in the valid region (valid_region_px) only"});
   }
   if (report.board_warp_m) {
     const auto& [x_m, y_m] = *report.board_warp_m;
@@ -104,7 +104,7 @@ std::string dispersion_table(const Dispersion& dispersion, const Eigen::Vector2d
         {"radius of the circle before", mm(dispersion.radius_m) + " mm"},
         {"its center from the station",
          mm(dispersion.center_m.x()) + ", " + mm(dispersion.center_m.y()) + " mm"},
-        {"offset taken off the image",
+        {"offset subtracted from the image",
          format_pair(dispersion.offset_px, "px") +
              format_sds(offset_covariance_with_map(dispersion, focal_px), 1, "px")}}});
 }

@@ -52,9 +52,8 @@ std::vector<ReportPlot> make_evaluation_plots(const EvaluationInput& input,
   curve.errors_m.reserve(errors.size());
   for (const FixError& error : errors) curve.errors_m.push_back(error.horizontal_m.norm());
   pictures.push_back(make_report_plot(make_drawing(CdfPlot{"Horizontal errors", {curve}})));
-  pictures.back().alt += " Half of the fixes are no further off than " +
-                         format_mm_with_unit(curve.p50_m) + ", nine tenths no further than " +
-                         format_mm_with_unit(curve.p90_m) + ".";
+  pictures.back().alt += " The median error is " + format_mm_with_unit(curve.p50_m) +
+                         ", nine tenths no further than " + format_mm_with_unit(curve.p90_m) + ".";
   return pictures;
 }
 

@@ -67,7 +67,7 @@ std::string format_gate_verdict(const std::vector<CheckedMetric>& gates,
   const std::string count = std::to_string(gates.size());
   const std::string of_gates = gates.size() == 1 ? " gate" : " gates";
   const std::string reason = missed == 0
-                                 ? "Every figure is within its limit (" + count + of_gates + ")."
+                                 ? "Every metric is within its limit (" + count + of_gates + ")."
                                  : std::to_string(missed) + " of " + count + of_gates +
                                        (missed == 1 ? " is" : " are") + " not met.";
   return verdict_box(missed == 0 ? "pass" : "fail", missed == 0 ? "PASS" : "FAIL",

@@ -33,37 +33,35 @@ constexpr std::array<Kind, 8> kKinds = {
       "Maps of the image: corners of the board in all views, their residuals enlarged, the "
       "standard deviation of the projection, and the MTF50 where it was measured."},
      {"rotation", ReportPart::rotation,
-      "Left: the lamps while the camera turns on the spot; each goes round an ellipse. Right, "
-      "enlarged: the centers of the ellipses, by lamp, with the rotation center and the principal "
-      "point. Centers far apart are a sign of tilt.",
-      "Traces of the lamps in the undistorted image with fitted ellipses, and beside them the "
-      "centers of the ellipses, the rotation center and the principal point."},
+      "Left: the lamps while the camera rotates in place; each moves on an ellipse. Right, "
+      "enlarged: the ellipse centers of the lamps, the rotation center and the principal point. "
+      "Centers far apart indicate tilt.",
+      "Traces of the lamps in the undistorted image with fitted ellipses; next to them the ellipse "
+      "centers, the rotation center and the principal point."},
      {"dispersion", ReportPart::dispersion,
-      "Fixes at a known station minus the station, before and after the dispersion calibration, "
-      "each "
-      "with the smallest circle around them. The circle after should be the smaller.",
+      "Fixes minus reference point, before and after the dispersion calibration, each with the "
+      "smallest enclosing circle. The circle after it should be smaller.",
       "Errors of fixes about the station with their dispersion circles, before and after."},
      {"errors", ReportPart::floor,
-      "Arrows from where the captures were towards their fixes, enlarged as the title says; the "
-      "bar "
-      "below the plan has the scale.",
-      "Floor plan with the lamps and an enlarged error arrow at each true place."},
+      "Arrows from the true position of each capture towards its fix, enlarged as the title "
+      "states; the bar below the plan is the scale.",
+      "Floor plan with the lamps and an enlarged error arrow at each true position."},
      {"cdf", ReportPart::distribution,
-      "The share of fixes that are no further off than so much; marks at half and at nine tenths.",
+      "Cumulative distribution of the errors; marks at 50 % and 90 %.",
       "Cumulative distribution of the horizontal errors."},
      {"budget", ReportPart::distribution,
-      "What the uncertainty of the fixes comes from, as they state it: noise, which averages out, "
-      "below, and what calibration and lamp map leave, which does not, above it. The largest part "
-      "is to be improved first. It is divided as for a level camera whose fixes are its own place: "
-      "fixes with an estimated lean are left out, and of a robot's center it does not hold.",
+      "Error budget of the fixes, from their reported uncertainty: below, noise, which averages "
+      "out; above, contributions of calibration and lamp map, which do not. Reduce the largest "
+      "contribution first. It holds for a level camera whose fixes are those of the camera: fixes "
+      "with estimated roll and pitch are left out, and it does not hold for fixes of a robot "
+      "center.",
       "Stacked horizontal variances of the fixes by their sources."},
      {"track", ReportPart::tracks,
-      "Above: the commanded line and the fixes on the floor. Below: how far they are to the left "
-      "of "
-      "the commanded line, in millimeters; what scatters about the fitted line is jitter.",
+      "Above: the commanded line and the fixes on the floor. Below: their offset to the left of "
+      "the commanded line, in millimeters; the scatter about the fitted line is jitter.",
       "Commanded line, fixes and the line fitted to them, on the floor and across the line."},
      {"limits", ReportPart::other,
-      "What accuracy the room and the camera allow over the floor, by one standard deviation.",
+      "Theoretical limit (CRLB) of the horizontal standard deviation over the floor.",
       "Map of the theoretical limit over the floor with the lamps."}}};
 
 /// Returns the text between <title> and </title>; empty if there is none.

@@ -61,7 +61,7 @@ Eigen::MatrixXd read_matrix(const YamlValue& value, std::size_t rows, std::size_
         list[row].numbers(cols).data(), static_cast<Eigen::Index>(cols));
   }
   if (matrix.cwiseAbs().maxCoeff() > kMaxDerivative) {
-    throw value.error("holds a derivative beyond 1e12: is the file damaged?");
+    throw value.error("contains a derivative beyond 1e12: is the file damaged?");
   }
   return matrix;
 }
@@ -205,11 +205,11 @@ Dispersion read_dispersion(YamlMap& map, std::size_t intrinsics) {
   dispersion.by_zenith = read_optional_matrix<Matrix2>(map, "jacobian_zenith", 2, 2);
   if (const auto value = map.optional("by_lamps")) {
     const auto items = value->list();
-    if (items.size() > kMaxUncertainLamps) throw value->error("holds more than 1,000 lamps");
+    if (items.size() > kMaxUncertainLamps) throw value->error("contains more than 1,000 lamps");
     for (const YamlValue& item : items) {
       const Dispersion::UncertainLamp lamp = item.read_map(read_uncertain_lamp);
       const auto has_same_id = [&](const auto& earlier) { return earlier.id == lamp.id; };
-      if (std::ranges::any_of(dispersion.by_lamps, has_same_id)) throw item.error("stands twice");
+      if (std::ranges::any_of(dispersion.by_lamps, has_same_id)) throw item.error("occurs twice");
       dispersion.by_lamps.push_back(lamp);
     }
   }
@@ -454,7 +454,7 @@ Calibration read_calibration(const std::filesystem::path& file) {
     const std::string& part = calibration.history.back().part;
     if ((part == "rotation_center" && !rotation_center) || (part == "dispersion" && !dispersion) ||
         (part == "adjustment" && !adjustment)) {
-      throw item.error("says that there is a part '" + part + "': is the file cut short?");
+      throw item.error("lists a part '" + part + "': is the file cut short?");
     }
   }
   return calibration;

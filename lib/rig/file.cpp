@@ -240,8 +240,8 @@ std::string read_text_file(const fs::path& path, std::size_t max_bytes) {
   }
   if (content.back() != '\n') {
     throw InputError(path, line_at(content.cend()), "",
-                     "the last line has no end: is the file cut short? "
-                     "If it is whole, end it with a newline");
+                     "the last line has no end: is the file cut short? If it is complete, end it "
+                     "with a newline");
   }
   return content;
 }

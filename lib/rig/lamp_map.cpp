@@ -30,13 +30,13 @@ Lamp read_lamp(YamlMap& map) {
   position.list()[2].number_within(-kMaxHeight_m, kMaxHeight_m, "m");
   lamp.shape = read_shape(map);
   lamp.frequency_hz = map.optional_number("frequency_hz", 50, 1e6, "Hz");
-  lamp.duty = map.optional_number("duty", 0.01, 0.99, "(a share of the period)");
+  lamp.duty = map.optional_number("duty", 0.01, 0.99, "(a fraction of the period)");
   lamp.sd_m = map.optional_number("sd_m", 0, kMaxSurveySd_m, "m");
   return lamp;
 }
 
 void UniqueLamps::check(const Lamp& lamp, const YamlValue& item) const {
-  if (ids_.contains(lamp.id)) throw item.error("id " + std::to_string(lamp.id) + " stands twice");
+  if (ids_.contains(lamp.id)) throw item.error("id " + std::to_string(lamp.id) + " occurs twice");
   const double x_m = lamp.position_m.x();
   const auto end = lamps_.upper_bound(x_m + kCoincident_m);
   for (auto near = lamps_.lower_bound(x_m - kCoincident_m); near != end; ++near) {
@@ -83,7 +83,7 @@ LampMapFile read_lamps_with_rooms(const std::filesystem::path& file, const std::
     const auto lamp_room = keys.optional("room");
     if (!room.empty() && !lamp_room) {
       throw item.error("has no key room, and lamps of room " + room +
-                       " are asked for: state the room of each lamp");
+                       " are selected: state the room of each lamp");
     }
     std::string room_name = lamp_room ? lamp_room->text() : "";
     const bool is_in_room = room.empty() || room_name == room;
@@ -91,7 +91,7 @@ LampMapFile read_lamps_with_rooms(const std::filesystem::path& file, const std::
     keys.finish();
     in_room.check(lamp, item);
     if (ids_of_other_rooms.contains(lamp.id)) {
-      throw item.error("id " + std::to_string(lamp.id) + " stands twice");
+      throw item.error("id " + std::to_string(lamp.id) + " occurs twice");
     }
     if (is_in_room) {
       in_room.add(lamp);
@@ -105,7 +105,7 @@ LampMapFile read_lamps_with_rooms(const std::filesystem::path& file, const std::
     throw InputError(
         file, "has no lamp with 'room: " + room + "': name another room, or correct the map");
   }
-  if (lamps.empty()) throw list.error("holds no lamp");
+  if (lamps.empty()) throw list.error("contains no lamp");
   return result;
 }
 

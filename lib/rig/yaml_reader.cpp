@@ -29,11 +29,11 @@ class TreeBuilder : public YAML::EventHandler {
   YamlNode take_root() { return std::move(root_); }
 
   void OnDocumentStart(const YAML::Mark& mark) override {
-    if (found_document_) refuse(mark, "a second YAML document begins; the file should hold one");
+    if (found_document_) refuse(mark, "a second YAML document begins; the file should contain one");
     found_document_ = true;
   }
   void OnAlias(const YAML::Mark& mark, YAML::anchor_t) override {
-    refuse(mark, "an alias (*) is not read here: write out what it stands for");
+    refuse(mark, "an alias (*) is not supported: write out the value");
   }
   void OnSequenceStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t,
                        YAML::EmitterStyle::value) override {
@@ -93,7 +93,7 @@ YamlNode build_tree(const std::filesystem::path& file, const std::string& text) 
     YAML::Parser parser(stream);
     while (parser.HandleNextDocument(tree)) {
     }
-    if (!tree.found_document()) throw InputError(file, "holds no YAML document");
+    if (!tree.found_document()) throw InputError(file, "contains no YAML document");
     return tree.take_root();
   } catch (const YAML::Exception& failure) {
     const bool tabs = text.find('\t') != std::string::npos;
@@ -133,7 +133,7 @@ YamlMap::YamlMap(const YamlPart& node, const std::filesystem::path* file, std::s
     const YamlNode &name = node->children[i], &value = node->children[i + 1];
     if (name.kind != YamlNode::Kind::scalar) throw error(name.line, "a key should be a word");
     if (!seen.insert(name.text).second) {
-      throw error(name.line, "key " + in_quotes(name.text) + " stands twice");
+      throw error(name.line, "key " + in_quotes(name.text) + " occurs twice");
     }
     entries_.push_back({name.text, name.line, YamlPart(node, &value)});
   }
@@ -181,7 +181,7 @@ YamlValue YamlMap::required(const std::string& key) {
   if (auto value = optional(key)) return *value;
   std::string names;
   for (const Entry& entry : entries_) names += (names.empty() ? "" : ", ") + entry.key;
-  throw error(line_, "key '" + key + "' is missing; there are: " + truncate_text(names, 150));
+  throw error(line_, "key '" + key + "' is missing; the keys are: " + truncate_text(names, 150));
 }
 
 void YamlMap::finish() const {
@@ -190,8 +190,7 @@ void YamlMap::finish() const {
     for (const std::string& name : known_) check_renamed(name);
     std::string names;
     for (const std::string& name : known_) names += (names.empty() ? "" : ", ") + name;
-    throw error(entry.line,
-                "key " + in_quotes(entry.key) + " is unknown here; the keys are: " + names);
+    throw error(entry.line, "key " + in_quotes(entry.key) + " is unknown; the keys are: " + names);
   }
 }
 

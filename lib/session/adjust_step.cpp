@@ -30,8 +30,8 @@ std::map<std::string, std::string> find_spots(const AdjustSet& set, const Adjust
       find_rotation_captures(set.frames, input.lamps, input.calibration.camera);
   std::map<std::string, std::string> spots;
   if (turn.status != RotationStatus::ok) {
-    result.warnings.push_back(
-        fmt::format("{} is taken for no turn on the spot: {}", set.name, describe(turn.status)));
+    result.warnings.push_back(fmt::format("{} is not treated as a rotation in place: {}", set.name,
+                                          describe(turn.status)));
     return spots;
   }
   for (const RotationCapture& capture : turn.captures) {
@@ -49,7 +49,7 @@ std::optional<KnownPlace> make_known_place(const Capture& capture, const AdjustS
     return std::nullopt;
   }
   if (!(*sd_m > 0)) {
-    throw InputError(set.name, "a position_sd_m of 0 is that of no measurement: state what it is");
+    throw InputError(set.name, "position_sd_m is 0; state the standard deviation of the position");
   }
   return KnownPlace{capture.place, {*capture.x_m, *capture.y_m}, capture.z_m, *sd_m};
 }
@@ -57,7 +57,7 @@ std::optional<KnownPlace> make_known_place(const Capture& capture, const AdjustS
 AdjustmentInput make_adjustment_input(const AdjustStepInput& input, AdjustStepResult& result) {
   if (input.calibration.adjustment) {
     throw InputError(input.calibration_file,
-                     "is adjusted already, and its captures would count twice: give the "
+                     "is adjusted already, and its captures would count twice; give the "
                      "calibration from before");
   }
   AdjustmentInput all{{}, input.lamps, input.calibration};
@@ -65,8 +65,7 @@ AdjustmentInput make_adjustment_input(const AdjustStepInput& input, AdjustStepRe
     auto& report = all.calibration.intrinsics_report;
     if (report && report->covariance) {
       throw InputError(input.calibration_file,
-                       "states the covariance of its lens: --lens-sd-px is for a lens that "
-                       "states none");
+                       "has a lens covariance already; leave --lens-sd-px out");
     }
     if (!report) report.emplace();
     report->covariance = make_lens_covariance(all.calibration.camera, *input.lens_sd_px);
@@ -74,10 +73,11 @@ AdjustmentInput make_adjustment_input(const AdjustStepInput& input, AdjustStepRe
   for (Lamp& lamp : all.lamps.lamps) {
     if (!lamp.sd_m) lamp.sd_m = input.map_sd_m;
     if (!lamp.sd_m) {
-      throw InputError(input.lamps_file,
-                       fmt::format("lamp {} has no sd_m, the standard deviation of the survey: "
-                                   "state it there, for all lamps or for one, or by --map-sd-m",
-                                   lamp.id));
+      throw InputError(
+          input.lamps_file,
+          fmt::format("lamp {} has no sd_m, the standard deviation of the survey; state it in the "
+                      "map, for all lamps or for one, or give --map-sd-m",
+                      lamp.id));
     }
   }
   for (const AdjustSet& set : input.sets) {
@@ -101,10 +101,10 @@ AdjustmentInput make_adjustment_input(const AdjustStepInput& input, AdjustStepRe
       all.captures.push_back(std::move(capture));
     }
     if (without_sd > 0) {
-      result.warnings.push_back(fmt::format(
-          "{}: the places of {} captures are left out: they have no position_sd_m; state "
-          "it, or give --position-sd-m",
-          set.name, without_sd));
+      result.warnings.push_back(
+          fmt::format("{}: the positions of {} captures are ignored, as they have no "
+                      "position_sd_m; state it, or give --position-sd-m",
+                      set.name, without_sd));
     }
   }
   return all;
@@ -124,23 +124,22 @@ void add_warnings(AdjustStepResult& result, const MapErrors& map_errors) {
   for (const auto& place : found.places) {
     if (!place.wrong) continue;
     result.warnings.push_back(fmt::format(
-        "{}: the place is {:.1f} mm from where the captures were taken, and is left "
-        "out{}",
-        place.name, 1e3 * place.residual_m.norm(),
+        "{}: the position has an error of {:.1f} mm and is ignored{}", place.name,
+        1e3 * place.residual_m.norm(),
         place.of == PlaceOf::camera
-            ? ": is it the camera's, and not that of the axis it turns about (reference_point: "
-              "axis)?"
+            ? ": is it that of the camera, and not of the rotation axis (reference_point: axis)?"
             : ""));
   }
   if (found.lens_contradicted) {
     result.warnings.push_back(
         fmt::format("the captures contradict the lens: its correction has a chi-squared of {:.0f}, "
-                    "{} is to be expected; is it this camera's, in focus as then?",
+                    "{} is expected; is it the lens of this camera, with the same focus?",
                     found.lens_chi_squared, found.lens_freedom));
   }
   if (found.noise_is_contradicted) {
     result.warnings.push_back(
-        fmt::format("the residuals are {:.2f} times what sigma_px lets expect, and count so",
+        fmt::format("the residuals are {:.2f} times those expected from sigma_px; standard "
+                    "deviations follow the residuals",
                     found.noise_scale));
   }
   for (const std::string& note : found.notes) result.notes.push_back(note);
@@ -154,7 +153,8 @@ void make_set_names_unique(std::vector<AdjustSet>& sets, const std::vector<std::
   for (const AdjustSet& set : sets) names.push_back(set.name);
   for (std::size_t i = 0; i < sets.size(); ++i) {
     if (std::count(paths.begin(), paths.end(), paths[i]) > 1) {
-      throw std::invalid_argument(paths[i] + " is named twice: its captures would count twice");
+      throw std::invalid_argument(paths[i] +
+                                  " is named twice: its captures would count twice; give it once");
     }
     if (std::count(names.begin(), names.end(), names[i]) > 1) sets[i].name = paths[i];
   }

@@ -73,12 +73,13 @@ std::string describe_check_outliers(const std::vector<CaptureError>& errors_m) {
   const double max_mm = kMmPerM * outliers.max, others_mm = kMmPerM * upper_median(outliers.others);
   if (outliers.captures.size() == 1) {
     return fmt::format(
-        "{} was not taken where its table says: it is {:.1f} mm off, others {:.2g} mm",
+        "{} was not taken at the position in its table: its error is {:.1f} mm, that of others "
+        "{:.2g} mm",
         outliers.captures.front().image, max_mm, others_mm);
   }
   return fmt::format(
-      "captures {} are off by up to {:.1f} mm, the others by {:.2g} mm: taken "
-      "elsewhere than their table says, or by another camera",
+      "captures {} have errors up to {:.1f} mm, the others {:.2g} mm: taken at other positions "
+      "than those in their table, or by another camera",
       join_images(outliers.captures), max_mm, others_mm);
 }
 
@@ -87,7 +88,7 @@ std::string describe_residual_outliers(const std::vector<CaptureError>& residual
   if (outliers.captures.size() < 2) return "";
   return fmt::format(
       "the lamps in captures {} do not fit lens and tilt of the others (residuals up to {:.2f} px, "
-      "typically {:.2g} px): of another camera, or with covered lamps; take them again",
+      "typically {:.2g} px): other camera, or covered lamps; repeat these captures",
       join_images(outliers.captures), outliers.max, upper_median(outliers.all));
 }
 

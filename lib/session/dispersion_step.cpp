@@ -94,11 +94,11 @@ void warn_of_lever_arm(DispersionResult& result, const KnownPlaces& places, cons
   if (arm_m.norm() < min_m ||
       (displacement_m + arm_m).norm() > max_relative_difference * arm_m.norm())
     return;
-  result.warnings.push_back(fmt::format(
-      "the offset is that of the lever arm, {:.1f} mm: the places are those of the axis, and fixes "
-      "would be {:.1f} mm wrong; say so: reference_point: axis in captures.csv, or --position-of "
-      "axis",
-      1e3 * arm_m.norm(), 1e3 * displacement_m.norm()));
+  result.warnings.push_back(
+      fmt::format("the offset equals the lever arm, {:.1f} mm: the positions are those of the "
+                  "axis, and fixes would have an error of {:.1f} mm; state reference_point: axis "
+                  "in captures.csv, or --position-of axis",
+                  1e3 * arm_m.norm(), 1e3 * displacement_m.norm()));
 }
 
 /// Function that returns the captures with their places; places of an axis depend on the
@@ -143,8 +143,8 @@ void propagate_uncertainty(DispersionResult& result, const CapturesFor& captures
   }
   if (is_propagated) return;
   result.warnings.emplace_back(
-      "how the errors of lens and zenith move the offset cannot be told, and sd of fixes will lack "
-      "part of them: vlp-adjust states them");
+      "the effect of lens and zenith errors on the offset cannot be determined, and sd of fixes "
+      "will lack part of it; use vlp-adjust");
 }
 
 /// Adds the covariance of the lever arm, without its part that depends on the zenith, to that of
@@ -170,8 +170,8 @@ void warn_of_few_captures(DispersionResult& result, DispersionMethod method) {
     return;
   }
   result.warnings.emplace_back(
-      "three captures hardly show their noise, and the standard deviation of the offset may be "
-      "wrong several times over: add captures, or state sigma_px");
+      "three captures barely determine their noise, and the standard deviation of the offset may "
+      "be wrong by a factor of several: add captures, or state sigma_px");
 }
 
 }  // namespace
@@ -189,8 +189,8 @@ DispersionResult solve_dispersion(const LampCaptures& input, const KnownPlaces& 
   const auto& center = input.calibration.rotation_center;
   if (of_axis && !(center && center->lever_arm_m)) {
     result.fail(StepFailure::undetermined,
-                "the places are of the axis, and the calibration knows no lever arm from it to the "
-                "camera: vlp-rotation finds it from captures at two heights");
+                "the positions are those of the axis, and the calibration has no lever arm; run "
+                "vlp-rotation with captures at two heights");
     return result;
   }
   const CapturesFor captures_for = [&](const Calibration& calibration) {
@@ -232,7 +232,7 @@ DispersionResult solve_dispersion(const LampCaptures& input, const KnownPlaces& 
   }
   propagate_uncertainty(result, captures_for, input, method, circle);
   result.calibration = with_dispersion(input.calibration, fit.dispersion, std::move(entry));
-  result.drawing = [fit] { return make_drawing(make_plot("Fixes at a known station", fit)); };
+  result.drawing = [fit] { return make_drawing(make_plot("Fixes at a reference point", fit)); };
   return result;
 }
 

@@ -19,7 +19,8 @@ void add_drive(Report& report, const Drive& drive) {
   const auto& [fixes, commanded_m] = drive;
   const auto fit = fit_line(fixes.rows, commanded_m);
   if (!fit) {
-    throw InputError(fixes.file, "no line can be fitted to its fixes: they have no direction");
+    throw InputError(fixes.file,
+                     "no line can be fitted to its fixes: they do not determine a direction");
   }
   const std::string name = fixes.file.filename().string();
   const auto metrics = make_report_statistics(name, *fit);
@@ -31,10 +32,11 @@ void add_warnings(EvaluateResult& result, const EvaluationInput& input) {
   const Evaluation& evaluation = result.evaluation;
   if (input.limit && !evaluation.limit) {
     result.warnings.emplace_back(
-        "no theoretical limit: the truth has no z_m and yaw_rad, or sees no two lamps");
+        "no theoretical limit: the ground truth has no z_m and yaw_rad, or two lamps are visible "
+        "from none of its positions");
   }
   if (input.line_m && !evaluation.fit) {
-    result.warnings.emplace_back("no line is fitted: the fixes are spread in no direction");
+    result.warnings.emplace_back("no line is fitted: the fixes do not determine a direction");
   }
   if (std::string warning = make_limit_warning(evaluation); !warning.empty()) {
     result.warnings.push_back(std::move(warning));
@@ -62,8 +64,8 @@ EvaluateResult evaluate_fixes(const EvaluationInput& input, const std::vector<Ga
         *std::max_element(evaluation.missing.begin(), evaluation.missing.end(),
                           [](const auto& a, const auto& b) { return a.second < b.second; });
     result.fail(StepFailure::undetermined,
-                fmt::format("not one of {} captures has a fix ({} of them: {})",
-                            evaluation.captures, count, status),
+                fmt::format("none of {} captures has a fix ({} of them: {})", evaluation.captures,
+                            count, status),
                 input.fixes.file);
     return result;
   }

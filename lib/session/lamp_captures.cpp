@@ -43,8 +43,8 @@ std::vector<KnownMotion> find_motions(std::span<const Frame> frames, const Captu
 void check_row_time(const Camera& camera) {
   if (camera.row_time_s && camera.readout) return;
   throw std::invalid_argument(
-      "a camera that moves needs row_time_s and readout in its calibration: vlp-intrinsics takes "
-      "--row-time-s and --readout, and programs that read captures --readout");
+      "a moving camera needs row_time_s and readout in its calibration; give --row-time-s and "
+      "--readout to vlp-intrinsics, or --readout to programs that read captures");
 }
 
 }  // namespace vlp

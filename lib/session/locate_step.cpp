@@ -196,9 +196,8 @@ bool warn_of_noise(LocateResult& result, const std::vector<Frame>& frames, doubl
   }
   if (!estimated_px || *estimated_px <= max_noise_ratio * stated_px) return false;
   result.warnings.push_back(fmt::format(
-      "the residuals show {:.2g} px of noise, {:.2g} px are stated: {}; are calibration and lamp "
-      "map "
-      "right and complete?",
+      "the residuals correspond to {:.2g} px of noise, {:.2g} px are stated: {}; are calibration "
+      "and lamp map right and complete?",
       *estimated_px, stated_px, factor > 1 ? "sd follows the residuals" : "sd is too small"));
   return true;
 }
@@ -255,10 +254,10 @@ void warn_of_motion(LocateResult& result, const LocateInput& input, bool is_nois
       sum_squared_residuals(fixes).degrees_of_freedom < min_degrees_of_freedom) {
     return;
   }
-  result.warnings.push_back(fmt::format(
-      "the images fit a camera that moves, at {:.2g} m/s: state velocities in captures.csv, or "
-      "--max-speed-m-per-s",
-      *speed_m_per_s));
+  result.warnings.push_back(
+      fmt::format("the images fit a moving camera, at {:.2g} m/s: state velocities in "
+                  "captures.csv, or --max-speed-m-per-s",
+                  *speed_m_per_s));
 }
 
 /// Scales the given noise of all detections and removes the detections that `fixes` reject.
@@ -323,10 +322,10 @@ bool locate_with_noise(const LocateInput& input, LocateResult& result) {
       how.unstated_sigma_px =
           std::clamp(how.unstated_sigma_px * *unstated_factor, kMinSigma_px, kMaxSigma_px);
       result.notes.push_back(fmt::format(
-          "sigma_px is not stated: {:.3g} px taken from the residuals", how.unstated_sigma_px));
+          "sigma_px is not stated: {:.3g} px estimated from the residuals", how.unstated_sigma_px));
     } else {
       result.warnings.emplace_back(
-          "sigma_px is not stated and no residuals show it: sd columns are empty");
+          "sigma_px is neither stated nor determined by residuals: sd columns are empty");
     }
   }
   if (factor > 1 || (is_known && !unstated.empty())) {
@@ -339,9 +338,10 @@ void warn_of_image(LocateResult& result, const LocateInput& input) {
   const auto& [width, height] = input.calibration.camera.imager_px;
   const std::size_t outside = count_far_outside(input.frames, {width, height});
   if (outside == 0) return;
-  result.warnings.push_back(fmt::format(
-      "{} detections far outside the camera's {} x {} px: is the calibration this camera's?",
-      outside, width, height));
+  result.warnings.push_back(
+      fmt::format("{} detections are far outside the {} x {} px of the camera: is it the "
+                  "calibration of this camera?",
+                  outside, width, height));
 }
 
 /// Marks the fixes that use lamps outside the calibrated region of the image, where the board was
@@ -364,16 +364,16 @@ void mark_outside_region(LocateResult& result, const LocateInput& input) {
     }
     if (lamps_outside.empty()) continue;
     ++outside;
-    result.details.push_back(fmt::format("{}: {} of {} lamps are where the lens is not known",
-                                         input.frames[i].image, lamps_outside.size(),
-                                         detections.size()));
+    result.details.push_back(
+        fmt::format("{}: {} of {} lamps are outside the valid region of the lens",
+                    input.frames[i].image, lamps_outside.size(), detections.size()));
   }
   if (outside == 0) return;
-  result.warnings.push_back(fmt::format(
-      "{} of {} fixes rest on lamps where no board was seen (valid_region_px of the calibration; "
-      "outside_region of the fixes says which): the lens may be wrong there; add views of the "
-      "board there",
-      outside, fixes));
+  result.warnings.push_back(
+      fmt::format("{} of {} fixes use lamps outside the valid region of the lens (valid_region_px "
+                  "of the calibration; outside_region of the fixes lists them), where it may be "
+                  "wrong; add views of the board there",
+                  outside, fixes));
 }
 
 void warn_of_captures(LocateResult& result, const LocateInput& input) {
@@ -383,8 +383,8 @@ void warn_of_captures(LocateResult& result, const LocateInput& input) {
       [&](const Frame& frame) { return captures.find(frame.image) == captures.end(); });
   if (captures.empty() || without == 0) return;
   result.warnings.push_back(fmt::format(
-      "{} of {} images are not in captures.csv: image names have to be equal (here '{}', "
-      "there '{}')",
+      "{} of {} images are not in captures.csv: image names have to be equal ('{}' in the images, "
+      "'{}' in the table)",
       without, input.frames.size(), input.frames.front().image, captures.begin()->first));
 }
 
@@ -420,7 +420,7 @@ void warn_of_rejected_lamps(LocateResult& result, const LocateInput& input,
   for (const auto& [id, count] : captures) result.rejected_lamps.push_back({id, count});
   if (unknown > 0) {
     result.warnings.push_back(
-        fmt::format("{} detections of lamps that are not in the map, left out", unknown));
+        fmt::format("{} detections of lamps not in the map, rejected", unknown));
   }
   for (const MapError& error : map_errors.errors) {
     result.warnings.push_back(describe(error));
@@ -431,11 +431,11 @@ void warn_of_rejected_lamps(LocateResult& result, const LocateInput& input,
   }
   if (rejected > 0) {
     result.warnings.push_back(
-        fmt::format("{} detections that contradict the others, left out", rejected));
+        fmt::format("{} detections that contradict the others, rejected", rejected));
   }
   for (const auto& [id, count] : captures) {
     result.warnings.push_back(
-        fmt::format("lamp {} is left out of {} of {} captures", id, count, input.frames.size()));
+        fmt::format("lamp {} is rejected in {} of {} captures", id, count, input.frames.size()));
   }
 }
 
@@ -467,8 +467,7 @@ LocateResult locate_frames(const LocateInput& input) {
     result.lamp_offsets = std::move(map_errors.offsets);
     if (input.frames.size() > 1 && result.lamp_offsets.empty()) {
       result.notes.push_back(
-          "where the other lamps see each lamp is not told: captures do not tie all lamps "
-          "together");
+          "relative lamp positions are not checked: captures do not tie all lamps together");
     }
   }
   result.summary = summarize(result.rows);

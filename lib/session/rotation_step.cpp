@@ -68,8 +68,8 @@ void propagate_lens_errors(
     return;
   }
   result.warnings.emplace_back(
-      "how the lens' errors move the zenith cannot be told, and sd of fixes will lack them: "
-      "vlp-adjust states them");
+      "the effect of lens errors on the zenith cannot be determined, and sd of fixes will lack it; "
+      "use vlp-adjust");
 }
 
 /// Returns true if two sets of captures have the same sightings in the same order.
@@ -100,16 +100,16 @@ void propagate_lens_errors(RotationResult& result, const LampCaptures& input,
 void add_warnings(RotationResult& result) {
   const auto& heights = result.spot.heights;
   if (!result.fit.center.lever_arm_m && heights.size() == 1) {
-    result.warnings.push_back(fmt::format(
-        "at one height, under lamps that hang much alike, a lever arm cannot be told from a tilt; "
-        "it is taken as zero, and fixes at z = {} m will be of the axis of rotation: add captures "
-        "at a second height",
-        format_height_m(heights.front().z_m)));
+    result.warnings.push_back(
+        fmt::format("at one height, under lamps of similar heights, lever arm and tilt cannot be "
+                    "separated; the lever arm is assumed to be zero, and fixes at z = {} m will be "
+                    "those of the rotation axis: add captures at a second height",
+                    format_height_m(heights.front().z_m)));
   } else if (!result.fit.center.lever_arm_m) {
-    result.warnings.push_back(fmt::format(
-        "this method takes the lever arm as zero, and the center is a mean over {} heights: axis "
-        "estimates both",
-        heights.size()));
+    result.warnings.push_back(
+        fmt::format("this method assumes a lever arm of zero, and the center is a mean over {} "
+                    "heights: use --method axis, which estimates both",
+                    heights.size()));
   }
   if (!result.fit.center.covariance) {
     result.warnings.emplace_back(
@@ -119,10 +119,10 @@ void add_warnings(RotationResult& result) {
   constexpr double max_noise_ratio = 3;
   const auto& median_sigma_px = result.spot.median_sigma_px;
   if (median_sigma_px && result.fit.residual_px > max_noise_ratio * *median_sigma_px) {
-    result.warnings.push_back(fmt::format(
-        "the residuals show {:.2g} px of noise, {:.2g} px are stated: is the lens calibrated, the "
-        "camera beside its axis, the method exact?",
-        result.fit.residual_px, *median_sigma_px));
+    result.warnings.push_back(
+        fmt::format("the residuals correspond to {:.2g} px of noise, {:.2g} px are stated: is the "
+                    "lens calibrated, the camera off the axis, the method exact?",
+                    result.fit.residual_px, *median_sigma_px));
   }
 }
 
@@ -226,12 +226,10 @@ RotationResult solve_rotation(const LampCaptures& input, RotationMethod method,
     const bool is_noise = method == RotationMethod::circle && result.circles.undetermined > 0;
     result.fail(
         StepFailure::undetermined,
-        is_noise
-            ? "the noise of the captures determines most circles, as captures at two yaws do: add "
-              "captures at other yaws, twelve over a full turn are good, or take --method joint"
-            : "no rotation center fits the captures: take them on one spot at each height, over "
-              "more of the turn, with more of the lamps in view, and see that lens and lamp map "
-              "are right");
+        is_noise ? "noise determines most circles, as with captures at two yaws: add captures at "
+                   "other yaws, preferably twelve over a full turn, or use --method joint"
+                 : "no rotation center fits the captures: take them at one position per height, "
+                   "over more of the turn, with more visible lamps, and check lens and lamp map");
     explain_failure_by_map(input, extract_camera(input.calibration), result);
     return result;
   }
@@ -280,10 +278,10 @@ LevelingResult solve_leveling(const LampCaptures& input, bool refine_map, Histor
   result.metrics = {{"tilt_deg", deg_from_rad(compute_tilt(leveling.center).angle_rad)}};
   constexpr double max_noise_scale = 3;
   if (leveling.noise_scale > max_noise_scale) {
-    result.warnings.push_back(fmt::format(
-        "the residuals are {:.1f} times what sigma_px lets expect: lamp map or lens are a little "
-        "wrong, and the tilt, too, may be wrong by more than its sd{}",
-        leveling.noise_scale, refine_map ? "" : "; --refine-map may help"));
+    result.warnings.push_back(
+        fmt::format("the residuals are {:.1f} times those expected from sigma_px: lamp map or lens "
+                    "is slightly wrong, and the error of the tilt may exceed its sd{}",
+                    leveling.noise_scale, refine_map ? "" : "; --refine-map may help"));
   }
   result.calibration = with_rotation_center(input.calibration, leveling.center, std::move(entry));
   return result;

@@ -107,8 +107,8 @@ std::string find_row_time_error(const std::vector<Observation>& images, const La
 /// Adds a contradiction of the row time of `camera` to the result of a step: in place of the reason
 /// if the step failed, as a warning otherwise, because fixes at rest are valid. The contradiction
 /// is that of check_row_time() if there is a result. Otherwise, and if identified lamps agree
-/// because each was taken for its neighbor, it is that of find_row_time_error(). Does nothing if
-/// the row time is unknown.
+/// because each was taken for its neighbor, it is that of find_row_time_error(). An unknown
+/// row time adds nothing.
 ///
 /// @param source  name of the file or of the option that gives the row time
 void explain_by_row_time(const std::vector<Observation>& images, const LampMap& lamps,

@@ -120,7 +120,7 @@ class SessionRun {
     for (const std::string& name : options_.redo) {
       if (std::ranges::find(names, name) != names.end()) continue;
       throw std::invalid_argument(
-          fmt::format("there is no step {} here; the steps are: {}", name, fmt::join(names, ", ")));
+          fmt::format("no step {}; the steps are: {}", name, fmt::join(names, ", ")));
     }
   }
 
@@ -416,8 +416,8 @@ class SessionRun {
           collect_known_places(captures.frames, read_captures_with_truth(folder));
       if (places.captures.empty()) {
         throw InputError(folder,
-                         "nothing tells where its captures were taken: captures.csv should, with "
-                         "x_m and y_m, and the names of the images");
+                         "its captures have no positions; add x_m and y_m to captures.csv, with "
+                         "the names of the images");
       }
       DispersionResult found =
           solve_dispersion(captures, places, DispersionMethod::camera, DispersionCircle::mean,
@@ -426,8 +426,8 @@ class SessionRun {
       add(remarks, found);
       if (places.without > 0) {
         found.warnings.push_back(
-            fmt::format("{} of {} captures left out: nothing tells their place", places.without,
-                        captures.frames.size()));
+            fmt::format("{} of {} captures ignored: they have no position; add it to captures.csv",
+                        places.without, captures.frames.size()));
       }
       return Work{found, [this, found] {
                     write_picture(found, "dispersion.svg");
@@ -456,7 +456,8 @@ class SessionRun {
       results_.remove_step("row-time");
       if (is_redo_requested("row-time")) {
         throw std::invalid_argument(
-            "there is no step row-time here: the row time is known, or there is a classifier");
+            "there is no step row-time in this session, as the row time is known or there is a "
+            "classifier; leave it out of --redo");
       }
     } else if (!find_row_time(camera)) {
       return false;
@@ -484,7 +485,7 @@ class SessionRun {
       if (report && report->views > 0) work.result.metrics = {{"rms_px", report->rms_px}};
       if (!unused.empty()) {
         work.result.warnings.push_back(
-            "camera.yaml says what the camera is: not used is what was stated of its " + unused);
+            "camera.yaml takes precedence over options of the camera; ignored: " + unused);
       }
       return work;
     });
@@ -553,8 +554,9 @@ class SessionRun {
       if (truth) return evaluate_check(*truth, inputs, gates);
       Work skipped_work;
       skipped_work.result.notes.emplace_back(
-          check ? "no errors and no report: check has no truth.csv, and no places in captures.csv"
-                : "no errors and no report: there is no check");
+          check
+              ? "no errors and no report: check has neither truth.csv nor positions in captures.csv"
+              : "no errors and no report: there is no check");
       return skipped_work;
     });
   }
@@ -654,7 +656,7 @@ SessionResult run_session(const fs::path& session, const fs::path& results,
   if (!options.gates_file.empty()) read_gates(options.gates_file, session_metrics());
   if (!fs::is_directory(session)) throw InputError(session, "is not a folder of captures");
   if (is_captures_folder(session, results)) {
-    throw InputError(results, "holds captures: results go to a folder of their own");
+    throw InputError(results, "contains captures: choose another folder for the results");
   }
   SessionResults session_results(results, session);
   std::optional<SessionFolder> folder;

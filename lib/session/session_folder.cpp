@@ -100,7 +100,7 @@ bool is_captures_folder(const fs::path& session, const fs::path& results) {
 std::array<Eigen::Vector2d, 2> find_drive_ends(const fs::path& truth,
                                                const std::vector<TruthRow>& places) {
   const std::array<Eigen::Vector2d, 2> ends_m{places.front().xy_m, places.back().xy_m};
-  if (ends_m[0] == ends_m[1]) throw InputError(truth, "the drive ends where it begins");
+  if (ends_m[0] == ends_m[1]) throw InputError(truth, "start and end of the drive are equal");
   return ends_m;
 }
 

@@ -52,8 +52,7 @@ void check_owner(const fs::path& results, const fs::path& session) {
   constexpr std::size_t max_bytes = 1 << 16;
   if (fs::exists(mark)) {
     if (read_text_file(mark, max_bytes) == mark_text(session)) return;
-    throw InputError(results,
-                     "holds the results of another session; give this one a folder of its own");
+    throw InputError(results, "contains the results of another session; choose another folder");
   }
   std::vector<const char*> foreign_names(kResults.begin(), kResults.end());
   foreign_names.insert(foreign_names.end(), {"lamps.yaml", "board.yaml", "boards", "rotation"});

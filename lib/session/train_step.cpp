@@ -25,7 +25,7 @@ bool has_examples(std::span<const LabeledLight> lights, const LampMap& lamps,
     const auto lamp = counts.find(light.lamp);
     if (lamp == counts.end()) {
       throw std::invalid_argument(fmt::format(
-          "the labels name lamp {}, which is not in the lamp map: correct one of the two",
+          "the labels contain lamp {}, which is not in the lamp map: correct one of them",
           light.lamp));
     }
     ++lamp->second;
@@ -41,7 +41,7 @@ bool has_examples(std::span<const LabeledLight> lights, const LampMap& lamps,
                             "wholly in view, {} or more of each",
                             few, kMinExamples));
   } else if (counts.size() < 2) {
-    result.fail(StepFailure::undetermined, "one lamp: there is nothing to tell apart; add lamps");
+    result.fail(StepFailure::undetermined, "a classifier needs two lamps or more; add lamps");
   }
   return result.ok();
 }
@@ -55,8 +55,8 @@ bool has_kept_examples(const LampClassifier& classifier, TrainStepResult& result
   }
   if (few.empty()) return true;
   result.fail(StepFailure::undetermined,
-              fmt::format("the lights of lamps {} have too little in common: are their labels "
-                          "right? Add captures that show them clearly",
+              fmt::format("the lights of lamps {} differ too much: are their labels right? Add "
+                          "captures that show them clearly",
                           few));
   return false;
 }
@@ -65,10 +65,10 @@ void warn_of_inseparable(const LampClassifier& classifier, TrainStepResult& resu
   constexpr std::size_t max_lines = 10;
   const auto pairs = find_inseparable_lamps(classifier);
   for (std::size_t i = 0; i < std::min(pairs.size(), max_lines); ++i) {
-    result.warnings.push_back(fmt::format(
-        "lamps {} and {} look alike ({:.1f} standard deviations apart) and may be left unknown: "
-        "change a frequency or a duty",
-        pairs[i].first, pairs[i].second, pairs[i].distance));
+    result.warnings.push_back(
+        fmt::format("lamps {} and {} look alike ({:.1f} standard deviations apart) and may remain "
+                    "unidentified: change a frequency or a duty",
+                    pairs[i].first, pairs[i].second, pairs[i].distance));
   }
   if (pairs.size() > max_lines) {
     result.warnings.push_back(

@@ -38,7 +38,7 @@ void check_spot(const Eigen::Vector2d& spot_m, const Room& room, double lever_ar
   const Eigen::Array2d spot = spot_m.array();
   const bool inside = (spot - lever_arm_m >= room.min_m.head<2>().array()).all() &&
                       (spot + lever_arm_m <= room.max_m.head<2>().array()).all();
-  if (!inside) throw value.error("takes the camera outside the room");
+  if (!inside) throw value.error("moves the camera outside the room");
 }
 
 Eigen::Vector2d read_spot(const YamlValue& value, const Room& room, double lever_arm_m) {
@@ -102,7 +102,7 @@ void read_places(YamlMap& map, const Scene& scene, const Room& room, LampShots& 
     for (const YamlValue& spot : spots->list()) {
       captures.spots_m.push_back(read_spot(spot, room, lever_arm_m));
     }
-    if (captures.spots_m.empty()) throw spots->error("holds no spot");
+    if (captures.spots_m.empty()) throw spots->error("contains no spot");
   } else if (grid) {
     captures.spots_m = read_grid(*grid, room, lever_arm_m);
   } else {
@@ -117,11 +117,11 @@ void read_heights(const YamlValue& list, const Scene& scene, const Room& room,
     const double height_m = item.number_within(-200, 200, "m");
     check_height(item, height_m, scene);
     if (height_m < room.min_m.z() || height_m > room.max_m.z()) {
-      throw item.error("takes the camera outside the room");
+      throw item.error("moves the camera outside the room");
     }
     captures.heights_m.push_back(height_m);
   }
-  if (captures.heights_m.empty()) throw list.error("holds no height");
+  if (captures.heights_m.empty()) throw list.error("contains no height");
 }
 
 void read_yaws(YamlMap& map, LampShots& captures) {
@@ -134,7 +134,7 @@ void read_yaws(YamlMap& map, LampShots& captures) {
     for (const YamlValue& yaw : yaws->list()) {
       captures.yaws_rad.push_back(rad_from_deg(yaw.number_within(-360, 360, "degrees")));
     }
-    if (captures.yaws_rad.empty()) throw yaws->error("holds no yaw");
+    if (captures.yaws_rad.empty()) throw yaws->error("contains no yaw");
     return;
   }
   YamlMap keys = turn->map();

@@ -94,7 +94,7 @@ void read_profile(YamlMap& map, Glow& glow) {
         map.required("rim_to_center_ratio").number_within(0, 2, "(of the radiance at the center)");
     glow.chips = map.optional_map("chips", [&](YamlMap& keys) { return read_chips(keys, glow); });
     if (const auto chips = map.optional("random_chips")) {
-      if (glow.chips) throw chips->error("stands beside chips: a disc has one of them");
+      if (glow.chips) throw chips->error("excludes chips: a disc has one of them; leave one out");
       glow.random_chips = chips->read_map(read_random_chips);
     }
   }

@@ -219,10 +219,10 @@ Scene read_scene(const std::filesystem::path& file) {
     scene.sets.push_back(
         item.read_map([&](YamlMap& map) { return read_capture_set(map, scene, room); }));
     if (!folders.insert(scene.sets.back().folder).second) {
-      throw item.error("folder '" + scene.sets.back().folder + "' stands twice");
+      throw item.error("folder '" + scene.sets.back().folder + "' occurs twice");
     }
   }
-  if (scene.sets.empty()) throw captures.error("holds no captures");
+  if (scene.sets.empty()) throw captures.error("contains no captures");
   draw_random_parts(scene);
   return scene;
 }

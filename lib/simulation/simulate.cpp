@@ -143,9 +143,9 @@ void claim_output_folder(const fs::path& output, const std::string& provenance) 
   if (fs::exists(mark)) {
     constexpr std::size_t max_bytes = 2 << 20;
     if (read_text_file(mark, max_bytes) == provenance) return;
-    throw InputError(output,
-                     "holds captures of another scene, seed or version: choose another folder or "
-                     "remove it");
+    throw InputError(
+        output,
+        "contains captures of another scene, seed or version: choose another folder or remove it");
   }
   make_folder(output);
   // An execution killed here may have left its temporary scene.yaml.
@@ -154,7 +154,7 @@ void claim_output_folder(const fs::path& output, const std::string& provenance) 
   };
   if (std::any_of(fs::directory_iterator(output), fs::directory_iterator(), foreign)) {
     throw InputError(output,
-                     "is not empty and holds no captures of this scene: choose another folder");
+                     "is not empty and contains no captures of this scene: choose another folder");
   }
   write_file(mark, provenance);
 }

@@ -89,7 +89,8 @@ class Files {
 Calibration read_shutter(const YamlValue& value, Files& files) {
   Calibration calibration = read_calibration(files(value));
   if (!calibration.camera.row_time_s || !calibration.camera.readout) {
-    throw value.error("its camera should have row_time_s and readout: lamps are told by them");
+    throw value.error(
+        "its camera should have row_time_s and readout, which are needed to identify lamps");
   }
   return calibration;
 }
@@ -114,7 +115,8 @@ void read_guard_bands(YamlMap map, std::vector<Gate>& gates) {
         CheckedMetric{gate.metric, "", {}, gate.limit, kind.direction, gate.guard}
             .acceptance_limit();
     if (accepted >= 0 && accepted <= kind.largest) continue;
-    throw value->error("leaves nothing within the gate: k times this is more than there is");
+    throw value->error(
+        "leaves no value within the gate: k times this uncertainty exceeds the limit; lower k");
   }
   uncertainties.finish();  // uncertainties of metrics without a gate
   if (found == 0) throw stated.error("names no gate");
@@ -128,7 +130,7 @@ GoldenUnit read_golden(YamlMap map, Files& files) {
   const YamlValue calibration = map.required("calibration");
   golden.calibration = read_shutter(calibration, files);
   if (!golden.calibration.rotation_center) {
-    throw calibration.error("should be of a whole calibration: it has no rotation_center");
+    throw calibration.error("should be a complete calibration: it has no rotation_center");
   }
   golden.gates = read_gates(map.required("gates"), unit_metrics());
   map.finish();
@@ -203,7 +205,7 @@ std::string pattern_problem(const std::string& serial, const std::string& patter
   try {
     if (std::regex_match(begin, end, std::regex(pattern))) return "";
   } catch (const std::length_error&) {
-    return "serial_pattern: takes too long to be compared with '" + serial +
+    return "serial_pattern: the comparison is too slow for '" + serial +
            "': write it without a repetition in a repetition, such as (a+)+";
   }
   return "'" + serial + "' is not of the form " + pattern;
@@ -320,8 +322,8 @@ StationConfig read_station(const fs::path& file) {
   document.finish();
   const auto& lamps = config.lamps.lamps;
   if (std::none_of(lamps.begin(), lamps.end(), [](const Lamp& l) { return l.frequency_hz; })) {
-    throw InputError(file,
-                     "no lamp of the map has a frequency_hz: none could be told from another");
+    throw InputError(
+        file, "no lamp of the map has a frequency_hz, which is needed to identify lamps; add it");
   }
   config.inputs = files.names();
   config.sha256 = files.sha256();

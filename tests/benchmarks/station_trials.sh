@@ -179,11 +179,11 @@ kinds() {
   scene_of $((seed + 3000)) 514.8 525.2 5 0.7
   scene_change 's/tilt_deg: [0-9.]*$/tilt_deg: 4/'
   render
-  tried leaning "$seed" 'the camera leans on its mount'
+  tried leaning "$seed" 'the camera is tilted on its mount'
   scene_of $((seed + 2000)) 514.8 525.2 5 0.7
   scene_change 's/lever_arm_m: .*/lever_arm_m: [0.03, 0.01]/'
   render
-  tried beside "$seed" 'the camera sits beside its axis'
+  tried beside "$seed" 'the camera is off its axis'
 
   # The good unit with errors of the station and of the operator.
   scene_of "$seed" 514.8 525.2 5 0.7
@@ -206,7 +206,7 @@ kinds() {
   scene_of $((seed + 5000)) 514.8 525.2 5 0.7
   scene_change 's/warp_m: .*/warp_m: [0.01, -0.0002]/'
   render --only boards
-  tried bent-board "$seed" 'the board is bent'
+  tried bent-board "$seed" 'the board is warped'
   unit_again
   picture 'image = 12 * image' boards
   tried bright-boards "$seed" 'overexposed'
@@ -230,12 +230,12 @@ kinds() {
   station_again
   unit_again
   station_change lamps.yaml 's/frequency_hz: 2500/frequency_hz: 2780/'
-  tried lamp-of-other-frequency "$seed" 'lamp 3 is never seen'
+  tried lamp-of-other-frequency "$seed" 'lamp 3 is never visible'
   station_again
   scene_of $((seed + 4000)) 514.8 525.2 5 0.7
   scene_change '/id: 4,/s/electron_rate_e_per_s: 2.0e+8/electron_rate_e_per_s: 1.0e+5/'
   render
-  tried unlit-lamp "$seed" 'lamp 4 is never seen'
+  tried unlit-lamp "$seed" 'lamp 4 is never visible'
   scene_of "$seed" 514.8 525.2 5 0.7
   scene_change 's/ambient_e_per_s: .*/ambient_e_per_s: 1.0e+10/'
   render --only rotation
@@ -267,16 +267,16 @@ kinds() {
     [ ! -e "$work/unit/check/$table.csv" ] || awk -F, -v OFS=, \
       '/^0003.png/ { $3 += 0.02 } { print }' "$work/good/check/$table.csv" >"$work/unit/check/$table.csv"
   done
-  tried one-point "$seed" '0003.png was not taken where its table says'
+  tried one-point "$seed" '0003.png was not taken at the position in its table'
   unit_again
   for table in captures truth; do
     [ ! -e "$work/unit/dispersion/$table.csv" ] || awk -F, -v OFS=, \
       '/^0.*png/ { $3 += 0.02 } { print }' "$work/good/dispersion/$table.csv" >"$work/unit/dispersion/$table.csv"
   done
-  tried station-moved "$seed" 'the station or its lamp map is off'
+  tried station-moved "$seed" 'the reference point or the lamp map is wrong'
   unit_again
   rm -f "$work/unit/check/captures.csv" "$work/unit/check/truth.csv"
-  tried no-table "$seed" 'check: nothing tells where'
+  tried no-table "$seed" 'check: captures have no position'
 
   # The images.
   unit_again
@@ -297,7 +297,7 @@ kinds() {
   render --only rotation,dispersion,check
   cp -r "$work/good/boards" "$work/unit/"
   find "$work/unit/boards" -name '*.png' -exec sh -c 'for f; do echo y >>"$f"; done' sh {} +
-  tried swapped-units "$seed" 'the lamps are seen through another lens than the boards'
+  tried swapped-units "$seed" 'lamps and boards are imaged by different lenses'
   # The capture tool writes four views repeatedly.
   unit_again
   (cd "$work/unit/boards" && for image in 00[0-3]?.png; do
@@ -306,7 +306,7 @@ kinds() {
   tried double-images "$seed" 'the same image again'
   unit_again
   rm -f "$work"/unit/boards/00[123]?.png
-  tried few-boards "$seed" 'boards: not enough images'
+  tried few-boards "$seed" 'boards: too few images'
 }
 
 # mixed SEED: a good unit with three images of another camera in one step, for each step; expects
@@ -406,11 +406,11 @@ sharpness() {
   uniform y 120 480
   for strength in 0.05 0.1 0.25; do
     optics_of "$seed" "veil: $strength"
-    tried "veil-$strength" "$seed" 'a veil lies over the image'
+    tried "veil-$strength" "$seed" 'veiling glare'
   done
   for strength in 0.1 0.2 0.4; do
     optics_of "$seed" "smears: [{at_px: [$x, $y], radius_px: 150, fraction: $strength, sigma_px: 8}]"
-    tried "smear-$strength" "$seed" 'a smear is on the lens'
+    tried "smear-$strength" "$seed" 'the lens is smeared'
   done
   for strength in 0.1 0.2 0.4; do
     optics_of "$seed" "dust: [{at_px: [$x, $y], radius_px: 50, depth: $strength}]"

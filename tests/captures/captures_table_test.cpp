@@ -77,13 +77,13 @@ TEST(ReadCaptures, RejectsContradictions) {
     return rejection_message([&] { read_captures(folder.file("c.csv", content)); });
   };
   EXPECT_THAT(refusal("z_m\n1\n"), HasSubstr("c.csv:1: image: this column is missing"));
-  EXPECT_THAT(refusal("image\na\na\n"), HasSubstr("c.csv:3: image: 'a' stands twice"));
+  EXPECT_THAT(refusal("image\na\na\n"), HasSubstr("c.csv:3: image: 'a' occurs twice"));
   EXPECT_THAT(refusal("image,roll_rad\na,0.1\n"), HasSubstr("without the other"));
   EXPECT_THAT(refusal("image,vx_m_per_s\na,0.1\n"),
               HasSubstr("c.csv:2: image: has one of vx_m_per_s and vy_m_per_s without the other"));
   EXPECT_THAT(refusal("image,vx_m_per_s,vy_m_per_s,velocity_sd_m_per_s\na,1,1,-1\n"),
               HasSubstr("c.csv:2: velocity_sd_m_per_s: should not be negative"));
-  EXPECT_THAT(refusal("image,velocity_sd_m_per_s\na,1\n"), HasSubstr("is of no velocity"));
+  EXPECT_THAT(refusal("image,velocity_sd_m_per_s\na,1\n"), HasSubstr("has no velocity"));
   EXPECT_THAT(refusal("image,z_m\na,high\n"), HasSubstr("c.csv:2: z_m: should be a finite number"));
   EXPECT_THAT(refusal("image,z_m\n,1\n"), HasSubstr("c.csv:2: image: is empty"));
   EXPECT_THAT(refusal("image,reference_point\na,robot\n"), HasSubstr("should be camera or axis"));

@@ -67,9 +67,9 @@ TEST_F(CsvTableTest, CountsLinesInQuotedFields) {
 }
 
 TEST_F(CsvTableTest, RejectsInvalidCsv) {
-  EXPECT_THAT(refusal("a,b\n1,\"2\n3,4\n"), HasSubstr("a.csv:2: a quote opens"));
-  EXPECT_THAT(refusal("a,b\n1,x\"y\"\n"), HasSubstr("a.csv:2: a quote stands where none may"));
-  EXPECT_THAT(refusal("a,a\n1,2\n"), HasSubstr("a.csv:1: a: this column stands twice"));
+  EXPECT_THAT(refusal("a,b\n1,\"2\n3,4\n"), HasSubstr("a.csv:2: a quote is not closed"));
+  EXPECT_THAT(refusal("a,b\n1,x\"y\"\n"), HasSubstr("a.csv:2: a quote is not allowed here"));
+  EXPECT_THAT(refusal("a,a\n1,2\n"), HasSubstr("a.csv:1: a: this column occurs twice"));
   EXPECT_THAT(refusal(std::string("a,b\n1,\0\n", 8)), HasSubstr("a.csv:2: is not a text file"));
   EXPECT_THAT(refusal(""), HasSubstr("a.csv: is empty"));
 }
@@ -129,7 +129,7 @@ TEST_F(CsvTableTest, ReportsDuplicateColumnAmongMany) {
   }
   EXPECT_EQ(read(header + "\n" + row + "\n").rows(), 1);
   EXPECT_THAT(refusal(header + ",twice\n" + row + ",0\n"),
-              HasSubstr("a.csv:1: twice: this column stands twice"));
+              HasSubstr("a.csv:1: twice: this column occurs twice"));
   const CsvTable table = read(header + "\n" + row + "\n");
   EXPECT_LT(rejection_message([&] { (void)table.required("u_px"); }).size(), 1000);
 }

@@ -71,8 +71,8 @@ TEST_F(ReadDetections, ReportsFileLineAndColumn) {
               HasSubstr("d.csv:2: sigma_px: should be within 0.0001 and 1000 px"));
   EXPECT_THAT(refusal(header + ",1,2,3,1\n"), HasSubstr("d.csv:2: image: is empty"));
   EXPECT_THAT(refusal(header + "a,1,2,3,1\nb,1,2,3,1\na,1,5,6,1\n"),
-              HasSubstr("d.csv:4: lamp: 1 stands twice in image 'a'"));
-  EXPECT_THAT(refusal(header), HasSubstr("d.csv: holds no detection"));
+              HasSubstr("d.csv:4: lamp: 1 occurs twice in image 'a'"));
+  EXPECT_THAT(refusal(header), HasSubstr("d.csv: contains no detection"));
 }
 
 }  // namespace

@@ -88,7 +88,7 @@ TEST(ReadFixes, ReportsLineOfInvalidRow) {
   using testing::HasSubstr;
   EXPECT_EQ(refusal("a,ok,0,0,0,0,,,,\nb,bad,x,,,,,,,\n"), "");
   EXPECT_THAT(refusal("a,ok,0,0,0,0,,,,\na,bad,,,,,,,,\n"),
-              HasSubstr("fixes.csv:3: image: 'a' stands twice"));
+              HasSubstr("fixes.csv:3: image: 'a' occurs twice"));
   EXPECT_THAT(refusal("a,ok,0,NaN,0,0,,,,\n"), HasSubstr("fixes.csv:2: y_m"));
   EXPECT_EQ(refusal("a,ok,-1e6,1e6,0,0,,,,\n"), "");
   EXPECT_THAT(refusal("a,ok,0,0,0,0,,,,\nb,ok,0,-1e308,0,0,,,,\n"),
@@ -98,7 +98,7 @@ TEST(ReadFixes, ReportsLineOfInvalidRow) {
   EXPECT_THAT(refusal("a,ok,0,0,0,0,1,1,1,-1\n"), HasSubstr("fixes.csv:2: yaw_sd_rad"));
   EXPECT_THAT(refusal("a,,0,0,0,0,,,,\n"), HasSubstr("fixes.csv:2: status: is empty"));
   EXPECT_THAT(refusal("a,ok,0,0\n"), HasSubstr("fixes.csv:2: has 4 fields"));
-  EXPECT_THAT(refusal(""), HasSubstr("fixes.csv: holds no fix"));
+  EXPECT_THAT(refusal(""), HasSubstr("fixes.csv: contains no fix"));
 }
 
 TEST(ReadFixes, NamesThePresentColumns) {

@@ -31,14 +31,14 @@ TEST(ReadTruth, ReportsLineOfInvalidRow) {
     return rejection_message(
         [&] { read_truth(folder.file("t.csv", "image,x_m,y_m,z_m\n" + rows)); });
   };
-  EXPECT_THAT(refusal("a,0,0,\na,1,1,\n"), HasSubstr("t.csv:3: image: 'a' stands twice"));
+  EXPECT_THAT(refusal("a,0,0,\na,1,1,\n"), HasSubstr("t.csv:3: image: 'a' occurs twice"));
   EXPECT_THAT(refusal("a,0,0,\n,1,1,\n"), HasSubstr("t.csv:3: image: is empty"));
   EXPECT_THAT(refusal("a,inf,0,\n"), HasSubstr("t.csv:2: x_m"));
   EXPECT_THAT(refusal("a,1e308,0,\n"), HasSubstr("t.csv:2: x_m: should be within 1,000 km"));
   EXPECT_THAT(refusal("a,0,-1e7,\n"), HasSubstr("t.csv:2: y_m"));
   EXPECT_THAT(refusal("a,0,0,1e7\n"), HasSubstr("t.csv:2: z_m"));
   EXPECT_THAT(refusal("a,,0,\n"), HasSubstr("t.csv:2: x_m"));
-  EXPECT_THAT(refusal(""), HasSubstr("t.csv: holds no place"));
+  EXPECT_THAT(refusal(""), HasSubstr("t.csv: contains no position"));
 }
 
 TEST(ReadPath, ReadsOptionalHeights) {
@@ -55,7 +55,7 @@ TEST(ReadPath, RejectsPathWithoutLength) {
   const TemporaryFolder folder;
   for (const char* text : {"x_m,y_m\n", "x_m,y_m\n1,2\n", "x_m,y_m\n1,2\n1,2\n"}) {
     EXPECT_THAT(rejection_message([&] { read_path(folder.file("p.csv", text)); }),
-                HasSubstr("two waypoints or more at different places"));
+                HasSubstr("two or more waypoints at different positions"));
   }
   EXPECT_THAT(rejection_message([&] { read_path(folder.file("p.csv", "x_m,y_m\n1,nan\n1,2\n")); }),
               HasSubstr("p.csv:2: y_m"));

@@ -66,7 +66,7 @@ diff - <("$scratch/rooms" <"$pixels") <<'EOF'
 6 lamps, the first is 3
 6 lamps, the first is 13
 rooms.yaml: has no lamp with 'room: attic': name another room, or correct the map
-rooms.yaml: lamps 1 and 11 share a frequency in two rooms: choose a room by the argument room of vlp_open_room(); the map has: hall, office
+rooms.yaml: lamps 1 and 11 share a frequency in two rooms: choose a room with the argument room of vlp_open_room(); the map has: hall, office
 EOF
 sed -n '/^```c++$/,/^```$/{/^```/!p}' "$source_dir/lib/README.md" >"$scratch/ros_node.cpp"
 # shellcheck disable=SC2086 # several words each

@@ -56,7 +56,7 @@ TEST(CheckGates, IncludesLimitInBothDirections) {
   EXPECT_FALSE(coverage[0].passed());
   EXPECT_EQ(describe(coverage[0]), "coverage is 0.69, at least 0.7 is asked for");
   EXPECT_EQ(describe_failure(coverage[0]),
-            "the board was not shown all over the image (" + describe(coverage[0]) + ")");
+            "the board views do not cover the image (" + describe(coverage[0]) + ")");
   EXPECT_TRUE(check_gates({{"coverage", 0.7}}, {{"coverage", 0.7}})[0].passed());
 }
 
@@ -166,9 +166,9 @@ TEST(ParseGate, RejectsUnreachableLimits) {
     }
   };
   EXPECT_EQ(words("missing_fraction=50"),
-            "gate 'missing_fraction' should be a share from 0 to 1, not 50: for 50 % say 0.5");
+            "gate 'missing_fraction' should be a fraction from 0 to 1, not 50: for 50 % say 0.5");
   EXPECT_EQ(words("coverage=7"),
-            "gate 'coverage' should be a share from 0 to 1, not 7: for 7 % say 0.07");
+            "gate 'coverage' should be a fraction from 0 to 1, not 7: for 7 % say 0.07");
   EXPECT_EQ(words("yaw_rms_deg=200"), "gate 'yaw_rms_deg' should be at most 180 deg, not 200");
   EXPECT_THAT(words("mean_mm=-1"), HasSubstr("gate 'mean_mm' should not be negative"));
   EXPECT_EQ(words("missing=0"), "gate 'missing' is now called 'missing_fraction'");
@@ -181,7 +181,7 @@ TEST(ParseGate, RejectsUnreachableLimits) {
         [&] { read_gates(folder.file("g.yaml", "format: vlp-gates/1\ngates:\n" + text), known); });
   };
   EXPECT_THAT(refusal("  mean_mm: 1\n  missing_fraction: 1.5\n"),
-              HasSubstr("g.yaml:4: gates.missing_fraction: should be a share from 0 to 1"));
+              HasSubstr("g.yaml:4: gates.missing_fraction: should be a fraction from 0 to 1"));
   EXPECT_THAT(refusal("  mean_mm: 1\n  missing: 0\n"),
               HasSubstr("g.yaml:4: gates: key 'missing' is now called 'missing_fraction'"));
   EXPECT_THAT(refusal("  yaw_rms_deg: -0.5\n"),
@@ -227,7 +227,7 @@ TEST(ReadGates, ReadsFileAndRejectsInvalidOnes) {
               HasSubstr("g.yaml:4: gates: key 'mean_cm'"));
   EXPECT_THAT(refusal("gates:\n  mean_cm: 1\n"), HasSubstr("p90_mm"));
   EXPECT_THAT(refusal("gates: {mean_mm: much}\n"), HasSubstr("g.yaml:2: gates.mean_mm"));
-  EXPECT_THAT(refusal("gates: {}\n"), HasSubstr("holds no gate"));
+  EXPECT_THAT(refusal("gates: {}\n"), HasSubstr("contains no gate"));
 }
 
 TEST(EvaluationJson, HasUnitsInKeys) {

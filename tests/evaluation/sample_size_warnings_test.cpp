@@ -32,7 +32,7 @@ TEST(MissingFixesWarning, WarnsIfNoGateLimitsMissingFixes) {
                                  {{"mean_mm", 1}, {"missing_fraction", 0.9}});
   const CheckedMetric &mean = gates[0], &missing = gates[1];
   EXPECT_EQ(make_missing_fixes_warning(evaluation(50), {mean}),
-            "393 of 432 captures have no fix, and no gate 'missing_fraction' asks");
+            "393 of 432 captures have no fix, and there is no gate 'missing_fraction'");
   EXPECT_EQ(make_missing_fixes_warning(evaluation(50), {mean, missing}), "");
   EXPECT_EQ(make_missing_fixes_warning(evaluation(50), {}), "");
   Evaluation all = evaluation(50);
@@ -62,8 +62,8 @@ TEST(LimitWarning, WarnsIfErrorsAreBelowCrlb) {
   EXPECT_EQ(make_limit_warning(limited), "");
   limited.limit = CrlbRatio{0.609, 1e-3, 36, 1.0 / 12};
   EXPECT_THAT(make_limit_warning(limited),
-              AllOf(HasSubstr("0.609 times the theoretical limit: either the noise of a lamp's "
-                              "pixel is stated too large, or the fixes use more than one image"),
+              AllOf(HasSubstr("0.609 times the theoretical limit: either the stated pixel noise is "
+                              "too large, or the fixes use more information than one image"),
                     Not(HasSubstr("nothing beats"))));
   limited.limit->horizontal = 0.9;
   EXPECT_EQ(make_limit_warning(limited), "");
@@ -75,7 +75,7 @@ TEST(SampleSizeWarnings, CountsUnitsOfPairs) {
   compared.comparison->clusters = 8;
   EXPECT_THAT(make_sample_size_warnings(compared),
               ElementsAre("of so few as 8 stations with a fix in both files a comparison is no "
-                          "evidence, which takes 20"));
+                          "evidence, which needs 20"));
   compared.comparison->clusters = 49;
   EXPECT_THAT(make_sample_size_warnings(compared),
               ElementsAre(HasSubstr("49 stations with a fix in both")));

@@ -210,7 +210,7 @@ TEST_F(BoardIntakeOfFolder, ReportsFailureIfNoImageShowsBoard) {
   ASSERT_TRUE(seen.failure);
   EXPECT_TRUE(seen.failure->is_wrong_file);
   EXPECT_EQ(seen.failure->file, "board.yaml");
-  EXPECT_THAT(seen.failure->message, HasSubstr("with other ids than the board has"));
+  EXPECT_THAT(seen.failure->message, HasSubstr("with other ids than those of the board"));
 }
 
 TEST_F(BoardIntakeOfFolder, ReturnsCachedDetection) {

@@ -120,7 +120,7 @@ TEST(ReadImage, RejectsOtherFormatsBeforeDecoding) {
       read_image(folder.file("a.png", content));
       ADD_FAILURE() << "is read";
     } catch (const InputError& error) {
-      EXPECT_THAT(error.what(), HasSubstr("is no PNG, JPEG, BMP, TIFF, PBM, PGM or PPM"));
+      EXPECT_THAT(error.what(), HasSubstr("it is not PNG, JPEG, BMP, TIFF, PBM, PGM or PPM"));
     }
   }
 }

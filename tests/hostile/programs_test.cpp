@@ -224,7 +224,7 @@ INSTANTIATE_TEST_SUITE_P(
               "a.avi: is a pipe or a device, not a file", 2, 300},
         Trial{"PipeAsImage", "mkdir images; mkfifo images/a.png",
               "vlp-detect images --lamps lamps.yaml --calibration calibration.yaml -o d.csv -q", 2,
-              "images: holds no image", 2, 300},
+              "images: contains no image", 2, 300},
         Trial{"EndlessCamera", "true", "vlp-convert /dev/zero -o out", 2,
               "is a pipe or a device, not a file", 2, 100},
         Trial{"SparseCamera", "truncate -s 3G camera.yaml", "vlp-convert camera.yaml -o out", 2,
@@ -239,7 +239,7 @@ INSTANTIATE_TEST_SUITE_P(
         Trial{"ImagerOfTwoBillionPixels", make_camera("2147483647", "a"),
               "vlp-convert camera.yaml --to ros -o out", 2, "the image should be 1 to 1048576 px"},
         Trial{"CameraNameWithEscapes", make_camera("800", "\\\"\\\\\\\\e[2J\\\""),
-              "vlp-convert camera.yaml --to ros -o out", 2, "holds control characters"},
+              "vlp-convert camera.yaml --to ros -o out", 2, "contains control characters"},
         Trial{"CameraNameWithQuotes", make_camera("800", "it\\47\\47s"),
               "vlp-convert camera.yaml --to ros -o out -q && vlp-convert out -o back -q", 0, "", 5,
               300, "grep -q \"id: .it..s\" back"},
@@ -349,7 +349,7 @@ TEST(DetectPrograms, RejectUnsupportedImageFormats) {
           "vlp-intrinsics images --board board.yaml --row-time-s 3e-5 --readout rows -o c.yaml"}) {
       const Ending ending_of = run_in(folder, command);
       EXPECT_THAT(ending_of.exit_code, testing::AnyOf(2, 3)) << command << ending;
-      EXPECT_THAT(ending_of.errors, HasSubstr("is no PNG, JPEG, BMP, TIFF, PBM, PGM or PPM"))
+      EXPECT_THAT(ending_of.errors, HasSubstr("it is not PNG, JPEG, BMP, TIFF, PBM, PGM or PPM"))
           << command << ending;
     }
   }

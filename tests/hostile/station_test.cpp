@@ -161,7 +161,7 @@ const std::vector<StationTrial> kFolderTrials{
        s.write("captures/0001/.run", "../../../x\n");
        return s.empty_run();
      },
-     2, "captures/0001/.run: holds no name of a run: remove it", expect_empty_records},
+     2, "captures/0001/.run: contains no id of a run: remove it", expect_empty_records},
     {"StateIsALink",
      [](const HostileStation& s) {
        s.link("captures/0001/.run", s.mine);
@@ -314,7 +314,7 @@ const std::vector<StationTrial> kFolderTrials{
                     name + ", gates: {check_mean_mm: 20}}");
        return s.vlp_station("clean --delete");
      },
-     0, "has something that station.yaml names: left",
+     0, "contains a file that station.yaml names: left",
      [](const HostileStation& s, const ProgramResult& result) {
        EXPECT_THAT(result.output, HasSubstr("1 folders, 0.0 MB deleted")) << "its images";
        EXPECT_EQ(s.vlp_station("list").exit_code, 0);
@@ -395,7 +395,7 @@ const std::vector<StationTrial> kTextTrials{
        return run_program("vlp-convert " + (s.home / "calibration.yaml").string() +
                           " --to ros -o " + (s.home / "ros.yaml").string());
      },
-     2, "the camera's name holds control characters",
+     2, "the camera id contains control characters",
      [](const HostileStation& s, const ProgramResult& result) {
        EXPECT_THAT(result.output + result.errors, Not(HasSubstr("\nFORGED")));
        EXPECT_FALSE(fs::exists(s.home / "ros.yaml"));
@@ -433,7 +433,7 @@ const std::vector<StationTrial> kTextTrials{
                 "records: records.db\nserial_pattern: '(a+)+b'");
        return s.empty_run("", std::string(60, 'a'));
      },
-     2, "serial_pattern: takes too long to be compared with"},
+     2, "serial_pattern: the comparison is too slow for"},
     {"RecordsAreTheExport",
      [](const HostileStation& s) {
        s.change("station.yaml", "records: records.db", "records: rec.csv");
@@ -441,21 +441,21 @@ const std::vector<StationTrial> kTextTrials{
        return run_program("vlp-station export --records " + (s.home / "rec.csv").string() + " -o " +
                           (s.home / "rec.csv").string());
      },
-     2, "rec.csv: is an input, too, and would be overwritten", expect_run_goes_on},
+     2, "rec.csv: is also an input and would be overwritten", expect_run_goes_on},
     {"RecordsOfTheStationAreTheExport",
      [](const HostileStation& s) {
        s.change("station.yaml", "records: records.db", "records: rec.json");
        s.empty_run();
        return s.vlp_station("export", "-o " + (s.home / "rec.json").string());
      },
-     2, "rec.json: is an input, too, and would be overwritten", expect_run_goes_on},
+     2, "rec.json: is also an input and would be overwritten", expect_run_goes_on},
     {"RecordsAreThePictureOfATrend",
      [](const HostileStation& s) {
        s.change("station.yaml", "records: records.db", "records: rec.svg");
        s.empty_run();
        return s.vlp_station("trend rms_px", "-o " + (s.home / "rec.svg").string());
      },
-     2, "rec.svg: is an input, too, and would be overwritten", expect_run_goes_on},
+     2, "rec.svg: is also an input and would be overwritten", expect_run_goes_on},
     {"RecordsInAFolderWithAQuote",
      [](const HostileStation& s) {
        const fs::path quoted = s.home / "a\" db=b.db x=\"";

@@ -233,10 +233,10 @@ TEST(VlpOpenRoom, IdentifiesLampsOfTheChosenRoom) {
   for (const char* no_room : {static_cast<const char*>(nullptr), ""}) {
     EXPECT_EQ(detect_in(no_room, count), VLP_BAD_FILE);
     EXPECT_EQ(count, 0U);
-    EXPECT_THAT(vlp_last_error(),
-                HasSubstr("lamps.yaml: lamps 1 and 11 share a frequency in two "
-                          "rooms: choose a room by the argument room of vlp_open_room(); "
-                          "the map has: hall, office"));
+    EXPECT_THAT(
+        vlp_last_error(),
+        HasSubstr("lamps.yaml: lamps 1 and 11 share a frequency in two rooms: choose a room with "
+                  "the argument room of vlp_open_room(); the map has: hall, office"));
   }
   vlp_positioner* none = nullptr;
   EXPECT_EQ(vlp_open_room(lamps.c_str(), "attic", camera.c_str(), nullptr, &none), VLP_BAD_FILE);

@@ -71,7 +71,8 @@ TEST_F(VlpAdjust, RefinesMapOfOneRoom) {
   folder.file("rooms.yaml", lamps + "  - {room: office, id: 901, position_m: [9, 9, 1.6]}\n");
   const ProgramResult result = adjust_with_map("rooms.yaml", refined() + " --room hall");
   ASSERT_EQ(result.exit_code, 0) << result.errors;
-  EXPECT_THAT(result.output, HasSubstr("has the lamps of room hall alone: use it without --room"));
+  EXPECT_THAT(result.output,
+              HasSubstr("contains the lamps of room hall only: use it without --room"));
   EXPECT_EQ(read_lamp_map(folder / "refined.yaml").lamps.size(), rig.map.lamps.size());
 }
 
@@ -134,13 +135,13 @@ TEST_F(VlpAdjust, AcceptsContinuousRotation) {
   EXPECT_LT((found.zenith_in_camera - body.calibration.rotation_center->zenith_in_camera).norm(),
             5e-4);
   EXPECT_LT((*found.lever_arm_m - Eigen::Vector2d(0.009, 0)).norm(), 5e-4);
-  EXPECT_THAT(result.errors, testing::Not(HasSubstr("times what sigma_px lets expect")));
+  EXPECT_THAT(result.errors, testing::Not(HasSubstr("times those expected from sigma_px")));
   captures = standing;
-  EXPECT_THAT(adjust("--map-sd-m 0.0001").errors, HasSubstr("times what sigma_px lets expect"));
+  EXPECT_THAT(adjust("--map-sd-m 0.0001").errors, HasSubstr("times those expected from sigma_px"));
   rig.calibration.camera.row_time_s.reset();
   const auto refused = adjust("--map-sd-m 0.0001 --max-speed-m-per-s 1");
   EXPECT_EQ(refused.exit_code, 2);
-  EXPECT_THAT(refused.errors, HasSubstr("a camera that moves needs row_time_s and readout"));
+  EXPECT_THAT(refused.errors, HasSubstr("a moving camera needs row_time_s and readout"));
 }
 
 TEST_F(VlpAdjust, RejectsLampWithoutStandardDeviation) {
@@ -154,7 +155,7 @@ TEST_F(VlpAdjust, EstimatesLensWithoutCovariance) {
   const std::vector<double> truth = rig.calibration.camera.intrinsics;
   rig.calibration.camera.intrinsics[0] *= 0.97;
   EXPECT_THAT(adjust("--map-sd-m 0.001").output,
-              HasSubstr("taken as exact: the calibration has no"));
+              HasSubstr("treated as exact: the calibration has no"));
   const ProgramResult result = adjust("--map-sd-m 0.001 --lens-sd-px 10");
   ASSERT_EQ(result.exit_code, 0) << result.errors;
   EXPECT_THAT(result.output, HasSubstr("lens        corrected"));
@@ -166,7 +167,7 @@ TEST_F(VlpAdjust, RejectsLensSdForLensWithCovariance) {
   rig.calibration.intrinsics_report->covariance = make_lens_covariance(rig.calibration.camera, 1);
   const ProgramResult result = adjust("--map-sd-m 0.001 --lens-sd-px 10");
   EXPECT_EQ(result.exit_code, 2);
-  EXPECT_THAT(result.errors, HasSubstr("camera.yaml: states the covariance of its lens"));
+  EXPECT_THAT(result.errors, HasSubstr("camera.yaml: has a lens covariance already"));
 }
 
 TEST_F(VlpAdjust, WarnsOfMovedLamp) {

@@ -265,11 +265,13 @@ TEST_F(VlpCalibrateSmallSession, FollowsChangesOfSessionFolder) {
   fs::copy(folder / "a session/true_calibration.yaml", folder / "a session/camera.yaml");
   const auto known = calibrate();
   ASSERT_EQ(known.exit_code, 0) << known.errors;
-  EXPECT_THAT(known.errors, HasSubstr("camera.yaml says what the camera is: not used is what was "
-                                      "stated of its row time, read-out"));
+  EXPECT_THAT(
+      known.errors,
+      HasSubstr(
+          "camera.yaml takes precedence over options of the camera; ignored: row time, read-out"));
   EXPECT_THAT(calibrate("--camera-id other --lens LENSMODEL_OPENCV5").errors,
               HasSubstr("stated of its name, lens model"));
-  EXPECT_THAT(calibrate("").errors, Not(HasSubstr("camera.yaml says")));
+  EXPECT_THAT(calibrate("").errors, Not(HasSubstr("camera.yaml takes precedence")));
   EXPECT_THAT(result("calibration.yaml"), HasSubstr("id: \"archive\""));
   EXPECT_FALSE(fs::exists(folder / "results/lens.yaml"));
   fs::remove(folder / "a session/camera.yaml");
@@ -288,7 +290,7 @@ TEST_F(VlpCalibrateSmallSession, FollowsChangesOfSessionFolder) {
   folder.file("a session/line-x/truth.csv", "image,x_m,y_m\n0000.png,0,0\n");
   const auto bad_line = calibrate();
   EXPECT_EQ(bad_line.exit_code, 2);
-  EXPECT_THAT(bad_line.errors, HasSubstr("line-x/truth.csv: the drive ends where it begins"));
+  EXPECT_THAT(bad_line.errors, HasSubstr("line-x/truth.csv: start and end of the drive are equal"));
   EXPECT_EQ(result("calibration.yaml"), calibration);
   EXPECT_FALSE(fs::exists(folder / "results/report.html"));
 }
@@ -433,10 +435,11 @@ TEST_F(VlpCalibrateSmallSession, RunsStepNamedByRedo) {
   EXPECT_EQ(result("session.json"), session) << "whatever was as before";
   const auto unknown = calibrate("--redo checks");
   EXPECT_EQ(unknown.exit_code, 2);
-  EXPECT_THAT(unknown.errors, HasSubstr("there is no step checks here; the steps are: lens, "));
+  EXPECT_THAT(unknown.errors, HasSubstr("no step checks; the steps are: lens, "));
   const auto known = calibrate("--row-time-s 3e-5 --readout rows --redo row-time");
   EXPECT_EQ(known.exit_code, 2);
-  EXPECT_THAT(known.errors, HasSubstr("there is no step row-time here: the row time is known"));
+  EXPECT_THAT(known.errors,
+              HasSubstr("there is no step row-time in this session, as the row time is known"));
 }
 
 TEST_F(VlpCalibrateSmallSession, ResumesAfterKill) {
@@ -499,7 +502,7 @@ TEST_F(VlpCalibrateSmallSession, ReportsDamagedImages) {
   fs::resize_file(folder / "a session/check/0001.png", 100);
   const auto run = calibrate("--no-report --row-time-s 3e-5 --readout rows");
   EXPECT_EQ(run.exit_code, 0) << run.errors;
-  EXPECT_THAT(run.errors, HasSubstr("0003.png: cannot be read as an image: is no PNG"));
+  EXPECT_THAT(run.errors, HasSubstr("0003.png: cannot be read as an image: it is not PNG"));
   const auto json = nlohmann::json::parse(result("session.json"));
   std::map<std::string, std::string> skipped;
   for (const auto& step : json["steps"]) {
@@ -539,12 +542,12 @@ TEST_F(VlpCalibrateSmallSession, RejectsResultsOfAnotherSession) {
   const auto other = run_program("vlp-calibrate '" + path("another") + "' -o '" + path("results") +
                                  "' --row-time-s 3e-5 --readout rows");
   EXPECT_EQ(other.exit_code, 2);
-  EXPECT_THAT(other.errors, HasSubstr("holds the results of another session"));
+  EXPECT_THAT(other.errors, HasSubstr("contains the results of another session"));
   EXPECT_EQ(std::count(other.errors.begin(), other.errors.end(), '\n'), 1);
   const auto inside =
       run_program("vlp-calibrate '" + path("another") + "' -o '" + path("another/check") + "'");
   EXPECT_EQ(inside.exit_code, 2);
-  EXPECT_THAT(inside.errors, HasSubstr("holds captures: results go to a folder of their own"));
+  EXPECT_THAT(inside.errors, HasSubstr("contains captures: choose another folder for the results"));
 }
 
 TEST_F(VlpCalibrate, NamesMissingInput) {

@@ -124,7 +124,7 @@ TEST_F(VlpConvert, RejectsUnsupportedLensModel) {
   const auto result =
       run_program("vlp-convert " + path("camera.yaml") + " --to kalibr -o " + path("out"));
   EXPECT_EQ(result.exit_code, 2) << result.output;
-  EXPECT_THAT(result.errors, HasSubstr("take --lens LENSMODEL_OPENCV4 or OPENCV_FISHEYE"));
+  EXPECT_THAT(result.errors, HasSubstr("use --lens LENSMODEL_OPENCV4 or OPENCV_FISHEYE"));
   EXPECT_FALSE(std::filesystem::exists(path("out")));
 }
 

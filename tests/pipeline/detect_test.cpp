@@ -134,7 +134,7 @@ TEST_F(VlpDetect, WritesAnnotatedImages) {
   }
   const auto refused = detect(kRig + "/sample", "--annotate " + kRig + "/sample");
   EXPECT_EQ(refused.exit_code, 2);
-  EXPECT_THAT(refused.errors, HasSubstr("holds the images"));
+  EXPECT_THAT(refused.errors, HasSubstr("contains the images"));
 }
 
 TEST_F(VlpDetect, ReportsClassAndReasonOfEachLight) {
@@ -158,8 +158,8 @@ TEST_F(VlpDetect, ReportsClassAndReasonOfEachLight) {
   EXPECT_EQ(kinds["steady"], 2U) << "the steady lamp and the window";
   EXPECT_EQ(kinds["unknown"], 1U) << "the reflection of lamp 5";
   EXPECT_THAT(found.output,
-              HasSubstr("1         unknown, reflection: it is softer than the lamps"));
-  EXPECT_THAT(found.errors, HasSubstr(") lamp 5: its stripes are that lamp's; radius 28.6 px"));
+              HasSubstr("1         unknown, reflection: it is more blurred than the lamps"));
+  EXPECT_THAT(found.errors, HasSubstr(") lamp 5: its stripes match this lamp; radius 28.6 px"));
 }
 
 TEST_F(VlpDetect, WritesLightsWithoutLamp) {
@@ -184,8 +184,8 @@ TEST_F(VlpDetect, DoesNotOverwriteOtherFilesWithLights) {
   };
   refused(folder / "found.csv", "--output and --lights name one file");
   refused(folder / "." / "found.csv", "--output and --lights name one file");
-  refused(kRig + "/lamps.yaml", "lamps.yaml: is an input, too");
-  refused(kRig + "/sample/0000.png", "0000.png: is an input, too");
+  refused(kRig + "/lamps.yaml", "lamps.yaml: is also an input");
+  refused(kRig + "/sample/0000.png", "0000.png: is also an input");
   refused(folder / "none" / "lights.csv", "lights.csv");
 }
 
@@ -261,7 +261,8 @@ TEST_F(VlpDetect, SkipsAndCountsUnusableImages) {
   EXPECT_THAT(result.errors, HasSubstr("cut.jpg: cannot be read as an image: it is cut short"));
   EXPECT_THAT(result.errors, HasSubstr("half.PNG: cannot be read as an image: it is cut short"));
   EXPECT_THAT(result.errors, testing::Not(HasSubstr("libpng")));
-  EXPECT_THAT(result.errors, HasSubstr("text.png: cannot be read as an image: is no PNG, JPEG"));
+  EXPECT_THAT(result.errors,
+              HasSubstr("text.png: cannot be read as an image: it is not PNG, JPEG"));
   EXPECT_THAT(result.errors, HasSubstr("the camera's images are 800 x 600 px; skipped"));
   EXPECT_EQ(CsvTable(folder / "found.csv").rows(), 12);
 }
@@ -276,7 +277,7 @@ TEST_F(VlpDetect, ReportsErrorInOneLineIfNoLampIsFound) {
   };
   refused((folder / "none").string(), 2, "none: is not a folder of images");
   fs::create_directory(folder / "bare");
-  refused((folder / "bare").string(), 2, "bare: holds no image");
+  refused((folder / "bare").string(), 2, "bare: contains no image");
   refused(kRig + "/sample-boards", 3, "no lamp was identified wholly in view in 1 images");
 }
 
@@ -296,7 +297,7 @@ TEST_F(VlpDetect, DoesNotOverwriteItsImages) {
                                   "/lamps.yaml --calibration " + kRig +
                                   "/true_calibration.yaml -o " + (images / "0001.png").string());
   EXPECT_EQ(result.exit_code, 2);
-  EXPECT_THAT(result.errors, HasSubstr("0001.png: is an input, too"));
+  EXPECT_THAT(result.errors, HasSubstr("0001.png: is also an input"));
 }
 
 TEST_F(VlpDetect, FailsWhenNoImageIsUsable) {

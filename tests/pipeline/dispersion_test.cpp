@@ -96,7 +96,7 @@ TEST_F(VlpDispersion, ReadsPlacesFromCapturesCsv) {
 TEST_F(VlpDispersion, RequiresSeveralYawsOrMethodPaper) {
   const auto refused = dispersion(turn(6, 0), "--reference-point 0.1 -0.05");
   EXPECT_EQ(refused.exit_code, 3);
-  EXPECT_THAT(refused.errors, HasSubstr("turn the camera at the station"));
+  EXPECT_THAT(refused.errors, HasSubstr("turn the camera at the reference point"));
   EXPECT_FALSE(std::filesystem::exists(folder / "calibration.yaml"));
   for (const std::string circle : {"", " --circle enclosing"}) {
     const auto paper =
@@ -111,7 +111,7 @@ TEST_F(VlpDispersion, RequiresSeveralYawsOrMethodPaper) {
 TEST_F(VlpDispersion, ReportsCauseOfFailure) {
   const auto far = dispersion(turn(6, 6.28), "--reference-point 100 -50");
   EXPECT_EQ(far.exit_code, 2);
-  EXPECT_THAT(far.errors, HasSubstr("in the frame of the lamp map?"));
+  EXPECT_THAT(far.errors, HasSubstr("in the frame of the lamp map, and"));
   const auto one = dispersion(turn(1, 0), "--reference-point 0.1 -0.05");
   EXPECT_EQ(one.exit_code, 3);
   EXPECT_THAT(one.errors, HasSubstr("add captures"));
@@ -128,7 +128,7 @@ TEST_F(VlpDispersion, ReportsCauseOfFailure) {
   write_lamp_map(folder / "lamps.yaml", mirrored);
   const auto from_below = dispersion(frames, "--reference-point 0.1 -0.05");
   EXPECT_EQ(from_below.exit_code, 2);
-  EXPECT_THAT(from_below.errors, HasSubstr("lamps.yaml: the lamp map looks mirrored"));
+  EXPECT_THAT(from_below.errors, HasSubstr("lamps.yaml: the lamp map seems to be mirrored"));
   write_lamp_map(folder / "lamps.yaml", rig.map);
   for (Frame& frame : frames) frame.detections.resize(1), frame.detections[0].lamp = 1;
   EXPECT_EQ(dispersion(frames, "--reference-point 0.1 -0.05").exit_code, 3);

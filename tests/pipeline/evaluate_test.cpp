@@ -114,7 +114,7 @@ TEST_F(VlpEvaluate, ProposesGatesThatPass) {
 }
 
 TEST_F(VlpEvaluate, WarnsOfMissingFixesWithoutGate) {
-  const std::string words = "1 of 6 captures has no fix, and no gate 'missing_fraction' asks";
+  const std::string words = "1 of 6 captures has no fix, and there is no gate 'missing_fraction'";
   const auto result = with_truth("--gate mean_mm=2.5 --report r.html");
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_THAT(result.errors, HasSubstr(words));
@@ -135,7 +135,7 @@ TEST_F(VlpEvaluate, CombinesGatesOfFileAndCommandLine) {
   folder.file("gates.yaml", "format: vlp-gates/1\ngates:\n  missing_fraction: 50\n");
   EXPECT_THAT(
       with_truth("--gates gates.yaml").errors,
-      HasSubstr("gates.yaml:3: gates.missing_fraction: should be a share from 0 to 1, not 50"));
+      HasSubstr("gates.yaml:3: gates.missing_fraction: should be a fraction from 0 to 1, not 50"));
 }
 
 TEST_F(VlpEvaluate, ComparesFixesWithPathAndLine) {
@@ -217,8 +217,8 @@ TEST_F(VlpEvaluate, WarnsOfErrorsBelowCrlb) {
   const auto result =
       evaluate_example("--noise-px 0.1 --json '" + path("e.json") + "'");  // 0.05 in truth
   EXPECT_EQ(result.exit_code, 0) << result.errors;
-  EXPECT_THAT(result.output, HasSubstr("(beaten: see the warning)"));
-  EXPECT_THAT(result.errors, HasSubstr("is stated too large, or the fixes use more than one"));
+  EXPECT_THAT(result.output, HasSubstr("(below the limit: see the warning)"));
+  EXPECT_THAT(result.errors, HasSubstr("or the fixes use more information than one"));
   EXPECT_THAT(content("e.json"), HasSubstr("\"beaten\": true"));
   EXPECT_EQ(problems_by_schema("evaluation", {folder / "e.json"}), "");
 }
@@ -241,7 +241,7 @@ TEST_F(VlpEvaluate, NamesFileAndLineOfBadInput) {
   const std::string good = "a.png,ok,0,0,0,0,,,,,3,0\n";
   EXPECT_THAT(refused(kFixes + good + "z.png,ok,0,0,0,0,,,,,3,0\n"),
               HasSubstr("fixes.csv:3: image: 'z.png' is not in truth.csv"));
-  EXPECT_THAT(refused(kFixes + good + good), HasSubstr("fixes.csv:3: image: 'a.png' stands twice"));
+  EXPECT_THAT(refused(kFixes + good + good), HasSubstr("fixes.csv:3: image: 'a.png' occurs twice"));
   EXPECT_THAT(refused(kFixes + "a.png,ok,nan,0,0,0,,,,,3,0\n"),
               HasSubstr("fixes.csv:2: x_m: should be a finite number, not 'nan'"));
   EXPECT_THAT(refused(kFixes + "a.png,ok,,0,0,0,,,,,3,0\n"), HasSubstr("fixes.csv:2: x_m"));
@@ -249,10 +249,10 @@ TEST_F(VlpEvaluate, NamesFileAndLineOfBadInput) {
               HasSubstr("fixes.csv:2: x_m: should be within 1,000 km"));
   EXPECT_THAT(refused(kFixes + "a.png,ok,0,0,0,0,-1,1,1,1,3,0\n"),
               HasSubstr("fixes.csv:2: x_sd_m: should not be negative"));
-  EXPECT_THAT(refused(kFixes), HasSubstr("fixes.csv: holds no fix"));
+  EXPECT_THAT(refused(kFixes), HasSubstr("fixes.csv: contains no fix"));
   EXPECT_THAT(refused(""), HasSubstr("fixes.csv: is empty"));
   folder.file("truth.csv", "image,x_m,y_m\na.png,0,0\na.png,0,0\n");
-  EXPECT_THAT(refused(kFixes + good), HasSubstr("truth.csv:3: image: 'a.png' stands twice"));
+  EXPECT_THAT(refused(kFixes + good), HasSubstr("truth.csv:3: image: 'a.png' occurs twice"));
 }
 
 TEST_F(VlpEvaluate, ReturnsTwoForBadUsage) {

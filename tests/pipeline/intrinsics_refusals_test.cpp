@@ -102,7 +102,7 @@ TEST_F(VlpIntrinsicsErrors, ReportsWrongKeyOfBoard) {
   EXPECT_THAT(cols.errors, HasSubstr("board.yaml: the images show cols 6, rows 5"));
   const auto ids = calibrate(images, with("first_id: 0", "first_id: 100"));
   EXPECT_EQ(ids.exit_code, 2);
-  EXPECT_THAT(ids.errors, HasSubstr("with other ids than the board has, 100 to 129"));
+  EXPECT_THAT(ids.errors, HasSubstr("with other ids than those of the board, 100 to 129"));
   const auto spacing = calibrate(images, with("tag_spacing: 1", "tag_spacing: 0.5"));
   EXPECT_EQ(spacing.exit_code, 2);
   EXPECT_THAT(spacing.errors, HasSubstr("tag_spacing is 0.5, but the images show gaps of "));
@@ -136,7 +136,7 @@ TEST_F(VlpIntrinsicsErrors, SkipsInvalidImagesAndOtherSizes) {
   folder.file("images/2.png", "no image\n");
   const auto bad = calibrate(images, kRig + "/board.yaml");
   EXPECT_EQ(bad.exit_code, 3) << bad.errors;
-  EXPECT_THAT(bad.errors, HasSubstr("2.png: cannot be read as an image: is no PNG"));
+  EXPECT_THAT(bad.errors, HasSubstr("2.png: cannot be read as an image: it is not PNG"));
   const auto only = calibrate((folder / "images/2.png").string(), kRig + "/board.yaml");
   EXPECT_EQ(only.exit_code, 2);
   EXPECT_THAT(only.errors, HasSubstr("none of its 1 images can be used"));

@@ -98,7 +98,7 @@ TEST(VlpLimits, RequiresRowTimeOfMovingCamera) {
                                 " --height-m 0 --noise-px 0.1 --step-m 0.5 ";
   const auto result = run_program(two_lamps + "--max-speed-m-per-s 2");
   EXPECT_EQ(result.exit_code, 2);
-  EXPECT_THAT(result.errors, HasSubstr("a camera that moves needs row_time_s and readout"));
+  EXPECT_THAT(result.errors, HasSubstr("a moving camera needs row_time_s and readout"));
   const auto leaning = run_program(two_lamps + "--roll-pitch-sd-deg 90");
   EXPECT_EQ(leaning.exit_code, 3);
   EXPECT_THAT(leaning.errors, HasSubstr("motion and tilt cannot be estimated at any position"));
@@ -169,7 +169,7 @@ TEST_F(VlpLimitsFromCalibration, WarnOfLampsAdjustedElsewhere) {
   const auto result = run("--from-calibration");
   EXPECT_EQ(result.exit_code, 0) << result.errors;
   EXPECT_THAT(result.errors,
-              HasSubstr("1 lamps are elsewhere than in the adjustment of the calibration"));
+              HasSubstr("1 lamps have other positions than in the adjustment of the calibration"));
 }
 
 TEST_F(VlpLimitsFromCalibration, RejectErrorsGivenTwice) {

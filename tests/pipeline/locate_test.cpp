@@ -62,7 +62,7 @@ TEST_F(VlpLocate, WritesRowForEveryImage) {
   EXPECT_EQ(figure(3, "lamps"), 2);
   EXPECT_THAT(result.output, HasSubstr("fixes       3\n"));
   EXPECT_THAT(result.output, HasSubstr("1 too_few_lamps"));
-  EXPECT_THAT(result.errors, HasSubstr("1 detections of lamps that are not in the map"));
+  EXPECT_THAT(result.errors, HasSubstr("1 detections of lamps not in the map"));
   EXPECT_THAT(result.errors, HasSubstr("2 detections that contradict the others"));
 }
 
@@ -79,7 +79,7 @@ TEST_F(VlpLocate, UsesNoiseOfColumnOptionOrResiduals) {
     for (Detection& detection : frames.back().detections) detection.sigma_px.reset();
   }
   const auto result = locate(frames);
-  EXPECT_THAT(result.errors, HasSubstr("px taken from the residuals"));
+  EXPECT_THAT(result.errors, HasSubstr("px estimated from the residuals"));
   double scatter = 0;
   for (std::size_t i = 0; i < frames.size(); ++i) {
     scatter += std::pow(figure(i, "x_m") - 0.1, 2) / static_cast<double>(frames.size());

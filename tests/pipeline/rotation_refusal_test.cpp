@@ -30,12 +30,12 @@ class VlpRotationErrors : public VlpRotation {
 
 TEST_F(VlpRotationErrors, ReportsMirroredMap) {
   for (Lamp& lamp : lamps.lamps) lamp.position_m.x() *= -1;
-  expect_refusals("the lamp map looks mirrored");
+  expect_refusals("the lamp map seems to be mirrored");
 }
 
 TEST_F(VlpRotationErrors, ReportsSwappedLamps) {
   std::swap(lamps.lamps[0].position_m, lamps.lamps[1].position_m);
-  expect_refusals("lamps 1 and 2 look swapped");
+  expect_refusals("lamps 1 and 2 seem to be swapped");
 }
 
 TEST_F(VlpRotationErrors, RejectsInsufficientCaptures) {
@@ -45,7 +45,7 @@ TEST_F(VlpRotationErrors, RejectsInsufficientCaptures) {
   auto frames = read_detections(kExample + "turning.csv");
   auto alike = frames;
   for (Frame& frame : alike) frame.detections = frames[0].detections;
-  expect_refusal(rotation(written(alike)), 3, "all alike: turn the camera");
+  expect_refusal(rotation(written(alike)), 3, "have the same yaw: turn the camera");
   for (Frame& frame : frames) frame.detections.resize(1);
   expect_refusal(rotation(written(frames)), 3, "add lamps");
 }
@@ -64,7 +64,7 @@ TEST_F(VlpRotationErrors, RejectsCirclesAtTwoOppositeYaws) {
     return written(frames);
   };
   expect_refusal(rotation(repeated({0, half, 0, half, 0, half}), "--method circle"), 3,
-                 "the noise of the captures determines most circles, as captures at two yaws do");
+                 "noise determines most circles, as with captures at two yaws");
   EXPECT_EQ(rotation(repeated({0, half, quarter, 0, half, quarter}), "--method circle").exit_code,
             0);
 }

@@ -92,9 +92,9 @@ TEST_F(VlpRotation, ReportsAssumedLeverArmAtOneHeight) {
   }
   const auto result = rotation(written(frames));
   ASSERT_EQ(result.exit_code, 0);
-  EXPECT_THAT(result.errors, HasSubstr("cannot be told from a tilt; it is taken as zero"));
+  EXPECT_THAT(result.errors, HasSubstr("cannot be separated; the lever arm is assumed to be zero"));
   EXPECT_THAT(result.errors, HasSubstr("add captures at a second height"));
-  EXPECT_THAT(result.output, HasSubstr("taken as zero"));
+  EXPECT_THAT(result.output, HasSubstr("assumed to be zero"));
   EXPECT_FALSE(found().lever_arm_m);
 }
 

@@ -31,7 +31,7 @@ TEST_F(VlpSimulateErrors, KeepFolderOfOtherSeedOrScene) {
   std::filesystem::remove(output / "boards/0000.png");
   const Files before = files_below(output);
   const std::string message =
-      output.string() + ": holds captures of another scene, seed or version";
+      output.string() + ": contains captures of another scene, seed or version";
   expect_refused("--seed 2", message);
   expect_refused("--seed 2 --only lamps", message);
   change_scene("blur_px: 0.5", "blur_px: 0.6");
@@ -45,7 +45,7 @@ TEST_F(VlpSimulateErrors, KeepFolderOfOtherFiles) {
   for (const std::string name : {"notes.txt", "boards/0000.png", "lamps.yaml"}) {
     std::filesystem::create_directories(output / "boards");
     folder.file("output/" + name, "mine\n");
-    expect_refused("", output.string() + ": is not empty and holds no captures of this scene");
+    expect_refused("", output.string() + ": is not empty and contains no captures of this scene");
     EXPECT_EQ(files_below(output), (Files{{name, "mine\n"}}));
     std::filesystem::remove_all(output);
   }
@@ -53,7 +53,7 @@ TEST_F(VlpSimulateErrors, KeepFolderOfOtherFiles) {
 
 TEST_F(VlpSimulateErrors, KeepSceneFile) {
   output = folder / "";
-  expect_refused("", "scene.yaml: is an input, too, and would be overwritten");
+  expect_refused("", "scene.yaml: is also an input and would be overwritten");
   EXPECT_EQ(files_below(output).at("scene.yaml"), kSmallScene);
 }
 

@@ -147,7 +147,7 @@ TEST_F(VlpStationKilled, KeepsVerdictWhileRecordsAreUnavailable) {
   fs::rename(share, unmounted);
   const auto away = run_program(run("b", "--idle-s 0.2"));
   EXPECT_EQ(away.exit_code, 2);
-  EXPECT_THAT(away.errors, testing::AllOf(HasSubstr("is kept, but its record cannot be read"),
+  EXPECT_THAT(away.errors, testing::AllOf(HasSubstr("is stored, but its record cannot be read"),
                                           HasSubstr("share/records.db")));
   EXPECT_TRUE(fs::exists(captures("b")));
   fs::rename(unmounted, share);

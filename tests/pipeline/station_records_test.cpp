@@ -97,8 +97,9 @@ TEST_F(VlpStationRecords, VerifyDetectsChangedRecords) {
       changed.output,
       ContainsRegex("run 20[0-9TZ]+-[0-9a-f]{16} was changed\nthe entry that was noted, 0{64}, "
                     "is not in the trail"));
-  EXPECT_THAT(changed.errors, ContainsRegex("error: the records are not as they were kept: run "
-                                            "20[^ ]+ was changed, and 1 more\n"));
+  EXPECT_THAT(
+      changed.errors,
+      ContainsRegex("error: the records were changed: run 20[^ ]+ was changed, and 1 more\n"));
 }
 
 /// A voided run, with operator and reason.
@@ -260,7 +261,7 @@ TEST_F(VlpStationRecords, TrendReportsAlarm) {
             ContainsRegex("slope +-0[.]09091 "), Not(HasSubstr("shows"))));
   EXPECT_THAT(TemporaryFolder::read_content(folder / "bias.svg"), HasSubstr("<svg"));
   EXPECT_THAT(records("study rms_px --reference m9=1").errors,
-              HasSubstr("no judged run that has the figure is of: m9"));
+              HasSubstr("no judged run with this metric is of: m9"));
   EXPECT_EQ(records("study rms_px --reference 500=1").exit_code, 2);
   for (const char* wrong : {"m1", "m1=", "m1=1x", "=1", "m1=nan", "m1=1 m1=2"}) {
     const auto refused = records(std::string("study rms_px --reference ") + wrong);
@@ -272,7 +273,7 @@ TEST_F(VlpStationRecords, TrendReportsAlarm) {
   EXPECT_THAT(too_few.errors, HasSubstr("two units or more"));
   const auto unknown = records("study rms_px --units m1 m2 m3 m4");
   EXPECT_EQ(unknown.exit_code, 2);
-  EXPECT_THAT(unknown.errors, HasSubstr("no judged run that has the figure is of: m3, m4"));
+  EXPECT_THAT(unknown.errors, HasSubstr("no judged run with this metric is of: m3, m4"));
 }
 
 }  // namespace

@@ -39,9 +39,8 @@ TEST_F(VlpStationShift, PassesNoUnitWhileGoldenUnitIsDue) {
   EXPECT_THAT(run_program(no_image).output, AllOf(HasSubstr("INVALID"), Not(HasSubstr("golden"))))
       << "it is not due any more";
   // What it said then it does not say now.
-  EXPECT_THAT(records(verify).errors,
-              ContainsRegex("is not judged: image [a-z]+/[^ ]+ was used in golden run "
-                            "[0-9TZa-f-]+: measure it anew"));
+  EXPECT_THAT(records(verify).errors, ContainsRegex("is not judged: image [a-z]+/[^ ]+ was used in "
+                                                    "golden run [0-9TZa-f-]+: measure it again"));
   EXPECT_THAT(run_program(no_image).output, Not(HasSubstr("golden"))) << "no INVALID run is noted";
   // Due while a unit is on the station: after it. Failed meanwhile: it does not pass.
   const auto note =
@@ -55,7 +54,7 @@ TEST_F(VlpStationShift, PassesNoUnitWhileGoldenUnitIsDue) {
   EXPECT_THAT(
       meanwhile.errors,
       ContainsRegex("warning: 1 units since the golden unit was measured [(]run [^ ]+[)]: "
-                    "'vlp-station verify' is due before the next unit; this one was begun"));
+                    "'vlp-station verify' is due before the next unit; this unit was started"));
   EXPECT_THAT(meanwhile.output, AllOf(HasSubstr("INVALID"), Not(HasSubstr("golden"))));
   EXPECT_THAT(run_program(no_image).output, HasSubstr("Cause    1 units since the golden unit"));
   const auto set_note = [&](const std::string& script) {
@@ -80,8 +79,9 @@ TEST_F(VlpStationShift, PassesNoUnitWhileGoldenUnitIsDue) {
   // Of another station.
   change("lamps.yaml", "[0, 0.28, 1.6]", "[0.05, 0.28, 1.6]");
   const auto changed = run_program(no_image);
-  EXPECT_THAT(changed.errors, HasSubstr("was changed since the golden unit was measured (run 20"));
-  EXPECT_THAT(changed.output, HasSubstr("Cause    what measures in station.yaml or a file"));
+  EXPECT_THAT(changed.errors, HasSubstr("was changed in a way that affects measurements after the "
+                                        "golden unit was measured (run 20"));
+  EXPECT_THAT(changed.output, HasSubstr("Cause    station.yaml or a file"));
 }
 
 /// Unit after unit without a terminal: a line each. What becomes of one ends nothing.

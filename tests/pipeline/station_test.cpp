@@ -43,7 +43,7 @@ TEST_F(VlpStation, PassesGoodUnitAndKeepsRecord) {
               AllOf(HasSubstr("<strong>PASS"), HasSubstr("check_mean_mm"), HasSubstr("LENSMODEL"),
                     // the captions of the pictures of lens, rotation center and dispersion
                     HasSubstr("Coverage: the corners"), HasSubstr("Left: the lamps"),
-                    HasSubstr("Fixes at a known station minus")));
+                    HasSubstr("Fixes minus reference point")));
   // A unit calibrated again keeps its history, and gives the same calibration.
   take_again();
   change(
@@ -193,7 +193,7 @@ TEST_F(VlpStation, NamesFaultOfLampsAndBoard) {
   take_again();
   const auto swapped = run_program(batch("swapped"));
   EXPECT_EQ(swapped.exit_code, 3);
-  EXPECT_THAT(swapped.errors, HasSubstr("not judged: lamps 2 and 5 look swapped"));
+  EXPECT_THAT(swapped.errors, HasSubstr("not judged: lamps 2 and 5 seem to be swapped"));
 
   folder.file("station/lamps.yaml", lamps);
   change("board.yaml", "first_id: 0", "first_id: 100");
@@ -202,7 +202,7 @@ TEST_F(VlpStation, NamesFaultOfLampsAndBoard) {
   EXPECT_EQ(board.exit_code, 3);
   EXPECT_THAT(board.errors, HasSubstr("not judged: wrong board"));
   EXPECT_THAT(records("list").output, AllOf(HasSubstr("3 runs, 0 passed, 0 failed, 3 invalid\n"),
-                                            HasSubstr("lamps 2 and 5 look swapped")));
+                                            HasSubstr("lamps 2 and 5 seem to be swapped")));
   EXPECT_THAT(records("trend rms_px").errors, HasSubstr("0 of the runs have rms_px"));
 }
 
@@ -214,7 +214,7 @@ TEST_F(VlpStation, DoesNotFailUnitForStationFault) {
   if (fs::exists(truth)) fs::rename(truth, folder / "truth.csv");
   const auto places = run_program(batch());
   EXPECT_EQ(places.exit_code, 3);
-  EXPECT_THAT(places.errors, HasSubstr("not judged: check: nothing tells where"));
+  EXPECT_THAT(places.errors, HasSubstr("not judged: check: captures have no position"));
   fs::rename(folder / "captures.csv", table);
 
   // One capture of the check beside where its table has it.
@@ -227,8 +227,10 @@ TEST_F(VlpStation, DoesNotFailUnitForStationFault) {
   folder.file("unit/check/captures.csv", moved);
   const auto elsewhere = run_program(batch());
   EXPECT_EQ(elsewhere.exit_code, 3);
-  EXPECT_THAT(elsewhere.errors,
-              HasSubstr("not judged: 0003.png was not taken where its table says: it is 20.0 mm"));
+  EXPECT_THAT(
+      elsewhere.errors,
+      HasSubstr(
+          "not judged: 0003.png was not taken at the position in its table: its error is 20.0 mm"));
   folder.file("unit/check/captures.csv", said);
 
   // Images of one step in the folder of another.
@@ -388,8 +390,9 @@ TEST_F(VlpStation, SpoolsRunsWhileRecordsAreUnavailable) {
               AllOf(HasSubstr("(waits here) boards"), HasSubstr("2 runs, 0 passed")));
   const std::string offline = "records are offline; 2 runs kept, delivered automatically\n";
   EXPECT_EQ(listed.errors, "vlp-station: error: " + offline);
-  EXPECT_THAT(records("list --verbose").errors,
-              AllOf(HasSubstr("share/records.db"), HasSubstr("kept here, 2 waiting")));
+  EXPECT_THAT(
+      records("list --verbose").errors,
+      AllOf(HasSubstr("share/records.db"), HasSubstr("runs are queued in the spool, 2 waiting")));
   EXPECT_EQ(records("export -o " + (folder / "runs.csv").string()).exit_code, 2);
   const auto shown = records("show --camera-id 0002");
   EXPECT_EQ(shown.exit_code, 0);
@@ -438,10 +441,9 @@ TEST_F(VlpStation, ReportsLampImagesOfAnotherCamera) {
   render_after_the_boards("rotation,dispersion,check");
   const auto result = run_program(batch("0001"));
   EXPECT_EQ(result.exit_code, 3);
-  EXPECT_THAT(
-      result.errors,
-      ContainsRegex("is not judged: the lamps are seen through another lens than the "
-                    "boards: they show a focal length of 508[.].* px and the center [(]407"));
+  EXPECT_THAT(result.errors,
+              ContainsRegex("is not judged: lamps and boards are imaged by different lenses: the "
+                            "lamps fit a focal length of 508[.].* px and the center [(]407"));
 }
 
 /// Images of another unit among those of the boards.
@@ -487,21 +489,22 @@ TEST_F(VlpStation, ReportsCheckImagesOfAnotherUnit) {
   const auto some = run_program(batch());
   EXPECT_EQ(some.exit_code, 3);
   EXPECT_THAT(some.errors,
-              ContainsRegex("camera 0001 is not judged: captures 0000.png to 0002.png are off by "
-                            "up to [0-9.]+ mm, the others by 0[.]0[0-9]+ mm"));
+              ContainsRegex("camera 0001 is not judged: captures 0000.png to 0002.png have errors "
+                            "up to [0-9.]+ mm, the others 0[.]0[0-9]+ mm"));
   // The shared step warns.
   EXPECT_THAT(
       run_program("vlp-calibrate " + (folder / "unit").string() + " -o " +
                   (folder / "results").string() + " --no-report --row-time-s 3e-5 --readout rows")
           .errors,
-      HasSubstr("captures 0000.png to 0002.png are off by up to "));
+      HasSubstr("captures 0000.png to 0002.png have errors up to "));
   fs::remove_all(folder / "unit/check");
   fs::rename(folder / "check", folder / "unit/check");
   const auto all = run_program(batch());
   EXPECT_EQ(all.exit_code, 3);
-  EXPECT_THAT(all.errors, ContainsRegex("camera 0001 is not judged: the images of check are of "
-                                        "another camera: its focal length differs, by heights that "
-                                        "are off by [+-][0-9.]+ mm"));
+  EXPECT_THAT(
+      all.errors,
+      ContainsRegex("camera 0001 is not judged: the images of check are of another camera: its "
+                    "focal length differs: the heights have an error of [+-][0-9.]+ mm"));
 }
 
 /// Images of another unit that the fits reject as outliers.
@@ -539,10 +542,12 @@ TEST_F(VlpStation, FailsLooseUnit) {
   fs::rename(folder / "first", folder / "unit");
   const auto result = run_program(batch());
   EXPECT_EQ(result.exit_code, 1);
-  EXPECT_THAT(result.errors,
-              AllOf(ContainsRegex("camera 0001 fails: all 8 captures of the check are off by "
-                                  "[0-9.]+ mm in one direction of the camera"),
-                    HasSubstr("loose in its housing or on its mount, or another camera took")));
+  EXPECT_THAT(
+      result.errors,
+      AllOf(ContainsRegex("camera 0001 fails: all 8 captures of the check are off by "
+                          "[0-9.]+ mm in one direction of the camera"),
+            HasSubstr(
+                "loose in its housing or on its mount, or the captures are of another camera")));
 }
 
 struct LensFault {
@@ -578,7 +583,7 @@ INSTANTIATE_TEST_SUITE_P(
                     LensFault{"blurred", "blur_px: 0.7", "blur_px: 2.5", "the lens is blurred"},
                     LensFault{"wrong", "[520, 520.6", "[480, 480.5", "wrong lens"},
                     LensFault{"bent", "warp_m: [0.0003, -0.0002]", "warp_m: [0.01, -0.0002]",
-                              "the board is bent"},
+                              "the board is warped"},
                     LensFault{"dark",
                               "white_e_per_s: 2.4e+6\n  black_e_per_s: 1.5e+5\n"
                               "  surround_e_per_s: 6.0e+5",

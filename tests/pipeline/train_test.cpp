@@ -157,7 +157,7 @@ TEST_F(VlpTrain, EstimatesRowTimeFromLampPositions) {
   const auto swapped = run_program(command + folder.file("swapped.yaml", map).string());
   EXPECT_EQ(swapped.exit_code, 3) << swapped.output;
   EXPECT_THAT(swapped.errors, HasSubstr("fit a row time of"));
-  EXPECT_THAT(swapped.errors, HasSubstr("neither the duties nor the places of the lamps decide"));
+  EXPECT_THAT(swapped.errors, HasSubstr("neither duties nor positions of the lamps decide"));
 }
 
 /// The classifier is still trained, because it identifies lamps without the row time.
@@ -259,7 +259,7 @@ TEST_F(VlpTrain, IsNotRequiredForWarningOfInseparableLamps) {
                               (folder / "found.csv").string();
   const auto result = run_program(command);
   EXPECT_EQ(result.exit_code, 0) << result.errors;
-  EXPECT_THAT(result.errors, HasSubstr("lamps 1 and 2 may be left unknown, seen from z = 0"));
+  EXPECT_THAT(result.errors, HasSubstr("lamps 1 and 2 may remain unidentified from z = 0"));
   EXPECT_EQ(std::count(result.errors.begin(), result.errors.end(), '\n'), 1) << result.errors;
   const auto smeared = run_program(command + " --exposure-s 2e-4");
   EXPECT_THAT(smeared.errors, HasSubstr("lamp 6 has"));

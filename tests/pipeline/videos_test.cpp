@@ -90,19 +90,19 @@ TEST_F(VlpDetectVideo, ReportsErrorInOneLine) {
   };
   const std::string none = folder.file("none.mp4", "no video").string();
   refused(none, "", none + ": cannot be opened as a video: is it cut short, or none?");
-  refused(kRig + "/sample", "--every 2", "--every is for videos, and there is none");
+  refused(kRig + "/sample", "--every 2", "--every: there is no video; leave it out");
   refused(kRig + "/sample", "--captures " + (folder / "captures.csv").string(),
           "--captures: images have no frame times; use it for a video only");
   const auto located =
       run_program("vlp-locate " + none + " --lamps " + kRig + "/lamps.yaml --calibration " + kRig +
                   "/true_calibration.yaml -o " + (folder / "fixes.csv").string());
-  EXPECT_THAT(located.errors, HasSubstr("is a video: vlp-detect finds the lamps in it"));
+  EXPECT_THAT(located.errors, HasSubstr("is a video; use vlp-detect"));
 
   const std::string film = (folder / "drive.avi").string();
   if (!write_video_of_folder(film, kRig + "/sample", 6)) GTEST_SKIP() << "OpenCV writes no FFV1";
   const auto over = detect(film, "drive.avi");
   EXPECT_EQ(over.errors,
-            "vlp-detect: error: " + film + ": is an input, too, and would be overwritten\n");
+            "vlp-detect: error: " + film + ": is also an input and would be overwritten\n");
   const std::string bytes = TemporaryFolder::read_content(film);
   const std::string cut = folder.file("cut.avi", bytes.substr(0, bytes.size() * 6 / 10)).string();
   const auto result = detect(cut, "found.csv");

@@ -270,7 +270,7 @@ TEST_F(CInterface, LocateRejectsHeightWithoutStandardDeviation) {
   vlp_sensors sensors = {};
   sensors.has_height = 1;
   EXPECT_EQ(located(open().get(), &sensors).status, VLP_NOT_FINITE);
-  EXPECT_THAT(vlp_explanation(VLP_NOT_FINITE), HasSubstr("that of a known height not positive"));
+  EXPECT_THAT(vlp_explanation(VLP_NOT_FINITE), HasSubstr("that of a known height is not positive"));
 }
 
 TEST_F(CInterface, LocateReportsStampAndUnknownLampsWithoutFix) {

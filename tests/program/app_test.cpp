@@ -110,7 +110,7 @@ TEST(CheckOutput, RejectsInputFile) {
   EXPECT_THAT(rejection_message<std::invalid_argument>([&] {
                 check_output(again, {"", lamps});
               }),
-              HasSubstr("is an input, too"));
+              HasSubstr("is also an input"));
   check_output((folder / "other.yaml").string(), {lamps});
 }
 

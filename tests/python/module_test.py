@@ -124,7 +124,7 @@ class Module(unittest.TestCase):
         no_sd = vlp.Sensors(height_m=(0, 0))
         fix = self.positioner.locate([1, 2], [[400.0, 300], [500, 300]], sensors=no_sd)
         self.assertEqual(fix.status, "not_finite")
-        self.assertIn("that of a known height not positive", fix.explanation)
+        self.assertIn("that of a known height is not positive", fix.explanation)
         fixes = self.positioner.locate_frames([0, 1, 1], [1, 1, 2], [[400.0, 300]] * 3)
         self.assertEqual(vlp.STATUSES[fixes["status"][0]], "too_few_lamps")
         self.assertTrue(np.isnan(fixes["position_m"]).all())

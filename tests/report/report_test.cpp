@@ -110,7 +110,7 @@ TEST(ReportHtml, ReportsOnlyValidRegionOfImportedLens) {
   calibration.intrinsics_report->region_px = {{0, 0}, {500, 0}, {500, 599}};
   const Report report{"cam-9", {}, {}, {}, calibration, {}, {}};
   const std::string html = report_html(report);
-  EXPECT_THAT(html, HasSubstr("where the board was seen, valid_region_px"));
+  EXPECT_THAT(html, HasSubstr("in the valid region (valid_region_px)"));
   EXPECT_THAT(html, Not(HasSubstr("views of the board")));
 }
 

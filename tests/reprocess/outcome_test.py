@@ -38,7 +38,7 @@ class Outcome(unittest.TestCase):
 
     def test_what_passed_with_something_to_look_at_says_so(self):
         cut = [{"image": f"000{i}.png", "reason": "is cut short"} for i in range(6)]
-        warning = "a lever arm cannot be told from a tilt; it is taken as zero"
+        warning = "lever arm and tilt cannot be separated; the lever arm is assumed to be zero"
         steps = [{"name": "lens"}, {"name": "rotation", "warnings": [warning], "skipped": cut}]
         self.session("pass", steps=steps)
         found = self.outcome()
@@ -70,7 +70,7 @@ class Outcome(unittest.TestCase):
         self.assertEqual((lamp["lamp"], lamp["offset_y_mm"], lamp["offset_y_sd_mm"], lamp["map_y_m"]), (2, "-1", "0.2", "1"))
 
     def test_no_result_has_no_figures(self):
-        self.session("no result", "lens: boards: holds no image")
+        self.session("no result", "lens: boards: contains no image")
         self.assertEqual(self.outcome(2)["verdict"], "no result")
         self.assertNotIn("rms_px", self.outcome(2))
 

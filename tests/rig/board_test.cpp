@@ -175,7 +175,7 @@ TEST(ReadBoard, ReportsLineAndKeyOfMissingKey) {
     const std::size_t begin = kBoardYaml.find("\n" + key + ":") + 1;
     const std::string line = kBoardYaml.substr(begin, kBoardYaml.find('\n', begin) + 1 - begin);
     EXPECT_THAT(refusal_with(line, ""),
-                HasSubstr("board.yaml:1: key '" + key + "' is missing; there are: format, "));
+                HasSubstr("board.yaml:1: key '" + key + "' is missing; the keys are: format, "));
   }
 }
 

@@ -61,7 +61,7 @@ TEST(ReadCalibration, ReportsLineAndKeyOfInvalidCamera) {
        {"0.00001", "0.01", "camera.row_time_s: 0.01 s is not within"},  // 10 us in ms
        {"0.00001", "1.0e-5 s", "camera.row_time_s: should be a finite number, not '1.0e-5 s'"},
        {"columns", "cols", "camera.readout: 'cols' is unknown; the read-out is along rows or"},
-       {"readout:", "read_out:", "camera: key 'read_out' is unknown here; the keys are: id, "}});
+       {"readout:", "read_out:", "camera: key 'read_out' is unknown; the keys are: id, "}});
 }
 
 TEST(ReadCalibration, ReportsLineAndKeyOfInvalidReport) {
@@ -102,7 +102,7 @@ TEST(ReadCalibration, ReportsLineAndKeyOfInvalidRotationCenter) {
        {"  lever_arm_m: [0.012, -0.009]\n", "",
         "rotation_center.lever_arm_covariance: is of no lever_arm_m"},
        {"center_px:", "middle_px:",
-        "rotation_center: key 'center_px' is missing; there are: model, middle_px, "
+        "rotation_center: key 'center_px' is missing; the keys are: model, middle_px, "
         "zenith_in_camera",
         "model: tilt"}});
 }
@@ -123,8 +123,10 @@ TEST(ReadCalibration, ReportsLineAndKeyOfInvalidHistory) {
        {"program: vlp-intrinsics", "program: [a]",
         "history[0].program: should be text, not a list"},
        {"version: \"0.1.0\"", "versions: 1",
-        "history[0]: key 'version' is missing; there are: part, program, versions", "part: camera"},
-       {", sha256: \"2d3c\"", "", "history[0].inputs[1]: key 'sha256' is missing; there are: file"},
+        "history[0]: key 'version' is missing; the keys are: part, program, versions",
+        "part: camera"},
+       {", sha256: \"2d3c\"", "",
+        "history[0].inputs[1]: key 'sha256' is missing; the keys are: file"},
        {"sha256: \"0f1e\"", "sha256: a, size: 3", "history[0].inputs[0]: key 'size' is unknown"},
        {"[]\n", "none\n", "history[1].inputs: should be a list, not 'none'"}});
 }
@@ -146,8 +148,7 @@ TEST(ReadCalibration, ReportsMissingPartOfHistory) {
   const std::size_t end = kCalibrationYaml.find("camera:\n");
   EXPECT_EQ(calibration_refusal(
                 changed(kCalibrationYaml, kCalibrationYaml.substr(begin, end - begin), "")),
-            "calibration.yaml:10: history[1]: says that there is a part 'dispersion': is the file "
-            "cut short?");
+            "calibration.yaml:10: history[1]: lists a part 'dispersion': is the file cut short?");
 }
 
 }  // namespace

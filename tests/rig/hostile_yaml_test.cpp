@@ -46,7 +46,7 @@ TEST(ReadYaml, RejectsBillionLaughs) {
     bomb.append(repeated(", " + alias, 8)).append("]\n");
   }
   EXPECT_THAT(map_refusal("format: vlp-lamps/1\n" + bomb + "lamps: *a9\n"),
-              HasSubstr("lamps.yaml:3: an alias (*) is not read here"));
+              HasSubstr("lamps.yaml:3: an alias (*) is not supported"));
 }
 
 // All keys are valid, but the file would need 400 GB.
@@ -58,7 +58,7 @@ TEST(ReadYaml, RejectsSelfReferencingHistory) {
       changed(text, "  - part: dispersion", repeated("  - *a\n", 60000) + "  - part: dispersion");
   const TemporaryFolder folder;
   EXPECT_THAT(refusal(read_calibration, folder.file("calibration.yaml", text)),
-              HasSubstr(": an alias (*) is not read here: write out what it stands for"));
+              HasSubstr(": an alias (*) is not supported: write out the value"));
 }
 
 TEST(ReadYaml, RejectsFileAboveOneMebibyte) {

@@ -16,13 +16,13 @@ std::string refusal_of_lamp(const std::string& keys) {
 
 TEST(ReadLampMap, ReportsLineAndKeyOfMissingKey) {
   EXPECT_EQ(refusal_of_lamp("id: 1"),
-            "lamps.yaml:3: lamps[0]: key 'position_m' is missing; there are: id");
+            "lamps.yaml:3: lamps[0]: key 'position_m' is missing; the keys are: id");
   EXPECT_EQ(refusal_of_lamp("id: 1, position_mm: [0, 0, 2000]"),
-            "lamps.yaml:3: lamps[0]: key 'position_m' is missing; there are: id, position_mm");
+            "lamps.yaml:3: lamps[0]: key 'position_m' is missing; the keys are: id, position_mm");
   EXPECT_EQ(refusal_of_lamp("position_m: [0, 0, 2]"),
-            "lamps.yaml:3: lamps[0]: key 'id' is missing; there are: position_m");
+            "lamps.yaml:3: lamps[0]: key 'id' is missing; the keys are: position_m");
   EXPECT_EQ(map_refusal("format: vlp-lamps/1\n"),
-            "lamps.yaml:1: key 'lamps' is missing; there are: format");
+            "lamps.yaml:1: key 'lamps' is missing; the keys are: format");
   EXPECT_EQ(
       map_refusal("lamps: []\n"),
       "lamps.yaml:1: key 'format' is missing: the file should begin with 'format: vlp-lamps/1'");
@@ -30,17 +30,17 @@ TEST(ReadLampMap, ReportsLineAndKeyOfMissingKey) {
 
 TEST(ReadLampMap, ReportsLineAndKeyOfUnknownKey) {
   EXPECT_EQ(refusal_of_lamp("id: 1, position_m: [0, 0, 2], position_mm: [0, 0, 2000]"),
-            "lamps.yaml:3: lamps[0]: key 'position_mm' is unknown here; the keys are: id, "
-            "position_m, shape, diameter_m, size_m, yaw_rad, frequency_hz, duty, sd_m, room");
+            "lamps.yaml:3: lamps[0]: key 'position_mm' is unknown; the keys are: id, position_m, "
+            "shape, diameter_m, size_m, yaw_rad, frequency_hz, duty, sd_m, room");
   EXPECT_EQ(map_refusal("format: vlp-lamps/1\nunits: mm\nlamps: []\n"),
-            "lamps.yaml:2: key 'units' is unknown here; the keys are: format, sd_m, lamps");
+            "lamps.yaml:2: key 'units' is unknown; the keys are: format, sd_m, lamps");
 }
 
 TEST(ReadLampMap, ReportsLineAndKeyOfDuplicateKey) {
   EXPECT_EQ(refusal_of_lamp("id: 1, position_m: [0, 0, 2], id: 2"),
-            "lamps.yaml:3: lamps[0]: key 'id' stands twice");
+            "lamps.yaml:3: lamps[0]: key 'id' occurs twice");
   EXPECT_EQ(map_refusal("format: vlp-lamps/1\nlamps: []\nlamps: []\n"),
-            "lamps.yaml:3: key 'lamps' stands twice");
+            "lamps.yaml:3: key 'lamps' occurs twice");
 }
 
 TEST(ReadLampMap, RejectsKeysOfOtherShape) {
@@ -65,7 +65,7 @@ TEST(ReadLampMap, RejectsKeysOfOtherShape) {
 
 TEST(ReadLampMap, ReportsLineOfDuplicateId) {
   EXPECT_EQ(map_refusal(changed(kLampsYaml, "id: 7", "id: 1")),
-            "lamps.yaml:4: lamps[1]: id 1 stands twice");
+            "lamps.yaml:4: lamps[1]: id 1 occurs twice");
 }
 
 TEST(ReadLampMap, ReportsBothLampsAtOnePosition) {
@@ -124,12 +124,13 @@ TEST(ReadLampMap, ReportsUnitOfImplausibleValue) {
   EXPECT_THAT(refusal_of_lamp(lamp + "frequency_hz: 2"), HasSubstr("frequency_hz: 2 Hz is not"));
   EXPECT_THAT(refusal_of_lamp(lamp + "frequency_hz: -2000"), HasSubstr("-2000 Hz is not within"));
   EXPECT_THAT(refusal_of_lamp(lamp + "frequency_hz: 2e6"), HasSubstr("2000000 Hz is not within"));
-  EXPECT_THAT(refusal_of_lamp(lamp + "duty: 50"), HasSubstr(place + "duty: 50 (a share of the"));
-  EXPECT_THAT(refusal_of_lamp(lamp + "duty: 0"), HasSubstr(place + "duty: 0 (a share of the"));
+  EXPECT_THAT(refusal_of_lamp(lamp + "duty: 50"), HasSubstr(place + "duty: 50 (a fraction of the"));
+  EXPECT_THAT(refusal_of_lamp(lamp + "duty: 0"), HasSubstr(place + "duty: 0 (a fraction of the"));
 }
 
 TEST(ReadLampMap, RejectsUnknownShape) {
-  EXPECT_EQ(map_refusal("format: vlp-lamps/1\nlamps: []\n"), "lamps.yaml:2: lamps: holds no lamp");
+  EXPECT_EQ(map_refusal("format: vlp-lamps/1\nlamps: []\n"),
+            "lamps.yaml:2: lamps: contains no lamp");
   EXPECT_EQ(map_refusal("format: vlp-lamps/1\n\nlamps:\n\n# none\n"),
             "lamps.yaml:3: lamps: should be a list, not nothing");
   EXPECT_EQ(map_refusal("format: vlp-lamps/1\nlamps:\n  id: 1\n"),

@@ -52,7 +52,7 @@ TEST(YamlMap, NamesThePresentKey) {
   EXPECT_EQ(message_on("center_px: 2\n", "principal_point_px"),
             "some.yaml:1: key 'center_px' is now called 'principal_point_px'");
   EXPECT_EQ(message_on("enough: 2\n", "retention"),
-            "some.yaml:1: key 'enough' is unknown here; the keys are: retention");
+            "some.yaml:1: key 'enough' is unknown; the keys are: retention");
   EXPECT_EQ(message_on("enough: 2\n", "enough"), "");
   const TemporaryFolder folder;
   const auto file = folder.file("some.yaml", "keep: 1\n");

@@ -31,9 +31,9 @@ TEST(ReadYaml, RejectsOtherNodeType) {
   EXPECT_EQ(map_refusal("lamps\n"),
             "lamps.yaml:1: should be a mapping of keys to values, not 'lamps'");
   EXPECT_EQ(map_refusal(kLampsYaml + "---\n" + kLampsYaml),
-            "lamps.yaml:5: a second YAML document begins; the file should hold one");
-  EXPECT_EQ(map_refusal("# nothing\n"), "lamps.yaml: holds no YAML document");
-  EXPECT_EQ(map_refusal("\n"), "lamps.yaml: holds no YAML document");
+            "lamps.yaml:5: a second YAML document begins; the file should contain one");
+  EXPECT_EQ(map_refusal("# nothing\n"), "lamps.yaml: contains no YAML document");
+  EXPECT_EQ(map_refusal("\n"), "lamps.yaml: contains no YAML document");
   EXPECT_EQ(map_refusal("format: vlp-lamps/1\n[a, b]: 1\n"),
             "lamps.yaml:2: a key should be a word");
 }
@@ -52,7 +52,7 @@ TEST(ReadYaml, ReportsLineOfInvalidYaml) {
 TEST(ReadYaml, RejectsAliases) {
   EXPECT_EQ(map_refusal("format: vlp-lamps/1\nlamps:\n  - &lamp {id: 1, position_m: [0, 0, 2]}\n"
                         "  - *lamp\n"),
-            "lamps.yaml:4: an alias (*) is not read here: write out what it stands for");
+            "lamps.yaml:4: an alias (*) is not supported: write out the value");
   EXPECT_THAT(map_refusal("format: vlp-lamps/1\nlamps: &a [*a]\n"), HasSubstr(":2: an alias"));
 }
 
@@ -63,13 +63,13 @@ TEST(ReadYaml, AcceptsWindowsLineEndsAndByteOrderMark) {
   expect_same(read_lamp_map(folder.file("lamps.yaml", windows)), sample_lamps());
   // The line is counted in the same way.
   EXPECT_EQ(map_refusal(changed(windows, "id: 7", "id: 1")),
-            "lamps.yaml:4: lamps[1]: id 1 stands twice");
+            "lamps.yaml:4: lamps[1]: id 1 occurs twice");
 }
 
 TEST(ReadYaml, RejectsMissingFinalNewline) {
   EXPECT_EQ(map_refusal(kLampsYaml.substr(0, kLampsYaml.size() - 1)),
-            "lamps.yaml:4: the last line has no end: is the file cut short? If it is whole, end it "
-            "with a newline");
+            "lamps.yaml:4: the last line has no end: is the file cut short? If it is complete, end "
+            "it with a newline");
 }
 
 TEST(ReadYaml, RejectsBinaryFile) {

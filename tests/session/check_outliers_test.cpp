@@ -22,10 +22,11 @@ std::vector<CaptureError> errors_with(const std::vector<std::size_t>& indices) {
 
 TEST(DescribeCheckOutliers, NamesRangesOfCaptures) {
   EXPECT_EQ(describe_check_outliers(errors_with({0, 1, 2, 3, 4})),
-            "captures 100 to 104 are off by up to 52.0 mm, the others by 0.05 mm: taken elsewhere "
-            "than their table says, or by another camera");
+            "captures 100 to 104 have errors up to 52.0 mm, the others 0.05 mm: taken at other "
+            "positions than those in their table, or by another camera");
   EXPECT_EQ(describe_check_outliers(errors_with({7})),
-            "107 was not taken where its table says: it is 52.0 mm off, others 0.05 mm");
+            "107 was not taken at the position in its table: its error is 52.0 mm, that of others "
+            "0.05 mm");
   const std::string many = describe_check_outliers(errors_with({0, 2, 3, 5, 7, 9, 11, 12, 13}));
   EXPECT_EQ(many.substr(0, many.find(" are")),
             "captures 100, 102, 103, 105, 107, 109 and 1 more groups");
@@ -58,10 +59,10 @@ TEST(DescribeResidualOutliers, RequiresTwoCaptures) {
   residuals[4].size = 0.19;
   EXPECT_EQ(describe_residual_outliers(residuals), "") << "one camera may have it";
   residuals[4].size = 0.3;
-  EXPECT_EQ(describe_residual_outliers(residuals),
-            "the lamps in captures 103, 104 do not fit lens and tilt of the others (residuals up "
-            "to 0.50 px, typically 0.02 px): of another camera, or with covered lamps; take them "
-            "again");
+  EXPECT_EQ(
+      describe_residual_outliers(residuals),
+      "the lamps in captures 103, 104 do not fit lens and tilt of the others (residuals up to 0.50 "
+      "px, typically 0.02 px): other camera, or covered lamps; repeat these captures");
   for (CaptureError& each : residuals) each.size = 0.3;
   EXPECT_EQ(describe_residual_outliers(residuals), "") << "all of them";
 }

@@ -40,7 +40,7 @@ TEST(SolveLens, WarnsWhenNoViewIsHeldOut) {
   LensInput input = views_with_edges(0);
   input.held_out = 30;
   EXPECT_THAT(solve_lens(input, {}).warnings,
-              Contains("of 20 views none is held out: there are fewer than 30"));
+              Contains("no view is held out: 20 views are fewer than 30"));
   input.held_out = 10;
   EXPECT_THAT(solve_lens(input, {}).warnings, IsEmpty());
 }

@@ -63,9 +63,8 @@ TEST(LocateFrames, ReportsUnknownMotionAsCauseOfResiduals) {
   LocateInput input = drive_without_stated_motion(0.02);
   const LocateResult found = locate_frames(input);
   EXPECT_THAT(found.warnings,
-              testing::Contains(
-                  HasSubstr("the images fit a camera that moves, at 1 m/s: state velocities in "
-                            "captures.csv, or --max-speed-m-per-s")));
+              testing::Contains(HasSubstr("the images fit a moving camera, at 1 m/s: state "
+                                          "velocities in captures.csv, or --max-speed-m-per-s")));
   input.motion = KnownMotion::up_to(3, 0);
   EXPECT_THAT(locate_frames(input).warnings, Not(testing::Contains(HasSubstr("moves"))));
 }
@@ -170,7 +169,7 @@ TEST(LocateFrames, WarnsOfLampsOutsideCalibratedRegion) {
   report.region_px = {{-1e4, -1e4}, {right_px, -1e4}, {right_px, 1e4}, {-1e4, 1e4}};
   const LocateResult marked = locate_frames(input);
   EXPECT_THAT(marked.warnings,
-              ElementsAre(HasSubstr("fixes rest on lamps where no board was seen")));
+              ElementsAre(HasSubstr("fixes use lamps outside the valid region of the lens")));
   for (std::size_t i = 0; i < input.frames.size(); ++i) {
     if (!marked.rows[i].fix) continue;
     std::vector<int> beyond;

@@ -33,19 +33,21 @@ LensResult solve_with_grid(const SplineGrid& grid) {
 TEST(SolveLensNarrowGrid, ProposesWiderSplineGrid) {
   const LensResult result = solve_with_grid({3, 12, 12, 100});
   ASSERT_FALSE(result.ok());
+  EXPECT_THAT(
+      result.why,
+      HasSubstr(
+          "control points of LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=12_Ny=12_fov_x_deg=100 "
+          "extend to 50 degrees off axis horizontally and 50 vert"));
   EXPECT_THAT(result.why,
-              HasSubstr("control points of LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=12_Ny=12_"
-                        "fov_x_deg=100 reach 50 degrees off the axis to the sides and 50 up"));
-  EXPECT_THAT(result.why,
-              HasSubstr(": take --lens LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=12_Ny="));
+              HasSubstr(": use --lens LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=12_Ny="));
 }
 
 TEST(SolveLensNarrowGrid, ProposesMoreRowsForVerticalField) {
   const LensResult result = solve_with_grid({3, 12, 5, 230});
   ASSERT_FALSE(result.ok());
-  EXPECT_THAT(result.why, testing::ContainsRegex("take --lens LENSMODEL_SPLINED_"
-                                                 "STEREOGRAPHIC_order=3_Nx=12_Ny=10_"
-                                                 "fov_x_deg=230"));
+  EXPECT_THAT(result.why,
+              testing::ContainsRegex(
+                  "use --lens LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=12_Ny=10_fov_x_deg=230"));
 }
 
 TEST(SolveLensWideGrid, FailsWithProposedGrid) {
@@ -66,8 +68,8 @@ TEST(SolveLensWideGrid, FailsWithProposedGrid) {
   const LensResult result = solve_lens(input, {});
   ASSERT_FALSE(result.ok());
   const std::string take =
-      " are too few where the lens sees, 5 degrees off the axis to the "
-      "sides and 4 up and down: take --lens ";
+      " do not cover the field of view, 5 degrees off axis horizontally and 4 vertically: use "
+      "--lens ";
   EXPECT_THAT(result.why, HasSubstr("views with the board: the control points of LENSMODEL_"));
   EXPECT_THAT(result.why, HasSubstr(take));
   const auto model = lens_model_from_name(result.why.substr(result.why.find(take) + take.size()));

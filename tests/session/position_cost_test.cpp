@@ -106,7 +106,7 @@ struct Images {
     const RowTimeResult result = chosen(with_lens);
     EXPECT_FALSE(result.found);
     EXPECT_THAT(result.problem, HasSubstr("fit a row time of"));
-    EXPECT_THAT(result.problem, HasSubstr("neither the duties nor the places of the lamps decide"));
+    EXPECT_THAT(result.problem, HasSubstr("neither duties nor positions of the lamps decide"));
   }
 };
 

@@ -105,7 +105,7 @@ TEST(EndsOf, ReturnsFirstAndLastPlace) {
   EXPECT_THAT(rejection_message([&] {
                 find_drive_ends("t.csv", {drive[0], drive[0]});
               }),
-              HasSubstr("t.csv: the drive ends where it begins"));
+              HasSubstr("t.csv: start and end of the drive are equal"));
 }
 
 }  // namespace

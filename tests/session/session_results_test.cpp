@@ -219,7 +219,7 @@ TEST_F(SessionResultsTest, AllowsOneSessionAndOneRun) {
   }
   EXPECT_NO_THROW(take(session)());
   EXPECT_THAT(take(folder / "another"),
-              ThrowsMessage<InputError>(HasSubstr("holds the results of another session")));
+              ThrowsMessage<InputError>(HasSubstr("contains the results of another session")));
   fs::create_directory(folder / "mine");
   folder.file("mine/calibration.yaml", "of somebody");
   EXPECT_THAT([&] { SessionResults(folder / "mine", session); },

@@ -43,9 +43,9 @@ TEST_P(SolveLensWideField, FailsWhereModelHasNoRays) {
   const LensResult result = solve_lens(make_wide_set(180, GetParam()), {});
   EXPECT_EQ(result.failure, StepFailure::undetermined);
   EXPECT_THAT(result.why,
-              AllOf(HasSubstr("30 views with the board: it is seen up to 10"),
-                    HasSubstr("degrees off the axis, where " + std::string(to_string(GetParam())) +
-                              " has no rays: take --lens OPENCV_FISHEYE"),
+              AllOf(HasSubstr("30 views with the board: it is visible up to 10"),
+                    HasSubstr("degrees off axis, where " + std::string(to_string(GetParam())) +
+                              " has no rays: use --lens OPENCV_FISHEYE"),
                     Not(HasSubstr("add views"))));
 }
 
@@ -57,11 +57,11 @@ TEST_P(SolveLensWideField, WarnsAndCoversErrorsNearLimitOfModel) {
   for (const double reach_deg : {60, 75, 87}) {
     const LensResult result = solve_lens(make_wide_set(reach_deg, GetParam()), {});
     if (!result.ok()) {
-      EXPECT_THAT(result.why, HasSubstr("take --lens OPENCV_FISHEYE"));
+      EXPECT_THAT(result.why, HasSubstr("use --lens OPENCV_FISHEYE"));
       continue;
     }
     if (reach_deg > 60) {
-      EXPECT_THAT(result.warnings, Contains(HasSubstr("take --lens OPENCV_FISHEYE")));
+      EXPECT_THAT(result.warnings, Contains(HasSubstr("use --lens OPENCV_FISHEYE")));
       EXPECT_EQ(result.lens.better_model, LensModel::fisheye);
     }
     if (!describe_failed_gates(check_gates(default_lens_gates(), result.metrics)).empty()) continue;
@@ -89,7 +89,7 @@ TEST(SolveLens, DoesNotBlameBoardForUnsuitableModel) {
   const LensResult result = solve_lens(make_wide_set(87, LensModel::opencv5), {});
   ASSERT_EQ(result.failure, StepFailure::undetermined);
   EXPECT_THAT(result.why, AllOf(HasSubstr("OPENCV_FISHEYE fits to 0.05 px"),
-                                HasSubstr("take --lens OPENCV_FISHEYE"),
+                                HasSubstr("use --lens OPENCV_FISHEYE"),
                                 Not(HasSubstr("board.yaml")), Not(HasSubstr("cannot be"))));
 }
 

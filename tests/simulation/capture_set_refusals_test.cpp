@@ -15,7 +15,7 @@ std::string without_board() {
 }
 
 TEST(ReadCaptureSet, RejectsSpotOutsideRoom) {
-  const std::string problem = "takes the camera outside the room";
+  const std::string problem = "moves the camera outside the room";
   EXPECT_EQ(refusal_with("[-0.2, 0.3]", "[-0.2, 0.6]"),
             "scene.yaml:25: captures[0].spots_m[1]: " + problem);
   EXPECT_EQ(refusal_with("x_m: [-0.6, 0.6], y", "x_m: [-1.6, 0.6], y"),
@@ -31,7 +31,7 @@ TEST(ReadCaptureSet, RejectsSpotOutsideRoom) {
 }
 
 TEST(ReadCaptureSet, RejectsLeverArmOutsideRoomAtAnyYaw) {
-  const std::string problem = "takes the camera outside the room";
+  const std::string problem = "moves the camera outside the room";
   EXPECT_EQ(refusal_with("[-0.2, 0.3]", "[0.949, -0.449]"), "");
   EXPECT_EQ(refusal_with("[-0.2, 0.3]", "[0.951, -0.449]"),
             "scene.yaml:25: captures[0].spots_m[1]: " + problem);
@@ -84,7 +84,7 @@ TEST(ReadCaptureSet, RequiresExactlyOneKeyForPositions) {
   EXPECT_EQ(refusal_with("folder: line,", "folder: line, spots_m: [[0, 0]],"),
             "scene.yaml:27: captures[2]: " + problem);
   EXPECT_EQ(refusal_with("folder: boards,", "folder: boards, spots_m: [[0, 0]],"),
-            "scene.yaml:28: captures[3]: key 'spots_m' is unknown here; the keys are: folder, "
+            "scene.yaml:28: captures[3]: key 'spots_m' is unknown; the keys are: folder, "
             "exposure_s, views");
 }
 
@@ -97,13 +97,14 @@ TEST(ReadCaptureSet, RequiresExactlyOneKeyForYaws) {
 
 TEST(ReadCaptureSet, RejectsEmptyList) {
   EXPECT_EQ(refusal_with("[[0.1, -0.05], [-0.2, 0.3]]", "[]"),
-            "scene.yaml:25: captures[0].spots_m: holds no spot");
+            "scene.yaml:25: captures[0].spots_m: contains no spot");
   EXPECT_EQ(refusal_with("heights_m: [0, 0.2]", "heights_m: []"),
-            "scene.yaml:25: captures[0].heights_m: holds no height");
+            "scene.yaml:25: captures[0].heights_m: contains no height");
   EXPECT_EQ(refusal_with("yaws_deg: [20, -90]", "yaws_deg: []"),
-            "scene.yaml:25: captures[0].yaws_deg: holds no yaw");
+            "scene.yaml:25: captures[0].yaws_deg: contains no yaw");
   const std::string before = kSceneYaml.substr(0, kSceneYaml.find("captures:\n"));
-  EXPECT_EQ(scene_refusal(before + "captures: []\n"), "scene.yaml:24: captures: holds no captures");
+  EXPECT_EQ(scene_refusal(before + "captures: []\n"),
+            "scene.yaml:24: captures: contains no captures");
 }
 
 TEST(ReadCaptureSet, RejectsDriveWithoutLength) {
@@ -128,7 +129,7 @@ TEST(ReadCaptureSet, RejectsInvalidFolderName) {
 
 TEST(ReadCaptureSet, RejectsRepeatedFolder) {
   EXPECT_EQ(refusal_with("folder: line", "folder: spots"),
-            "scene.yaml:27: captures[2]: folder 'spots' stands twice");
+            "scene.yaml:27: captures[2]: folder 'spots' occurs twice");
 }
 
 TEST(ReadCaptureSet, RejectsSetWithoutItsLampsOrBoard) {

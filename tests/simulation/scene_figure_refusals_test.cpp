@@ -89,7 +89,7 @@ TEST(ReadScene, RejectsLightOutsideRoomOrBelowCamera) {
 }
 
 TEST(ReadScene, RejectsInvalidLamp) {
-  EXPECT_EQ(refusal_with("id: 5,", "id: 1,"), "scene.yaml:11: lamps[1]: id 1 stands twice");
+  EXPECT_EQ(refusal_with("id: 5,", "id: 1,"), "scene.yaml:11: lamps[1]: id 1 occurs twice");
   EXPECT_EQ(refusal_with("[0.6, 0.2, 1.5]", "[-0.6, -0.3, 1.6]"),
             "scene.yaml:11: lamps[1]: lamp 5 is where lamp 1 is");
   EXPECT_EQ(refusal_with("phase: 0.25", "phase: 90"),
@@ -169,7 +169,7 @@ TEST(ReadScene, RejectsInvalidRandomChips) {
             chips + ".excess: should be [least, most]");
   EXPECT_EQ(with("chips: {fraction: 0.3, pitch_m: 0.03, width_m: 0.02}, " + random +
                  "within_fraction: 0.75, excess: [0.3, 0.8]}"),
-            chips + ": stands beside chips: a disc has one of them");
+            chips + ": excludes chips: a disc has one of them; leave one out");
 }
 
 TEST(ReadScene, RejectsInvalidRecessExponents) {
@@ -247,8 +247,8 @@ TEST(ReadScene, RectangleLampTakesKeysOfLampMapOnly) {
 TEST(ReadScene, RejectsEdgeShareWithRecess) {
   EXPECT_EQ(
       refusal_with("recess: {", "rim_to_center_ratio: 1, recess: {"),
-      "scene.yaml:13: clutter.steady_lamps[1]: key 'rim_to_center_ratio' is unknown here; the keys "
-      "are: position_m, shape, diameter_m, size_m, yaw_rad, electron_rate_e_per_s, recess, halo");
+      "scene.yaml:13: clutter.steady_lamps[1]: key 'rim_to_center_ratio' is unknown; the keys are: "
+      "position_m, shape, diameter_m, size_m, yaw_rad, electron_rate_e_per_s, recess, halo");
 }
 
 TEST(ReadScene, RejectsInvalidPicture) {

@@ -12,16 +12,16 @@ using testing::HasSubstr;
 TEST(ReadScene, AcceptsSampleScene) { EXPECT_EQ(scene_refusal(kSceneYaml), ""); }
 
 TEST(ReadScene, RejectsUnknownKeyInEachSection) {
-  EXPECT_EQ(refusal_with("seed: 7", "seed: 7\nlight: 1"),
-            "scene.yaml:3: key 'light' is unknown here; the keys are: format, seed, room, camera, "
-            "optics, sensor, processing, mount, ambient_e_per_s, lamps, clutter, board, archive, "
-            "captures");
+  EXPECT_EQ(
+      refusal_with("seed: 7", "seed: 7\nlight: 1"),
+      "scene.yaml:3: key 'light' is unknown; the keys are: format, seed, room, camera, optics, "
+      "sensor, processing, mount, ambient_e_per_s, lamps, clutter, board, archive, captures");
   EXPECT_EQ(refusal_with("z_m: [0, 1.7]", "z_m: [0, 1.7], w_m: 0"),
-            "scene.yaml:3: room: key 'w_m' is unknown here; the keys are: x_m, y_m, z_m");
+            "scene.yaml:3: room: key 'w_m' is unknown; the keys are: x_m, y_m, z_m");
   const auto unknown = [](const std::string& before, const std::string& place) {
-    EXPECT_THAT(refusal_with(before, "nonsense: 1, " + before),
-                testing::StartsWith("scene.yaml:" + place +
-                                    ": key 'nonsense' is unknown here; the keys are: "));
+    EXPECT_THAT(
+        refusal_with(before, "nonsense: 1, " + before),
+        testing::StartsWith("scene.yaml:" + place + ": key 'nonsense' is unknown; the keys are: "));
   };
   unknown("id: small", "4: camera");
   unknown("blur_px", "5: optics");
@@ -52,12 +52,12 @@ TEST(ReadScene, RejectsUnknownKeyInEachSection) {
 
 TEST(ReadScene, RejectsMissingKey) {
   EXPECT_EQ(refusal_with("seed: 7\n", ""),
-            "scene.yaml:1: key 'seed' is missing; there are: format, room, camera, optics, sensor, "
-            "mount, ambient_e_per_s, lamps, clutter, board, captures, processing");
+            "scene.yaml:1: key 'seed' is missing; the keys are: format, room, camera, optics, "
+            "sensor, mount, ambient_e_per_s, lamps, clutter, board, captures, processing");
   const auto missing = [](const std::string& text, const std::string& place,
                           const std::string& key) {
     EXPECT_THAT(refusal_with(text, ""),
-                HasSubstr("scene.yaml:" + place + "key '" + key + "' is missing; there are: "));
+                HasSubstr("scene.yaml:" + place + "key '" + key + "' is missing; the keys are: "));
   };
   missing("ambient_e_per_s: 1.0e+6\n", "1: ", "ambient_e_per_s");
   missing("x_m: [-1, 1], ", "3: room: ", "x_m");
@@ -90,10 +90,10 @@ TEST(ReadScene, RejectsMissingKey) {
 
 TEST(ReadScene, RejectsCameraWithoutRowTimeOrReadout) {
   EXPECT_EQ(refusal_with(", row_time_s: 3.0e-5", ""),
-            "scene.yaml:4: camera: key 'row_time_s' is missing; there are: id, imager_px, "
+            "scene.yaml:4: camera: key 'row_time_s' is missing; the keys are: id, imager_px, "
             "lens_model, intrinsics, pixel_pitch_m, readout");
   EXPECT_EQ(refusal_with(", readout: columns", ""),
-            "scene.yaml:4: camera: key 'readout' is missing; there are: id, imager_px, "
+            "scene.yaml:4: camera: key 'readout' is missing; the keys are: id, imager_px, "
             "lens_model, intrinsics, pixel_pitch_m, row_time_s");
   EXPECT_EQ(refusal_with("[160, 120]", "[160, 4]"),
             "scene.yaml:4: camera.imager_px[1]: should be a whole number within 8 and 20000, not "
@@ -120,7 +120,7 @@ TEST(ReadScene, RejectsValueOfWrongType) {
             "scene.yaml:3: room.z_m: should be [least, most]");
   EXPECT_EQ(refusal_with("warp_m: [0.0003, -0.0002]", "warp_m: 0.0003"),
             "scene.yaml:20: board.warp_m: should be a list, not '0.0003'");
-  EXPECT_EQ(refusal_with("seed: 7", "seed: 7\nseed: 8"), "scene.yaml:3: key 'seed' stands twice");
+  EXPECT_EQ(refusal_with("seed: 7", "seed: 7\nseed: 8"), "scene.yaml:3: key 'seed' occurs twice");
 }
 
 }  // namespace

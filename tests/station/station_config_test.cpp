@@ -78,7 +78,7 @@ TEST_F(ReadStation, RejectsUnknownGateWithLine) {
 
 TEST_F(ReadStation, RejectsImplausibleValues) {
   change("station.yaml", "\n  coverage: 0.7", "\n  coverage: 7");
-  EXPECT_THAT(refusal(), HasSubstr("gates.coverage: should be a share from 0 to 1, not 7"));
+  EXPECT_THAT(refusal(), HasSubstr("gates.coverage: should be a fraction from 0 to 1, not 7"));
   change("station.yaml", "board_coverage: 0.7", "board_coverage: 70");
   EXPECT_THAT(refusal(), HasSubstr("completion.board_coverage"));
 }
@@ -112,9 +112,9 @@ TEST_F(ReadStation, ReadsGuardBands) {
   EXPECT_THAT(refused("check_mean_mm: 0.02", "check_mean_mm: 0"), HasSubstr("above 0"));
   EXPECT_THAT(refused("check_mean_mm: 0.02", "check_mean_mm: 0.62"),
               AllOf(HasSubstr("standard_uncertainties.check_mean_mm"),
-                    HasSubstr("leaves nothing within the gate")));
+                    HasSubstr("leaves no value within the gate")));
   EXPECT_THAT(refused("check_mean_mm: 0.02", "check_lamp_inlier_fraction: 0.04"),
-              HasSubstr("leaves nothing within the gate"));
+              HasSubstr("leaves no value within the gate"));
 }
 
 TEST_F(ReadStation, ReadsHook) {
@@ -154,7 +154,7 @@ TEST(SerialProblem, LimitsTimeOfPatternMatch) {
   config.serial_pattern = "(a+)+b";
   EXPECT_EQ(serial_problem(config, "aaab"), "");
   EXPECT_THAT(serial_problem(config, std::string(60, 'a')),
-              HasSubstr("serial_pattern: takes too long to be compared with"));
+              HasSubstr("serial_pattern: the comparison is too slow for"));
   config.serial_pattern = "[A-Za-z0-9_.-]{1,64}";
   EXPECT_EQ(serial_problem(config, std::string(64, 'a')), "");
 }

@@ -21,7 +21,7 @@ static_assert(sizeof(Eigen::Vector3d) == sizeof(mrcal_point3_t));
 mrcal_lensmodel_t lens_model(const std::string& name) {
   mrcal_lensmodel_t model;
   if (!mrcal_lensmodel_from_name(&model, name.c_str())) {
-    throw std::runtime_error("mrcal does not know " + name);
+    throw std::runtime_error("mrcal does not support " + name);
   }
   return model;
 }

@@ -466,13 +466,11 @@ std::string explain_undetermined(const AdjustmentProblem& problem,
       problem.has_lever_arm && compute_max_sd(at.lever_arm) <= limits.lever_arm_fraction * height_m;
   if (zenith) return "";
   if (problem.has_lever_arm && !has_lever_arm) {
-    return "tilt and lever arm are not told apart: a camera that leans looks like one beside its "
-           "axis; add a turn on a spot at a second height, or captures at known places of the "
-           "camera, turned";
+    return "tilt and lever arm cannot be separated; add a rotation in place at a second height, or "
+           "captures at known camera positions and several yaws";
   }
-  return "the captures do not determine the tilt: add a turn on a spot, over 90 degrees or more, "
-         "or "
-         "captures that see more lamps at other yaws";
+  return "the captures do not determine the tilt: add a rotation in place over 90 degrees or more, "
+         "or captures with more lamps at other yaws";
 }
 
 /// Moves the problem to its robust solution and rejects everything far from it. Returns false if
@@ -606,7 +604,8 @@ void set_map(const AssembledProblem& all, const Contradictions& contradictions,
     result.surveyed_covariance.block<3, 3>(row, row) =
         surveyed_sd_m * surveyed_sd_m * Eigen::Matrix3d::Identity();
     if (!all.lamp_seen[i]) {
-      result.notes.push_back(fmt::format("no capture sees lamp {}: it stays where it is", lamp.id));
+      result.notes.push_back(
+          fmt::format("lamp {} is visible in no capture: its position stays unchanged", lamp.id));
       continue;
     }
     result.lamps.push_back(
@@ -632,13 +631,13 @@ void set_places(AssembledProblem& all, AdjustmentResult& result) {
   }
   if (places_used < 3) {
     constexpr std::array<const char*, 3> undetermined_parts{
-        "where the map is, how it is turned and how large it is",
-        "how the map is turned and how large it is",
-        "how the map is turned about the line through both places"};
-    result.notes.push_back(fmt::format(
-        "{} known place{}: {} rests on the survey; captures at {} more known places would tell it",
-        places_used, places_used == 1 ? "" : "s", undetermined_parts.at(places_used),
-        3 - places_used));
+        "position, yaw and scale of the map", "yaw and scale of the map",
+        "rotation of the map about the line through both positions"};
+    result.notes.push_back(
+        fmt::format("{} known position{}: only the survey determines {}; captures at {} more known "
+                    "positions would determine it",
+                    places_used, places_used == 1 ? "" : "s", undetermined_parts.at(places_used),
+                    3 - places_used));
   }
 }
 
@@ -698,15 +697,15 @@ AdjustmentResult adjust_captures(const AdjustmentInput& input, const AdjustmentL
   result.camera = input.calibration.camera;
   result.refined = input.lamps;
   if (problem.captures.empty()) {
-    result.undetermined = "no capture sees two lamps of the map well enough for a fix";
+    result.undetermined = "no capture shows two lamps of the map clearly enough for a fix";
     return result;
   }
   Contradictions contradictions(all);
   const auto adjusted = solve_all(input, all, contradictions);
   if (!adjusted) {
     result.undetermined =
-        "no zenith and no places of the lamps fit the captures: is it the map of this room, and "
-        "the calibration this camera's?";
+        "no zenith and no lamp positions fit the captures: is it the map of this room, and the "
+        "calibration of this camera?";
     return result;
   }
   const Eigen::MatrixXd& covariance = adjusted->matrix;

@@ -141,20 +141,20 @@ std::string_view describe(DispersionStatus status) {
       return "too few captures have a fix that agrees with the others: three or more are needed "
              "(two for --method chen-guan); add captures";
     case DispersionStatus::station_far:
-      return "every fix is farther from the station than a fifth of the lamps' height: is it in "
-             "meters, and in the frame of the lamp map? Are these the captures taken there?";
+      return "every fix is farther from its reference point than a fifth of the lamp height: is "
+             "the reference point in meters, in the frame of the lamp map, and that of these "
+             "captures?";
     case DispersionStatus::one_yaw:
-      return "all captures, or all but one, are at one yaw, where an error of the camera and one "
-             "of the station or the lamp map look alike: turn the camera at the station and add "
-             "those captures, or take --method chen-guan, which supposes that station and map are "
-             "right";
+      return "all captures, or all but one, have one yaw, which cannot separate errors of the "
+             "camera from errors of the reference point or the lamp map; turn the camera at the "
+             "reference point and add captures, or use --method chen-guan, which assumes an exact "
+             "reference point and lamp map";
     case DispersionStatus::many_yaws:
-      return "the captures are at different yaws, over which the paper's circle averages the "
-             "camera's error away: hold the yaw, or take --method camera";
+      return "the captures have different yaws, over which the circle of Chen and Guan averages "
+             "out the camera error; use one yaw, or use --method camera";
     case DispersionStatus::diverged:
-      return "no offset explains the fixes: is each lamp where the map has it, are all captures "
-             "from "
-             "the station, and is the calibration this camera's? Add captures at other yaws";
+      return "no offset explains the fixes: are the lamp positions, the reference points and the "
+             "calibration correct? Add captures at other yaws";
   }
   return "";
 }

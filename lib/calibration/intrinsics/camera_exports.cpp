@@ -34,7 +34,7 @@ std::vector<double> pad_distortions(const Camera& camera, std::size_t min_count)
 
 [[noreturn]] void throw_unsupported(const Camera& camera, const char* format, const char* known) {
   throw std::invalid_argument(std::string(format) + " has no lens model like " +
-                              std::string(to_string(camera.lens_model)) + "; take --lens " + known);
+                              std::string(to_string(camera.lens_model)) + "; use --lens " + known);
 }
 
 /// Returns ROS's name of the distortion model; nullptr if it has none.
@@ -62,7 +62,7 @@ std::string quoted_name(const std::string& name) {
     const auto byte = static_cast<unsigned char>(character);
     if (byte < first_printable || byte == del || utf8_length(name) < name.size()) {
       throw std::invalid_argument(
-          "the camera's name holds control characters or is not UTF-8; give it another by "
+          "the camera id contains control characters or is not UTF-8; give another one with "
           "--camera-id");
     }
     quoted += character == '\'' ? std::string("''") : std::string(1, character);

@@ -116,10 +116,9 @@ ImageRegion parse_mrcal_region(const fs::path& file, const std::string& text) {
   if (!value) return {};
   const auto numbers = parse_numbers(file, *value, key);
   if (numbers.empty())
-    throw InputError(
-        file,
-        "'" + key +
-            "' is empty: the lens is known nowhere; without the key it is all over the image");
+    throw InputError(file, "'" + key +
+                               "' is empty, so the lens has no valid region; leave the key out if "
+                               "it is valid in the whole image");
   ImageRegion region;
   for (std::size_t i = 0; i + 1 < numbers.size(); i += 2) {
     region.emplace_back(numbers[i], numbers[i + 1]);
@@ -163,7 +162,7 @@ std::vector<double> parse_yaml_numbers(const YAML::Node& node) {
 LensModel find_lens_model(const std::string& name, std::vector<double>& distortions) {
   constexpr std::size_t with_tilt = 14, without = 12;
   if (name == "fisheye" || name == "equidistant") {
-    if (distortions.size() != 4) throw std::invalid_argument(name + " takes four coefficients");
+    if (distortions.size() != 4) throw std::invalid_argument(name + " has four coefficients");
     return LensModel::fisheye;
   }
   if (!name.empty() && name != "plumb_bob" && name != "rational_polynomial" && name != "radtan" &&
@@ -199,7 +198,7 @@ Camera parse_yaml_camera(const YAML::Node& document) {
   std::vector<double> distortions;
   if (kalibr) {
     if (const auto model = kalibr["camera_model"].as<std::string>(); model != "pinhole") {
-      throw std::invalid_argument("camera_model " + model + " is not known here, pinhole is");
+      throw std::invalid_argument("camera_model " + model + " is not supported; use pinhole");
     }
     camera.intrinsics = parse_yaml_numbers(kalibr["intrinsics"]);
     const auto model = kalibr["distortion_model"].as<std::string>("none");
@@ -320,16 +319,16 @@ AnyCamera read_any_camera(const fs::path& file) {
     found = parse_mrcal_camera(file, text);
   } else {
     if (text.starts_with("<?xml")) {
-      throw InputError(file, "is XML, which is not read: have OpenCV write it as .yaml");
+      throw InputError(file, "is XML, which is not supported; save it as .yaml with OpenCV");
     }
     // "%YAML:1.0" of OpenCV is no directive of YAML.
     if (text.starts_with("%YAML:")) text.erase(0, text.find('\n'));
     if (text.size() > kMaxYamlBytes) {
-      throw InputError(file, "holds no camera: as YAML it would be shorter than 1 MiB");
+      throw InputError(file, "contains no camera: a YAML file of a camera is shorter than 1 MiB");
     }
     try {
       const YAML::Node document = parse_yaml(file, text);
-      if (!document.IsMap()) throw InputError(file, "holds no camera");
+      if (!document.IsMap()) throw InputError(file, "contains no camera");
       if (document["format"]) {
         const Calibration calibration = read_calibration(file);
         const auto& report = calibration.intrinsics_report;
@@ -337,7 +336,7 @@ AnyCamera read_any_camera(const fs::path& file) {
       }
       camera = parse_yaml_camera(document);
     } catch (const YAML::Exception& error) {
-      throw InputError(file, "holds no camera that is known here: " + error.msg);
+      throw InputError(file, "contains no supported camera: " + error.msg);
     } catch (const std::invalid_argument& error) {
       throw InputError(file, error.what());
     }

@@ -162,8 +162,7 @@ std::string describe(const LensChoice& choice) {
   std::string taken, others;
   if (choice.beyond_rad > 0) {
     others = fmt::format(
-        "the board is seen up to {:.0f} degrees off the axis, where no "
-        "LENSMODEL_OPENCVn has rays",
+        "the board is visible up to {:.0f} degrees off axis, where no LENSMODEL_OPENCVn has rays",
         deg_from_rad(choice.beyond_rad));
   }
   for (const auto& [model, rms_px] : choice.tried) {

@@ -49,8 +49,8 @@ SplitViews split_views(const LensViews& input, LensEstimate& result) {
     if (!is_held_out) result.images.push_back(view.image);
   }
   if (input.held_out > 0 && split.held_out.views.empty()) {
-    result.warnings.push_back(fmt::format("of {} views none is held out: there are fewer than {}",
-                                          count, input.held_out));
+    result.warnings.push_back(
+        fmt::format("no view is held out: {} views are fewer than {}", count, input.held_out));
   }
   return split;
 }
@@ -116,8 +116,8 @@ std::string explain_unsuitable_grid(IntrinsicsInput input) {
   }
   const auto angle_deg = [](double u) { return deg_from_rad(2 * std::atan(u / 2)); };
   return fmt::format(
-      "the control points of {} reach {:.0f} degrees off the axis to the sides and {:.0f} up and "
-      "down, but the board is seen {:.0f} and {:.0f} degrees off: take --lens {}",
+      "the control points of {} extend to {:.0f} degrees off axis horizontally and {:.0f} "
+      "vertically, but the board is visible to {:.0f} and {:.0f} degrees: use --lens {}",
       to_string(grid), angle_deg(grid_reach.x()), angle_deg(grid_reach.y()),
       angle_deg(reach.farthest.x()), angle_deg(reach.farthest.y()),
       to_string(extend_grid(grid, grid_reach.cwiseMax(margin * reach.farthest))));
@@ -125,7 +125,7 @@ std::string explain_unsuitable_grid(IntrinsicsInput input) {
 
 std::string recommend_model(LensModel requested, const IntrinsicsSolution& other) {
   const std::string name(to_string(other.problem.lens_model));
-  return fmt::format("no lens of {} is found, but {} fits to {:.2f} px: take --lens {}",
+  return fmt::format("no lens of {} fits, but {} fits with {:.2f} px: use --lens {}",
                      to_string(requested), name, other.rms_px, name);
 }
 
@@ -183,15 +183,15 @@ void recommend_fisheye(const FisheyeFit& fisheye, LensEstimate& result) {
   const LensModel model = solution.problem.lens_model;
   if (fisheye.solution.rms_px > max_ratio * solution.rms_px &&
       fisheye.farthest_rad < min_angle_rad) {
-    result.details.push_back(
-        fmt::format("{} fits the views as well as {}, so that nothing is known beyond the corners",
-                    to_string(LensModel::fisheye), to_string(model)));
+    result.details.push_back(fmt::format(
+        "{} fits the views as well as {}: the lens is valid only where corners were detected",
+        to_string(LensModel::fisheye), to_string(model)));
     return;
   }
   result.better_model = LensModel::fisheye;
   result.warnings.push_back(fmt::format(
-      "the board is seen up to {:.0f} degrees off the axis, and {} fits it to {:.3f} px, {} to "
-      "{:.3f} px, with no rays from 90 degrees on: take --lens {}",
+      "the board is visible up to {:.0f} degrees off axis; {} fits with {:.3f} px, {} with {:.3f} "
+      "px and no rays beyond 90 degrees: use --lens {}",
       deg_from_rad(fisheye.farthest_rad), to_string(LensModel::fisheye), fisheye.solution.rms_px,
       to_string(model), solution.rms_px, to_string(LensModel::fisheye)));
 }
@@ -212,8 +212,8 @@ void warn_of_dropped_views(LensEstimate& result) {
   for (const auto& [view, rms_px] : result.solution.dropped) {
     if (!std::isfinite(rms_px) && is_splined(model)) {
       result.warnings.push_back(
-          fmt::format("{}: shows the board where {} has no control points; take a larger "
-                      "fov_x_deg, or Ny; dropped",
+          fmt::format("{}: dropped, as the board is where {} has no control points; use a larger "
+                      "fov_x_deg or Ny",
                       result.images[view], to_string(model)));
       continue;
     }
@@ -235,8 +235,8 @@ bool choose_model(SplitViews& views, LensEstimate& result) {
   result.choice = choose_lens(views.solved);
   if (views.solved.views.size() < kMinViewsToChoose) {
     fail(result, LensStatus::too_few_views,
-         fmt::format("{} views with the board do not determine the lens model, which takes {}; "
-                     "add views, or name the model with --lens",
+         fmt::format("{} views of the board do not determine the lens model, which needs {}; add "
+                     "views, or give the model with --lens",
                      views.solved.views.size(), kMinViewsToChoose));
     return false;
   }
@@ -297,8 +297,8 @@ WarpChoice select_warp(const Board& board, WarpChoice warp) {
   if (board.kind != BoardKind::chessboard || board.cols != board.rows) return warp;
   if (warp == WarpChoice::on) {
     throw std::invalid_argument(
-        "a square chessboard looks the same after a quarter turn, so that its bend cannot be told: "
-        "leave --warp on out");
+        "--warp on: not possible for a square chessboard, which has the same appearance after a "
+        "rotation by 90 degrees; leave it out");
   }
   return WarpChoice::off;
 }
@@ -329,10 +329,10 @@ LensEstimate estimate_lens(LensViews input) {
     if (fisheye && fisheye->farthest_rad >= kRightAngle_rad) {
       fail_undetermined(
           result, views,
-          fmt::format("it is seen up to {:.0f} degrees off the axis, where {} has no rays: take "
-                      "--lens {}",
-                      deg_from_rad(fisheye->farthest_rad), to_string(model),
-                      to_string(LensModel::fisheye)));
+          fmt::format(
+              "it is visible up to {:.0f} degrees off axis, where {} has no rays: use --lens {}",
+              deg_from_rad(fisheye->farthest_rad), to_string(model),
+              to_string(LensModel::fisheye)));
       return result;
     }
   }

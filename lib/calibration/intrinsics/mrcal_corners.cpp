@@ -52,7 +52,7 @@ class CornerTable {
       read(++line, std::string_view(text_).substr(from, end - from));
       from = end + 1;
     }
-    if (rows.empty()) throw InputError(file, "holds no corner");
+    if (rows.empty()) throw InputError(file, "contains no corner");
     if (too_many_outside(num_outside_, num_seen_)) throw InputError(*first_outside_);
   }
 
@@ -157,9 +157,8 @@ PartOfImage parse_part(const BoardLattice& lattice, const CornerTable& table, st
   const auto ending = name.rfind("-corner");
   if (ending == name.npos || ending + 8 != name.size() || name.back() < '0' || name.back() > '3') {
     throw table.error(line,
-                      "an image of a board whose gaps are not as wide as its tags stands "
-                      "four times, as NAME-corner0 to NAME-corner3, as vlp-intrinsics "
-                      "writes it");
+                      "an image of a board whose gaps differ from its tag width needs four "
+                      "entries, NAME-corner0 to NAME-corner3, as vlp-intrinsics writes them");
   }
   found.part = static_cast<std::size_t>(name.back() - '0');
   found.image.resize(ending);
@@ -195,7 +194,7 @@ std::vector<BoardView> read_corners(const std::filesystem::path& file, const Boa
     std::size_t end = from + 1;
     while (end < table.rows.size() && table.rows[end].image == name) ++end;
     if (!known.insert(name).second) {
-      throw table.error(line, fmt::format("image '{}' stands twice", name));
+      throw table.error(line, fmt::format("image '{}' occurs twice", name));
     }
     const auto [image, part] = parse_part(lattice, table, line, name);
     const auto [entry, is_new] = view_of_image.try_emplace(image, views.size());

@@ -145,8 +145,8 @@ std::string describe_too_coarse_grid(const Lens& lens, const std::array<int, 2>&
   const bool helps = fit_splined_lens(lens, imager_px, other, core).has_value();
   const auto angle_deg = [](double u) { return deg_from_rad(2 * std::atan(u / 2)); };
   return fmt::format(
-      "the control points of {} are too few where the lens sees, {:.0f} degrees off the axis to "
-      "the sides and {:.0f} up and down: take {}",
+      "the control points of {} do not cover the field of view, {:.0f} degrees off axis "
+      "horizontally and {:.0f} vertically: use {}",
       to_string(model), angle_deg(farthest.x()), angle_deg(farthest.y()),
       helps ? fmt::format("--lens {}", to_string(other)) : "another model");
 }

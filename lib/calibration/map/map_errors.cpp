@@ -473,24 +473,23 @@ std::string describe(const MapError& error) {
       return describe_offset(error.lamps[0], error.offset_m);
     case MapErrorKind::unsteady:
       return fmt::format(
-          "lamp {} contradicts the other lamps in {} of {} captures, in varying directions: "
-          "another "
-          "light is taken for it, it moved in between, or its height is wrong",
+          "lamp {} contradicts the other lamps in {} of {} captures, in varying directions: it is "
+          "confused with another light, was moved between captures, or has a wrong height",
           error.lamps[0], error.contradicting, error.captures);
     case MapErrorKind::swapped:
       return fmt::format(
-          "lamps {} and {} look swapped: the captures fit the map once these two change places or "
-          "ids",
+          "lamps {} and {} seem to be swapped: the captures fit the map if their positions or ids "
+          "are exchanged",
           error.lamps[0], error.lamps[1]);
     case MapErrorKind::mirrored:
-      return "the lamp map looks mirrored, as if drawn as seen from below: the captures fit its "
-             "mirror image; turn the sign of x or of y of every lamp";
+      return "the lamp map seems to be mirrored, as if drawn from below: the captures fit its "
+             "mirror image; change the sign of x or of y of every lamp";
     case MapErrorKind::other_room:
       return "most captures contradict the lamp map: is it the map of this room, and the "
-             "calibration "
-             "this camera's?";
+             "calibration of this camera?";
     case MapErrorKind::unseen:
-      return fmt::format("lamp {} is never seen: is it lit, and not overexposed?", error.lamps[0]);
+      return fmt::format("lamp {} is never visible: is it lit, and not overexposed?",
+                         error.lamps[0]);
   }
   return "";
 }
@@ -503,8 +502,8 @@ std::string describe(std::span<const MapError> errors) {
 
 std::string describe_lamps_elsewhere(int lamps) {
   return fmt::format(
-      "{} lamps are elsewhere than in the adjustment of the calibration, and sd does not "
-      "know how well they are: give the map that vlp-adjust --refine-map wrote with it",
+      "{} lamps have other positions than in the adjustment of the calibration, and sd lacks their "
+      "uncertainty: give the map that vlp-adjust --refine-map wrote with it",
       lamps);
 }
 

@@ -283,7 +283,7 @@ class RotationSearch {
     for (std::size_t i = 0; i < fixes_.fixes.size(); ++i) {
       if (!(model_fit_.residuals_m[i] > max_residual_m)) continue;
       outliers_.insert(fixes_.frames[i]);
-      rejection_reasons_[fixes_.frames[i]] = "its fix is not where the others turn";
+      rejection_reasons_[fixes_.frames[i]] = "its fix is not on the rotation axis of the others";
     }
   }
 
@@ -367,24 +367,22 @@ RotationCaptures find_rotation_captures(const std::vector<Frame>& frames, const 
 std::string_view describe(RotationStatus status) {
   switch (status) {
     case RotationStatus::ok:
-      return "captures of a turn on the spot";
+      return "captures of a rotation in place";
     case RotationStatus::other_map:
-      return "the lamps that are seen are not those of the lamp map, or not where it says: is it "
-             "the map of this room?";
+      return "the visible lamps contradict the lamp map: is it the map of this room?";
     case RotationStatus::too_few_lamps:
-      return "two lamps or more are needed in each capture: add lamps, or turn where more of them "
-             "are in view";
+      return "each capture needs two lamps or more: add lamps, or move to where more are visible";
     case RotationStatus::too_few_captures:
-      return "three captures or more are needed at a height: add captures while turning on the "
-             "spot, twelve over a full turn are good";
+      return "each height needs three captures or more: add captures of a rotation in place, "
+             "preferably twelve over a full turn";
     case RotationStatus::alike:
-      return "the captures are all alike: turn the camera on the spot from one to the next";
+      return "the captures have the same yaw: turn the camera in place between captures";
     case RotationStatus::short_arc:
-      return "the captures span less than 90 degrees: add captures over more of the turn, a full "
-             "one is best";
+      return "the captures span less than 90 degrees: add captures over more of the turn, "
+             "preferably a full one";
     case RotationStatus::moved:
-      return "the captures are not of one spot: take them while turning about one vertical axis, "
-             "without driving";
+      return "the captures are not of one rotation in place: take them while rotating about one "
+             "vertical axis, without driving";
   }
   return "";
 }

@@ -19,8 +19,8 @@ constexpr int kDigits = 3;
 constexpr double kOneYaw_rad = rad_from_deg(10);
 constexpr double kOnePlace = 0.1;  // of the lamps' height above the camera
 constexpr const char* kUndeterminedMessage =
-    "the captures do not determine it: the lamps they see are too few or in one line; add captures "
-    "that see more lamps, at other places and yaws";
+    "the captures do not determine the tilt: too few lamps are visible, or they are in one line; "
+    "add captures with more lamps, at other positions and yaws";
 
 /// Captures whose lamps agree with the map and with a camera at one zenith, with their poses.
 struct Placement {
@@ -125,31 +125,31 @@ PoseVariation compute_variation(const Placement& placement) {
 /// map), and the remedy. Returns an empty string if they can.
 std::string explain_undetermined(const Placement& placement, const LampMap& map, bool refine_map) {
   if (placement.captures.size() < 2) {
-    return "two captures or more are needed that see three lamps of the map or more which agree "
-           "with it; there " +
+    return "two captures or more with three consistent lamps of the map or more are needed; "
+           "there " +
            std::string(placement.captures.empty() ? "is none" : "is one") +
-           ": add captures that see more lamps, or see that lamp map and camera are the right ones";
+           ": add captures with more lamps, or correct lamp map and camera";
   }
   const PoseVariation variation = compute_variation(placement);
   const bool one_yaw = variation.yaw < std::sin(kOneYaw_rad),
              one_place = variation.place < kOnePlace;
   if (one_yaw && one_place) {
-    return "all captures are alike: from one place and yaw a lamp map that is a little off looks "
-           "like a tilt; turn the camera on the spot, or drive, and add those captures";
+    return "all captures have one position and yaw, where a small error of the lamp map cannot be "
+           "separated from a tilt; turn the camera in place, or drive, and add captures";
   }
   if (!refine_map) return "";
   if (one_yaw) {
-    return "all captures are at one yaw: a tilt of all lamps cannot be told from the camera's; "
-           "turn the camera and add those captures, or leave the lamp map as it is";
+    return "all captures have one yaw, which cannot separate a tilt of the lamp map from the tilt "
+           "of the camera; turn the camera and add captures, or leave out --refine-map";
   }
   if (one_place) {
-    return "all captures are from one place: the distances of the lamps do not show; add captures "
-           "from elsewhere, or leave the lamp map as it is";
+    return "all captures are at one position, which does not determine the distances of the lamps; "
+           "add captures at other positions, or leave out --refine-map";
   }
   const auto& counts = placement.detection_counts;
   if (const auto once = std::find(counts.begin(), counts.end(), 1); once != counts.end()) {
     return "lamp " + std::to_string(map.lamps[static_cast<std::size_t>(once - counts.begin())].id) +
-           " is in one capture only: add captures that see it, or leave the lamp map as it is";
+           " is in one capture only: add captures with it, or leave out --refine-map";
   }
   const auto lamps = std::ssize(counts) - std::count(counts.begin(), counts.end(), 0);
   return placement.degrees_of_freedom() > 2 + 3 * lamps - 5 ? "" : kUndeterminedMessage;
@@ -162,16 +162,16 @@ std::string explain_uncertainty(const TiltCalibration& result, const Eigen::Vect
   const double sd_rad =
       result.center.covariance->diagonal().cwiseSqrt().cwiseQuotient(focal_px).maxCoeff();
   if (!(sd_rad <= options.max_sd_rad)) {
-    return "the tilt would be known to " + significant(deg_from_rad(sd_rad), kDigits) +
-           " degrees only: add captures, of more lamps, at other places and yaws";
+    return "the standard deviation of the tilt would be " +
+           significant(deg_from_rad(sd_rad), kDigits) +
+           " degrees: add captures with more lamps, at other positions and yaws";
   }
   for (const auto& lamp : result.corrections) {
     const double sd_m = lamp.sd_m.maxCoeff();
     if (!(sd_m <= options.max_lamp_sd_m)) {
-      return "lamp " + std::to_string(lamp.id) + " would be known to " +
+      return "lamp " + std::to_string(lamp.id) + " would have a standard deviation of " +
              significant(1e3 * sd_m, kDigits) +
-             " mm only: add captures that see it, at other places and yaws, or leave the lamp map "
-             "as it is";
+             " mm: add captures with it, at other positions and yaws, or leave out --refine-map";
     }
   }
   return "";

@@ -54,8 +54,9 @@ EdgeCurvature read_curvature(const CsvTable& csv, std::size_t row) {
   const auto reach_at = csv.required(kBowColumns[2]);
   const double reach = csv.number(row, reach_at);
   if (reach != 0 && !(reach >= min_reach && reach <= max_reach)) {
-    throw csv.error(row, reach_at,
-                    "should be how far an edge's pixels reach, 0.01 to 2, or 0 of none");
+    throw csv.error(
+        row, reach_at,
+        "should be the half extent of the edge pixels, 0.01 to 2, or 0 if there are none");
   }
   return {csv.number(row, csv.required(kBowColumns[0])),
           csv.number(row, csv.required(kBowColumns[1])), reach};
@@ -68,7 +69,7 @@ double read_sd_px(const CsvTable& csv, std::size_t row) {
   if (!column) return 0;
   const double sd_px = csv.number(row, *column);
   if (sd_px < 0) {
-    throw csv.error(row, *column, "should be a standard deviation, or 0 where nobody knows it");
+    throw csv.error(row, *column, "should be a standard deviation, or 0 if unknown");
   }
   return sd_px;
 }
@@ -131,7 +132,7 @@ class CornerTableReader {
   /// are outside the image.
   std::vector<BoardView> read() {
     for (std::size_t row = 0; row < csv_.rows(); ++row) read_row(row);
-    if (views_.empty()) throw InputError(file_, "holds no corner");
+    if (views_.empty()) throw InputError(file_, "contains no corner");
     if (too_many_outside(outside_, corners_)) throw InputError(*first_outside_);
     return std::move(views_);
   }
@@ -154,7 +155,7 @@ class CornerTableReader {
     }
     const int corner = read_number(row);
     if (!add(row, corner, pixel, views_[entry->second].seen)) {
-      throw csv_.error(row, number_, fmt::format("{} stands twice in image '{}'", corner, name));
+      throw csv_.error(row, number_, fmt::format("{} occurs twice in image '{}'", corner, name));
     }
   }
 

@@ -78,7 +78,7 @@ std::string describe_other_tags(const Board& board, const cv::Mat& image) {
   cv::Mat mirrored;
   cv::flip(image, mirrored, 1);
   if (count_tags(detect_board(mirrored, board)) >= kMinTags) {
-    return "the image is mirrored: mirror it back, or tell the camera not to";
+    return "the image is mirrored: mirror it back, or turn mirroring off in the camera";
   }
   const bool charuco = board.kind == BoardKind::charuco;
   // Damaged tags of the board can look like tags of other families. Another family therefore needs

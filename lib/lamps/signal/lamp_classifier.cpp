@@ -221,12 +221,12 @@ LampClassifier read_lamp_classifier(const std::filesystem::path& file) {
     const auto lamp = read_class(item.map());
     for (const auto& other : classifier.lamps) {
       if (other.lamp == lamp.lamp) {
-        throw item.error("id " + std::to_string(lamp.lamp) + " stands twice");
+        throw item.error("id " + std::to_string(lamp.lamp) + " occurs twice");
       }
     }
     classifier.lamps.push_back(lamp);
   }
-  if (classifier.lamps.empty()) throw lamps.error("holds no lamp");
+  if (classifier.lamps.empty()) throw lamps.error("contains no lamp");
   return classifier;
 }
 

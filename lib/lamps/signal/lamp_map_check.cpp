@@ -63,7 +63,7 @@ std::string explain_missing_room(const LampMapFile& lamps, const std::string& ar
       if (!share_frequency(map.lamps[i], map.lamps[j])) continue;
       return "lamps " + std::to_string(map.lamps[i].id) + " and " +
              std::to_string(map.lamps[j].id) +
-             " share a frequency in two rooms: choose a room by " + argument +
+             " share a frequency in two rooms: choose a room with " + argument +
              "; the map has: " + list_rooms(rooms);
     }
   }

@@ -258,7 +258,7 @@ RowTimeCandidates estimate_row_time(std::span<const MeasuredPeriod> lights, cons
   std::vector<PeriodMatch> matches = PeriodMatching(found.groups, lamps).matches();
   if (matches.empty()) {
     found.problem =
-        "no lamp of the map can have the periods that are seen: are its frequencies right?";
+        "no lamp of the map has one of the measured periods: are its frequencies right?";
     return found;
   }
   std::stable_sort(matches.begin(), matches.end(),
@@ -291,20 +291,19 @@ RowTimeResult choose_row_time(const RowTimeCandidates& found,
   const std::string groups = std::to_string(found.groups.size());
   if (ranked.size() > 1 && ranked[1].first < ranked[0].first + kClearCost) {
     return {{},
-            "the " + groups + " stripe periods that are seen fit a row time of " +
+            "the " + groups + " measured stripe periods fit a row time of " +
                 format_microseconds(best.row_time.row_time_s) + " and one of " +
                 format_microseconds(ranked[1].second->row_time.row_time_s) +
-                ", and neither the duties nor the places of the lamps decide: add captures that "
-                "show more "
-                "lamps, or a table that says which lamp is which"};
+                ", and neither duties nor positions of the lamps decide: add captures with more "
+                "lamps, or a table of the lamps in the images (--labels)"};
   }
   const auto explained = std::count_if(best.lamps.begin(), best.lamps.end(),
                                        [](const auto& lamps) { return !lamps.empty(); });
   if (2 * explained < std::ptrdiff_t(found.groups.size())) {
     return {{},
             "no row time explains more than " + std::to_string(explained) + " of the " + groups +
-                " stripe periods that are seen: are the frequencies of the lamp map right, and "
-                "all lamps in it?"};
+                " measured stripe periods: are the frequencies in the lamp map right, and all "
+                "lamps in it?"};
   }
   return {best.row_time, {}};
 }

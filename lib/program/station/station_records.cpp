@@ -41,7 +41,7 @@ void print_line(const std::string& text) { fmt::print("{}\n", printable_line(tex
 /// are unavailable, commands that continue without them report it (warn_if_unavailable()).
 std::unique_ptr<KnownRuns> open_runs(const StationRecordsOptions& options) {
   if (options.station.empty() == options.records.empty()) {
-    throw std::invalid_argument("which records? Give --station or --records");
+    throw std::invalid_argument("the records are not specified; give --station or --records");
   }
   try {
     if (options.station.empty()) return std::make_unique<KnownRuns>(options.records);
@@ -119,7 +119,7 @@ void check_output_option(const StationRecordsOptions& options, const KnownRuns& 
 std::filesystem::path find_results_folder(const StationRecordsOptions& options) {
   if (!options.output.empty()) return options.output;
   if (!options.station.empty()) return read_station(options.station).results;
-  throw std::invalid_argument("where to? Give --station, whose results it goes to, or --output");
+  throw std::invalid_argument("the output folder is not specified; give --station or --output");
 }
 
 /// Returns the result of a study. Converts std::invalid_argument to Undetermined.
@@ -143,7 +143,7 @@ std::map<std::string, double> parse_references(const std::vector<std::string>& t
       throw std::invalid_argument("--reference: should be UNIT=VALUE, not " + text);
     }
     if (!references.emplace(text.substr(0, at), value).second) {
-      throw std::invalid_argument("--reference: " + text.substr(0, at) + " stands twice");
+      throw std::invalid_argument("--reference: " + text.substr(0, at) + " occurs twice");
     }
   }
   return references;
@@ -174,7 +174,7 @@ void print_bias(const MetricKind& kind, const StationRecordsOptions& options) {
   constexpr const char* head = "{:<20}{:>10}{:>6}{:>12}{:>12}{:>9}{:>9}   {}";
   print_line(fmt::format("{}: bias against {} reference units, {}", options.metric,
                          study.units.size(),
-                         std::string_view(kind.unit).empty() ? "a share" : kind.unit));
+                         std::string_view(kind.unit).empty() ? "a fraction" : kind.unit));
   fmt::print("\n");
   print_line(
       fmt::format(head, "unit", "reference", "runs", "bias", "se", "t", "p", "95 % interval"));
@@ -291,7 +291,7 @@ void clean_expired_folders(const StationRecordsOptions& options) {
   const auto known = open_runs(options);
   const StationConfig& config = *known->station();
   if (!config.keep.images_days && !config.keep.results_days) {
-    throw InputError(options.station, "keeps all for ever: add the key 'retention'");
+    throw InputError(options.station, "nothing expires; add the key 'retention'");
   }
   check_clock(config, known->records());
   const RetentionResult found = find_expired(config, known->records());
@@ -313,10 +313,10 @@ void clean_expired_folders(const StationRecordsOptions& options) {
                            options.remove ? "(deleted)" : ""));
   }
   for (const auto& folder : found.without_record) {
-    spdlog::warn("{}: is of no run of the records: left", folder.string());
+    spdlog::warn("{}: belongs to no run of the records: left", folder.string());
   }
   for (const auto& folder : found.in_use) {
-    spdlog::warn("{}: has something that station.yaml names: left; move that elsewhere",
+    spdlog::warn("{}: contains a file that station.yaml names: left; move that file elsewhere",
                  folder.string());
   }
   fmt::print("{} folders, {:.1f} MB{}\n", done, all_mb,
@@ -346,7 +346,7 @@ void verify_records(const StationRecordsOptions& options) {
   if (!found.last_digest.empty()) fmt::print("last digest {}\n", found.last_digest);
   if (found.problems.empty()) return;
   throw GateNotMet(fmt::format(
-      "the records are not as they were kept: {}{}", found.problems.front(),
+      "the records were changed: {}{}", found.problems.front(),
       found.problems.size() == 1 ? "" : fmt::format(", and {} more", found.problems.size() - 1)));
 }
 
@@ -361,12 +361,10 @@ void export_runs(const StationRecordsOptions& options) {
 void import_archive(const StationRecordsOptions& options) {
   auto [sessions, undated, crashed, refused] = read_archive_sessions(options.archive);
   if (undated > 0) {
-    spdlog::warn(
-        "{} sessions are left out: when they were taken stands neither in archive.csv "
-        "nor in their names",
-        undated);
+    spdlog::warn("{} sessions are ignored: neither archive.csv nor their names have their date",
+                 undated);
   }
-  if (crashed > 0) spdlog::warn("{} sessions are left out: their program crashed", crashed);
+  if (crashed > 0) spdlog::warn("{} sessions are ignored: their program crashed", crashed);
   if (sessions.empty() && refused.empty()) {
     throw Undetermined(options.archive + ": no session with a date");
   }
@@ -391,16 +389,16 @@ void import_archive(const StationRecordsOptions& options) {
     progress.update(i + 1, sessions.size());
   }
   if (!sessions.empty()) {
-    print_line(fmt::format("station {}: {} runs taken, {} were there", sessions.front().run.station,
+    print_line(fmt::format("station {}: {} runs added, {} existed", sessions.front().run.station,
                            taken, sessions.size() - taken - unread - other.size()));
   }
   if (!refused.empty()) {
-    throw std::invalid_argument(fmt::format("{} sessions are not taken, the first because of {}",
+    throw std::invalid_argument(fmt::format("{} sessions are not imported, the first because of {}",
                                             refused.size(), refused.front()));
   }
   if (other.empty()) return;
   throw std::invalid_argument(fmt::format(
-      "{} sessions, the first {}, have another result than these records have: take new records",
+      "{} sessions, the first {}, have another result than these records; use new records",
       other.size(), other.front()));
 }
 
@@ -465,10 +463,9 @@ void print_capability(const StationRecordsOptions& options) {
         index(found->cpk), index(found->ppk)));
   }
   if (rows.empty()) {
-    throw Undetermined(
-        "no figure with a gate has two values that differ, of runs that were judged");
+    throw Undetermined("no metric with a gate has two different values in judged runs");
   }
-  print_line(fmt::format(head, "figure", "runs", "mean", "sd within", "overall", "gate",
+  print_line(fmt::format(head, "metric", "runs", "mean", "sd within", "overall", "gate",
                          "Cpk (95 %)", "Ppk (95 %)"));
   for (const std::string& row : rows) print_line(row);
 }
@@ -499,7 +496,7 @@ void print_study(const StationRecordsOptions& options) {
   }
   if (study.interaction_p) {
     fmt::print("units x stations by chance with p = {:.3f}: {}\n", *study.interaction_p,
-               study.pooled ? "taken as error" : "of its own");
+               study.pooled ? "pooled with the error" : "significant");
   }
   fmt::print("\n{:<34}{:>12}{:>14}\n", "", "sd", "% of total");
   const auto part = [&](const char* name, double sd) {
@@ -512,7 +509,7 @@ void print_study(const StationRecordsOptions& options) {
     part("stations (AV)", study.of_station);
     part("units x stations (INT)", study.of_interaction);
   }
-  part("measuring, all of it (GRR)", study.grr);
+  part("measurement, total (GRR)", study.grr);
   part("units (PV)", study.of_unit);
   part("total (TV)", study.total);
   if (const auto categories = study.distinct_categories()) {
@@ -520,13 +517,13 @@ void print_study(const StationRecordsOptions& options) {
   }
   if (const auto percent_of_tolerance =
           study.percent_of_tolerance(make_tolerance_limits(kind, gate))) {
-    fmt::print("measuring / tolerance (P/T){:>19.1f} %\n", *percent_of_tolerance);
+    fmt::print("measurement / tolerance (P/T){:>17.1f} %\n", *percent_of_tolerance);
   } else if (gate) {
     fmt::print("no P/T: the mean is not within the gate, {} {:.4g}\n", describe(kind.direction),
                *gate);
   }
   if (study.stations == 1) {
-    fmt::print("\nOne station: nothing is known of what stations differ by.\n");
+    fmt::print("\nOne station: differences between stations are unknown.\n");
   }
 }
 

@@ -39,7 +39,7 @@ void update_golden_state(const StationConfig& config, const RunRecord& record) {
   try {
     update_golden_note(config, record);
   } catch (const InputError& error) {
-    spdlog::error("when the golden unit is due is not known: {}", error.what());
+    spdlog::error("the due time of the golden unit is unknown: {}", error.what());
   }
 }
 
@@ -125,7 +125,7 @@ void guide_unit(const StationRunOptions& options, Unit& unit, WatchedRun& watche
       break;
     }
     if (interrupted()) {
-      throw std::runtime_error("left before the verdict; the same command goes on where it was");
+      throw std::runtime_error("left before the verdict; the same command continues");
     }
     changed = terminal.resized();
   }
@@ -151,7 +151,7 @@ void finish_run(
   try {
     spool.keep(record);
   } catch (const InputError&) {
-    lines.push_back({"NOT RECORDED: do it again when the run can be kept", Tone::bad});
+    lines.push_back({"NOT RECORDED: repeat the run when it can be stored", Tone::bad});
     terminal.print(lines);
     throw;
   }
@@ -232,7 +232,7 @@ RunRecord make_final_record(Unit& unit, const std::string& run, const StationRun
     unit.invalidate(golden_problem(unit.config(), GoldenCheckTime::verdict));
     const std::string due = golden_problem(unit.config());
     if (unit.invalid_reason().empty() && !due.empty()) {
-      spdlog::warn("{} before the next unit; this one was begun before it was", due);
+      spdlog::warn("{} before the next unit; this unit was started before", due);
     }
   }
   RunRecord record = make_unit_record(unit, run, kProgram);
@@ -273,7 +273,7 @@ RunRecord run_watched(const StationRunOptions& options, const StationConfig& con
   if (const auto& finished = watched.finished()) {
     terminal.print(make_verdict_screen(*finished));
     terminal.print(make_hook_lines(*finished));
-    spdlog::info("run {} had its verdict before it was put away; the same command begins another",
+    spdlog::info("run {} has its verdict already; the same command starts another run",
                  finished->run);
     return *finished;
   }

@@ -107,7 +107,7 @@ int run_process(const std::vector<std::string>& command) {
     const pid_t ended = ::waitpid(process, &status, WNOHANG);
     if (ended == process) break;
     if (ended < 0 && errno != EINTR) {
-      spdlog::error("how the unit's process ended is not known: {}",
+      spdlog::error("the exit code of the unit's process is unknown: {}",
                     std::generic_category().message(errno));
       return kBadInput;
     }

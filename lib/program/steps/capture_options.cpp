@@ -40,8 +40,8 @@ void add_capture_options(CLI::App& app, CaptureOptions& options, const CaptureTe
 
 void add_lens_option(CLI::App& app, std::string& lens) {
   app.add_option("--lens", lens,
-                 "Lens model (default: LENSMODEL_OPENCV8); auto: the one that the views call for, "
-                 "by what each leaves of views that took no part")
+                 "Lens model (default: LENSMODEL_OPENCV8). auto: selected by cross-validation over "
+                 "the views")
       ->check([](const std::string& name) {
         const bool known = name == kAutomaticLens || lens_model_from_name(name);
         return known ? std::string() : "the models are: auto, " + lens_model_names();
@@ -53,40 +53,40 @@ void add_readout_option(CLI::App& app, std::optional<Readout>& readout) {
                                                     {"columns", Readout::columns}};
   app.add_option_function<std::string>(
          "--readout", [&readout](const std::string& name) { readout = names.at(name); },
-         "Along what the shutter reads and stripes lie (default: as the calibration says, or else "
-         "as the images show)")
+         "Readout direction: image axis along which the shutter reads (default: that of the "
+         "calibration, or estimated from the images)")
       ->check(CLI::IsMember({"rows", "columns"}))
       ->option_text("rows|columns");
 }
 
 void add_every_option(CLI::App& app, int& every) {
-  app.add_option("--every", every, "Of a video take every Nth frame (default: 1)")
+  app.add_option("--every", every, "Use every Nth frame of a video (default: 1)")
       ->check(CLI::Range(1, 1000000))
       ->option_text("N");
 }
 
 void check_every(int every, const std::vector<std::string>& files) {
   if (every == 1 || std::any_of(files.begin(), files.end(), is_video_name)) return;
-  throw std::invalid_argument("--every is for videos, and there is none");
+  throw std::invalid_argument("--every: there is no video; leave it out");
 }
 
 void add_room_option(CLI::App& app, std::string& room) {
   app.add_option("--room", room,
-                 "Room of the lamp map whose lamps are meant, as its lamps have it in the key "
-                 "room (default: all lamps)");
+                 "Room whose lamps are used, by the key room in the lamp map (default: all lamps)");
 }
 
 void write_refined_map(const std::filesystem::path& file, const LampMap& map,
                        const std::string& room) {
   write_lamp_map(file, map);
   if (room.empty()) return;
-  fmt::print("{} has the lamps of room {} alone: use it without --room\n", printable(file.string()),
-             printable(room));
+  fmt::print("{} contains the lamps of room {} only: use it without --room\n",
+             printable(file.string()), printable(room));
 }
 
 void add_max_mpx_option(CLI::App& app, double& max_mpx) {
-  app.add_option("--max-mpx", max_mpx,
-                 "Skip images of more than so many million pixels, unread (default: 200)")
+  app.add_option(
+         "--max-mpx", max_mpx,
+         "Maximum size of an image, in megapixels; larger images are skipped unread (default: 200)")
       ->check(make_finite_positive_validator())
       ->check(CLI::Range(0.001, 1e6));
 }
@@ -94,23 +94,25 @@ void add_max_mpx_option(CLI::App& app, double& max_mpx) {
 void add_board_limit_options(CLI::App& app, FrontendOptions& options) {
   constexpr double max_limit_px = 100;
   app.add_option("--max-blur-px", options.max_blur_px,
-                 "Skip images of the board whose sharpest edges are blurred by more (sigma, "
-                 "default: 2)")
+                 "Maximum blur of a board image: sigma of its sharpest edges, in px; others are "
+                 "skipped (default: 2)")
       ->check(CLI::Range(0.1, max_limit_px));
   app.add_option("--max-white-fraction", options.max_white_fraction,
-                 "Skip images of the board with more of it at full scale (default: 0.25)")
+                 "Maximum fraction of the board at full scale in an image; others are skipped "
+                 "(default: 0.25)")
       ->check(CLI::Range(0.0, 1.0));
 }
 
 void add_detect_options(CLI::App& app, CaptureOptions& options) {
   add_room_option(app, options.frontend.room);
   app.add_option("--classifier", options.frontend.classifier,
-                 "Lamp classifier by vlp-train, instead of the map's frequencies");
+                 "Lamp classifier of vlp-train, used instead of the frequencies in the map");
   app.add_option("--annotate", options.frontend.annotate,
-                 "Folder for pictures of the lights found, with outlines, centers and lamps");
+                 "Output folder of annotated images with outlines, centers and lamp ids");
   add_readout_option(app, options.frontend.readout);
-  app.add_option("--exposure-s", options.frontend.exposure_s,
-                 "Exposure of the images, for the check of the lamp map (default: short)")
+  app.add_option(
+         "--exposure-s", options.frontend.exposure_s,
+         "Exposure time of the images, in s, for the check of the lamp map (default: short)")
       ->check(make_finite_positive_validator());
   add_max_mpx_option(app, options.frontend.max_mpx);
   add_threads_option(app, options.frontend.threads);
@@ -126,15 +128,17 @@ std::optional<KnownMotion> MotionOptions::motion() const {
 void add_motion_options(CLI::App& app, MotionOptions& options, const char* help) {
   app.add_option("--max-speed-m-per-s", options.max_speed_m_per_s, help)
       ->check(make_finite_positive_validator());
-  app.add_option("--max-yaw-rate-deg-per-s", options.max_yaw_rate_deg_per_s,
-                 "With --max-speed-m-per-s: it turns so fast at most (default: 180); 0: not at all")
+  app.add_option(
+         "--max-yaw-rate-deg-per-s", options.max_yaw_rate_deg_per_s,
+         "Maximum yaw rate with --max-speed-m-per-s, in degrees/s (default: 180); 0: no rotation")
       ->check(finite_not_negative())
       ->needs("--max-speed-m-per-s");
 }
 
 void add_yaw_rate_sd_option(CLI::App& app, std::optional<double>& yaw_rate_sd_deg_per_s) {
   app.add_option("--yaw-rate-sd-deg-per-s", yaw_rate_sd_deg_per_s,
-                 "Standard deviation of yaw_rate_rad_per_s in captures.csv (default: as it says)")
+                 "Standard deviation of yaw_rate_rad_per_s in captures.csv, in degrees/s (default: "
+                 "0, exact)")
       ->check(finite_not_negative());
 }
 
@@ -211,10 +215,8 @@ LampCaptures read_lamp_captures(const CaptureOptions& options, ImageUse use) {
 
 std::vector<Frame> read_detection_captures(const CaptureOptions& options) {
   if (is_video_name(options.images)) {
-    throw std::invalid_argument(
-        options.images +
-        " is a video: vlp-detect finds the lamps in it, and with --captures "
-        "the times of its frames");
+    throw std::invalid_argument(options.images +
+                                " is a video; use vlp-detect, with --captures for the frame times");
   }
   const FrontendOptions& frontend = options.frontend;
   const std::array<std::pair<const char*, bool>, 3> image_options{
@@ -223,7 +225,8 @@ std::vector<Frame> read_detection_captures(const CaptureOptions& options) {
        {"--exposure-s", frontend.exposure_s.has_value()}}};
   for (const auto& [name, is_given] : image_options) {
     if (!is_given) continue;
-    throw std::invalid_argument(fmt::format("{}: {} is no folder of images", name, options.images));
+    throw std::invalid_argument(
+        fmt::format("{}: {} is no folder of images; leave the option out", name, options.images));
   }
   return read_detections(options.images);
 }

@@ -22,7 +22,7 @@ namespace {
 
 /// Returns ", sd X Y UNIT" for a covariance, with standard deviations multiplied by a factor.
 std::string format_sd(const std::optional<Matrix2>& covariance, double factor, const char* unit) {
-  if (!covariance) return ", sd not known";
+  if (!covariance) return ", sd unknown";
   const Eigen::Vector2d sd = factor * covariance->diagonal().cwiseSqrt();
   return fmt::format(", sd {:.4f} {:.4f} {}", sd.x(), sd.y(), unit);
 }
@@ -32,7 +32,7 @@ void print_lever_arm(const RotationCenter& center) {
     fmt::print("lever arm   {:.3f} {:.3f} mm{}\n", 1e3 * arm_m->x(), 1e3 * arm_m->y(),
                format_sd(center.lever_arm_covariance, 1e3, "mm"));
   } else {
-    fmt::print("lever arm   taken as zero\n");
+    fmt::print("lever arm   assumed to be zero\n");
   }
 }
 
@@ -64,8 +64,8 @@ void print_summary(const IntrinsicsSolution& solution, const CalibrationReport& 
   if (std::any_of(solution.edge_shifts_px.begin(), solution.edge_shifts_px.end(),
                   [](double shift_px) { return shift_px != 0; })) {
     const double shift_px = upper_median(solution.edge_shifts_px);
-    fmt::print("edges         {:.3f} px towards the {}, taken out\n", std::abs(shift_px),
-               shift_px < 0 ? "light" : "dark");
+    fmt::print("edges         displaced by {:.3f} px towards the {}, corrected\n",
+               std::abs(shift_px), shift_px < 0 ? "light" : "dark");
   }
   fmt::print("focal length  {:.2f}, {:.2f} px", parameters[0], parameters[1]);
   if (is_splined(solution.problem.lens_model)) {
@@ -79,17 +79,18 @@ void print_summary(const IntrinsicsSolution& solution, const CalibrationReport& 
   fmt::print("uncertainty   {:.3f} px mean, {:.3f} px worst\n", report.uncertainty_mean_px,
              report.uncertainty_worst_px);
   if (report.region_fraction > 0.999) {
-    fmt::print("board seen    all over the image\n");
+    fmt::print("valid region  all of the image\n");
   } else {
     fmt::print(
-        "board seen    in {:.0f} % of the image, for which the figures are; beyond, uncertainty "
-        "is up to {:.3g} px\n",
+        "valid region  {:.0f} % of the image, for which these values hold; uncertainty outside up "
+        "to {:.3g} px\n",
         100 * report.region_fraction, report.uncertainty_beyond_px);
   }
-  fmt::print("true lens     {:.3f} px rms apart per axis, expected by noise, {:.3f} by views\n",
-             report.expected_rms_px, report.expected_by_views_rms_px);
+  fmt::print(
+      "true lens     expected difference {:.3f} px rms per axis from noise, {:.3f} from views\n",
+      report.expected_rms_px, report.expected_by_views_rms_px);
   if (report.halves) {
-    fmt::print("halves        {:.3f} px rms apart per axis, {:.3f} px worst\n",
+    fmt::print("halves        difference {:.3f} px rms per axis, {:.3f} px maximum\n",
                report.halves->rms_px, report.halves->worst_px);
   }
   if (held_out.views > 0) {
@@ -196,7 +197,7 @@ void print_adjustment(const AdjustmentResult& found, const Calibration& before, 
                1e3 * arm_m->y(), 1e3 * std::sqrt((*center.lever_arm_covariance)(0, 0)),
                1e3 * std::sqrt((*center.lever_arm_covariance)(1, 1)));
   } else {
-    fmt::print("lever arm   not determined: a turn on a spot at a second height tells it\n");
+    fmt::print("lever arm   not determined: add a rotation in place at a second height\n");
   }
   if (found.lens_freedom > 0) {
     fmt::print("lens        corrected: chi-squared {:.1f}, {} expected\n", found.lens_chi_squared,
@@ -208,16 +209,16 @@ void print_adjustment(const AdjustmentResult& found, const Calibration& before, 
         "{:.3f}\n",
         lens[0], lens[1], sd[0], sd[1], lens[2], lens[3], sd[2], sd[3]);
   } else {
-    fmt::print("lens        {}\n", lens_stated
-                                       ? "as it was: the captures tell nothing of it"
-                                       : "taken as exact: the calibration has no covariance of "
-                                         "it (see --lens-sd-px)");
+    fmt::print("lens        {}\n",
+               lens_stated
+                   ? "unchanged: the captures do not determine it"
+                   : "treated as exact: the calibration has no lens covariance (see --lens-sd-px)");
   }
   fmt::print("residual    {:.4f} px per axis\n", found.residual_px);
   for (const auto& place : found.places) {
-    fmt::print("place       {}: {:.3f} {:.3f} {:.3f} mm from where it is said to be{}\n",
-               place.name, 1e3 * place.residual_m.x(), 1e3 * place.residual_m.y(),
-               1e3 * place.residual_m.z(), place.wrong ? ", left out" : "");
+    fmt::print("position    {}: error {:.3f} {:.3f} {:.3f} mm{}\n", place.name,
+               1e3 * place.residual_m.x(), 1e3 * place.residual_m.y(), 1e3 * place.residual_m.z(),
+               place.wrong ? ", left out" : "");
   }
   print_corrections_header();
   for (const auto& [id, correction_m, sd_m, moved] : found.lamps) {

@@ -104,10 +104,10 @@ void print_ratios(const Evaluation& evaluation) {
     fmt::print(" (errors within 1.96 sd; those of one calibration go together)\n");
   }
   if (const auto& limit = evaluation.limit) {
-    fmt::print(
-        "limit       {:.3f} mm rms, error / limit {:.3f} ({})\n", mm(limit->limit_m),
-        limit->horizontal,
-        limit->is_below_limit() ? "beaten: see the warning" : "1: the best of one level image");
+    fmt::print("limit       {:.3f} mm rms, error / limit {:.3f} ({})\n", mm(limit->limit_m),
+               limit->horizontal,
+               limit->is_below_limit() ? "below the limit: see the warning"
+                                       : "1: the best of one level image");
   }
 }
 
@@ -131,9 +131,10 @@ std::string_view find_remedy(std::string_view key) {
   if (key == "motion") return "odometry, or a faster read-out";
   if (key == "roll_pitch") return "an inclination sensor, or a camera that is held level";
   if (key == "lens") return "more views of the board, or vlp-adjust, which corrects the lens";
-  if (key == "zenith") return "more captures of the turn, or vlp-adjust with known places";
-  if (key == "offset") return "more captures at the known place, or vlp-adjust instead";
-  if (key == "lamp_map") return "a better survey, or vlp-adjust --refine-map with known places";
+  if (key == "zenith")
+    return "more captures of the rotation in place, or vlp-adjust with known positions";
+  if (key == "offset") return "more captures at the known position, or vlp-adjust instead";
+  if (key == "lamp_map") return "a better survey, or vlp-adjust --refine-map with known positions";
   return "more lamps in view, larger in the image, or the mean of several captures";
 }
 

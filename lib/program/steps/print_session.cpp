@@ -51,12 +51,12 @@ void print_session(const SessionResult& result, const std::string& results) {
       MetricRow{"residuals", "rms_px", "px rms, of the board's corners"},
       MetricRow{"tilt", "tilt_deg", "degrees"},
       MetricRow{"lever arm", "lever_arm_mm", "mm"},
-      MetricRow{"dispersion", "dispersion_mm", "mm, before it is taken off"},
+      MetricRow{"dispersion", "dispersion_mm", "mm, before its correction"},
       MetricRow{"mean error", "mean_mm", "mm, horizontal"},
       MetricRow{"p90", "p90_mm", "mm"},
       MetricRow{"max", "max_mm", "mm"},
       MetricRow{"height", "height_rms_mm", "mm rms"},
-      MetricRow{"missing", "missing_fraction", "of the captures, as a share"}};
+      MetricRow{"missing", "missing_fraction", "fraction of the captures"}};
   fmt::print("\n");
   for (const auto& [label, name, unit] : metric_rows) {
     if (const auto value = find(result, name)) fmt::print("{:11} {:.4g} {}\n", label, *value, unit);

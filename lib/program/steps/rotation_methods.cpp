@@ -37,7 +37,7 @@ void report(const TiltCalibration& result, const Camera& camera) {
   print_center(result.center, camera);
   fmt::print(
       "residual    {:.4f} px per axis; for a level camera{} {:.4f} px in the undistorted image\n",
-      result.residual_px, result.corrections.empty() ? "" : " and the map as it was",
+      result.residual_px, result.corrections.empty() ? "" : " and the original map",
       result.residual_before_px);
   if (result.corrections.empty()) return;
   print_corrections_header();

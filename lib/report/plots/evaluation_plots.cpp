@@ -334,7 +334,7 @@ Drawing make_drawing(const CdfPlot& plot) {
     layers.append(layers.empty() ? "plot " : ", ").append(format_layer(plot.curves[i], i));
   }
   const std::string beyond =
-      cut ? "; the largest, " + format_mm(largest_m) + " mm, is off the picture" : "";
+      cut ? "; the largest, " + format_mm(largest_m) + " mm, is outside the plot" : "";
   return {"cdf", 720, 460 + 24 * static_cast<int>(plot.curves.size()),
           blocks + plot_settings() + set_title(plot.title) + "set xlabel 'horizontal error (mm)" +
               beyond +

@@ -61,8 +61,8 @@ std::string subject_part(const RunRecord& record, const Calibration& calibration
                       {"begun (UTC)", record.begun_utc},
                       {"ended (UTC)", record.ended_utc},
                       {"procedure",
-                       "lens by views of a board; rotation center and tilt by a turn; "
-                       "dispersion at one place; check at known points"},
+                       "lens from views of a board; rotation center and tilt from a rotation in "
+                       "place; dispersion at one reference point; check at known points"},
                       {"program", record.program},
                       {"libraries", record.libraries},
                       {"images", fmt::format("{} taken, {} used", record.images.size(),
@@ -74,7 +74,7 @@ std::string describe_inputs(const RunRecord& record, const Calibration& calibrat
   const CheckedMetric* print = record.find_metric("board_print_px");
   const auto& report = calibration.intrinsics_report;
   if (print == nullptr || !print->value || !report || !report->covariance) {
-    return "The board and the known points are taken as exact.";
+    return "The board and the known points are assumed to be exact.";
   }
   return fmt::format(
       "That of the focal length and the principal point includes the print of the board, as far as "
@@ -136,11 +136,10 @@ std::string make_conformity_table(const RunRecord& record) {
   return html_table(table) +
          html_element(
              "p",
-             "Decision rules: \"simple\" compares the figure with the limit, whatever its "
-             "uncertainty, so that of units at the limit in truth half are accepted; a "
-             "guard band of k u takes k times the standard uncertainty off the limit "
-             "(JCGM 106:2012). p is the probability that the figure is within the limit in "
-             "truth.");
+             "Decision rules: \"simple\" compares the value with the limit without its "
+             "uncertainty, so that half of the units exactly at the limit are accepted; a guard "
+             "band of k u subtracts k times the standard uncertainty from the limit (JCGM "
+             "106:2012). p is the probability that the true value is within the limit.");
 }
 
 /// Returns the digest of the names and digests of the images that a step used, empty without any.
@@ -174,7 +173,7 @@ std::string make_blank_part() {
     table.rows.push_back({line, "\u00a0"});
   }
   return html_table(table) + "<div class=\"signature\">signature</div>\n" +
-         html_element("p", "The results relate to this unit as it was measured, and only to it.");
+         html_element("p", "The results relate only to this unit as measured.");
 }
 
 }  // namespace
@@ -222,11 +221,11 @@ void check_certifiable(const RunRecord& record) {
   const auto none = [&](const std::string& why) {
     return InputError(record.run, why + ": it has no certificate");
   };
-  if (record.kind != "unit") throw none("is of the golden unit, by which a station is measured");
+  if (record.kind != "unit") throw none("is a run of the golden unit, which measures the station");
   const std::string no_verdict = find_verdict_problem(record);
   if (!no_verdict.empty()) throw none(no_verdict);
   if (record.invalid()) throw none("was not judged (" + record.first_cause() + ")");
-  if (record.calibration.empty()) throw none("came to no calibration");
+  if (record.calibration.empty()) throw none("has no calibration");
 }
 
 std::string make_certificate(const RunRecord& record, const Calibration& calibration) {

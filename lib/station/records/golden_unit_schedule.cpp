@@ -35,7 +35,7 @@ std::string make_note_name(const StationConfig& config) {
 
 /// Returns the message about an incomplete note.
 std::string describe_damaged_note(const std::string& why) {
-  return fmt::format("what the golden unit said is not known ({}): 'vlp-station verify' is due",
+  return fmt::format("the result of the golden unit is unknown ({}): 'vlp-station verify' is due",
                      why);
 }
 
@@ -182,16 +182,17 @@ std::string golden_problem(const StationConfig& config, GoldenCheckTime at) {
     return describe_damaged_note(file.string() + " is damaged");
   }
   if (failed) {
-    return fmt::format("the golden unit failed (run {}): mend the station, then {}", run, verify);
+    return fmt::format("the golden unit failed (run {}): repair the station, then {}", run, verify);
   }
   if (measured_with.empty()) {  // note of an older program
-    return fmt::format("with which lamp map the golden unit was measured is not known (run {}): {}",
-                       run, verify);
+    return fmt::format(
+        "the lamp map with which the golden unit was measured is unknown (run {}): {}", run,
+        verify);
   }
   if (measured_with != measuring_digest(config)) {
     return fmt::format(
-        "what measures in station.yaml or a file that it names was changed since the golden unit "
-        "was measured (run {}): {}",
+        "station.yaml or a file that it names was changed in a way that affects measurements after "
+        "the golden unit was measured (run {}): {}",
         run, verify);
   }
   if (at == GoldenCheckTime::verdict) return "";

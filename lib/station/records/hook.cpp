@@ -250,7 +250,7 @@ RunEvent run_hook(const Hook& hook, const RunRecord& record, const HookLock& loc
   try {
     status = process.wait(hook.time_limit_s);
   } catch (const std::system_error& error) {
-    return failed("how it ended is not known: " + error.code().message());
+    return failed("its exit code is unknown: " + error.code().message());
   }
   if (!status) subreaper.kill_all();
   const std::string line = find_last_line(process.written);
@@ -283,7 +283,7 @@ std::string call_hook(const Hook& hook, RunRecord& record, const HookLock& lock,
   try {
     spool.keep(record);
   } catch (const InputError& error) {
-    problem = std::string("what became of the hook is not recorded: ") + error.what();
+    problem = std::string("the result of the hook is not recorded: ") + error.what();
   }
   spool.deliver();
   return problem;

@@ -148,8 +148,8 @@ namespace {
 bool rename_files(const StationConfig* own_station, const RunRecord& record, std::string& problem) {
   if (own_station == nullptr) {
     problem = fmt::format(
-        "the files of run {} keep their names: the same command with --station of {}"
-        " renames them",
+        "the files of run {} keep their names: use the same command with --station of {} to rename "
+        "them",
         record.run, record.station);
     return false;
   }

@@ -42,7 +42,7 @@ fs::path write_calibration(const RunRecord& record, const SharedFolder& folder) 
   if (!folder.has(name)) {
     folder.replace(name, record.calibration);
   } else if (!holds(folder, name, record.calibration)) {
-    throw InputError(file, "is not what the record has: move it away");
+    throw InputError(file, "differs from the record: move it away");
   }
   return file;
 }
@@ -63,7 +63,7 @@ ReportVerdict make_verdict_box(const RunRecord& record) {
 
 std::string describe_meaning(const CheckedMetric& metric) {
   const auto kind = metric_kind(metric.name);
-  return kind ? kind->meaning : "a figure of another version of the program";
+  return kind ? kind->meaning : "a metric of another version of the program";
 }
 
 }  // namespace

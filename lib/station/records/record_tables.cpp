@@ -126,8 +126,9 @@ int load_table_version(soci::session& sql) {
   if (tables_there == 0) return 0;
   sql << "SELECT COALESCE(MAX(version), 0) FROM vlp_schema", soci::into(version);
   if (version <= kSchemaVersion) return version;
-  throw std::runtime_error("holds records of version " + std::to_string(version) +
-                           ", this program knows those up to " + std::to_string(kSchemaVersion) +
+  throw std::runtime_error("contains records of version " + std::to_string(version) +
+                           ", this program supports versions up to " +
+                           std::to_string(kSchemaVersion) +
                            ": use the newer vlp-station that wrote them");
 }
 

@@ -156,7 +156,7 @@ struct Records::Database {
     if (!refused)
       throw RecordsOffline(name, "the server of the records cannot be reached: " + what);
     throw RecordsRefused(
-        name, "the server of the records answers, but refuses 'records' as it is: " + what);
+        name, "the server of the records answers, but refuses 'records' of station.yaml: " + what);
   }
 
   /// Runs an action; its errors name the database.

@@ -182,7 +182,7 @@ std::string serialize_run(const SpooledRun& spooled) {
 SpooledRun read_run(const std::filesystem::path& file) {
   const auto text =
       SharedFolder(file.parent_path()).read(file.filename().string(), kMaxRunFileBytes);
-  if (!text) throw InputError(file, "cannot be opened: it was taken away");
+  if (!text) throw InputError(file, "cannot be opened: it was removed");
   try {
     check_json_bounds(*text);
     return parse_run(Json::parse(*text));

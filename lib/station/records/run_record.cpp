@@ -120,7 +120,7 @@ std::string find_verdict_problem(const RunRecord& record) {
     return fmt::format("was voided by {}: {}", event->who, event->text);
   }
   if (!record.passed()) return "";
-  constexpr const char* words = "the record says PASS, but {}: it was changed by hand";
+  constexpr const char* words = "the record has PASS, but {}: it was changed by hand";
   if (!record.causes.empty()) return fmt::format(words, "names a cause");
   for (const CheckedMetric& metric : record.metrics) {
     if (metric.limit && !metric.passed()) return fmt::format(words, describe(metric));

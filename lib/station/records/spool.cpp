@@ -167,9 +167,10 @@ void Spool::keep(const RunRecord& run) {
   } catch (const InputError& error) {
     const std::string refused = try_on_records([&](Records& records) { records.keep(run); });
     if (refused.empty()) return;
-    throw InputError(folder_,
-                     fmt::format("neither here can a run be kept ({}) nor in the records ({})",
-                                 error.what(), refused));
+    throw InputError(
+        folder_,
+        fmt::format("a run can be stored neither in the spool ({}) nor in the records ({})",
+                    error.what(), refused));
   }
 }
 
@@ -180,7 +181,7 @@ void Spool::deliver() {
   problem_.clear();
   for (const fs::path& file : files()) {
     if (Clock::now() - begun > max_duration) {
-      if (problem_.empty()) problem_ = "there are many, the rest goes with the next run";
+      if (problem_.empty()) problem_ = "there are many; the next run delivers the others";
       return;
     }
     std::error_code gone;
@@ -214,8 +215,8 @@ std::string Spool::with_remarks(const std::string& first) const {
   std::vector<std::string> remarks;
   if (!first.empty()) remarks.push_back(first);
   if (!other_runs.empty()) {
-    remarks.push_back(
-        fmt::format("{} here for other records, such as {}", other_runs.size(), other_records));
+    remarks.push_back(fmt::format("{} queued for another database, such as {}", other_runs.size(),
+                                  other_records));
   }
   if (!unread_.empty()) remarks.push_back(unread_);
   if (num_unchecked_ > 0) {
@@ -228,10 +229,10 @@ std::string Spool::state() {
   const std::size_t waiting = this->waiting().size();
   const std::string& why = offline_reason_.empty() ? problem_ : offline_reason_;
   if (waiting > 0) {
-    return with_remarks(
-        fmt::format("kept here, {} waiting{}{}", waiting, why.empty() ? "" : ": ", why));
+    return with_remarks(fmt::format("runs are queued in the spool, {} waiting{}{}", waiting,
+                                    why.empty() ? "" : ": ", why));
   }
-  return with_remarks(why.empty() ? "" : "runs are kept here: " + why);
+  return with_remarks(why.empty() ? "" : "runs are queued in the spool: " + why);
 }
 
 std::string Spool::notice() {

@@ -77,7 +77,7 @@ constexpr std::array kRules{
     ChartRule{"nelson-1", kBeyond3, has_values_beyond<1, 1, 3>},
     ChartRule{"nelson-2", "9 in a row on one side of the mean", has_values_beyond<9, 9, 0>},
     ChartRule{"nelson-3", "6 in a row up, or down", has_steps<6, false>},
-    ChartRule{"nelson-4", "14 in a row up and down in turns", has_steps<14, true>},
+    ChartRule{"nelson-4", "14 in a row alternating up and down", has_steps<14, true>},
     ChartRule{"nelson-5", kBeyond2, has_values_beyond<2, 3, 2>},
     ChartRule{"nelson-6", kBeyond1, has_values_beyond<4, 5, 1>},
     ChartRule{"nelson-7", "15 in a row within a sigma of the mean", are_all_near_or_far<15, true>},
@@ -97,8 +97,8 @@ void check_rules(const std::vector<std::string>& names) {
     const auto is_named = [&](const ChartRule& rule) { return is_selected_by(rule.name, name); };
     if (name == kEwma || std::ranges::any_of(kRules, is_named)) continue;
     throw std::invalid_argument("there is no rule " + name +
-                                "; there are western-electric-1 to -4, nelson-1 to -8, ewma, and "
-                                "western-electric and nelson for all of them");
+                                "; the rules are western-electric-1 to -4, nelson-1 to -8, ewma, "
+                                "and western-electric and nelson for all of them");
   }
 }
 

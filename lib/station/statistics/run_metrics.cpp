@@ -24,10 +24,10 @@ MetricKind find_run_metric(const std::string& name) {
   const auto kind = std::ranges::find(kinds, name, &MetricKind::name);
   if (kind != kinds.end()) return *kind;
   const std::string_view present = find_present_name(NameKind::metric, name);
-  if (!present.empty()) throw std::invalid_argument("figure " + describe_renaming(name, present));
+  if (!present.empty()) throw std::invalid_argument("metric " + describe_renaming(name, present));
   std::string names;
   for (const MetricKind& any : kinds) names.append(names.empty() ? "" : ", ").append(any.name);
-  throw std::invalid_argument("there is no figure " + name + "; there are: " + names);
+  throw std::invalid_argument("there is no metric " + name + "; the metrics are: " + names);
 }
 
 std::vector<TrendPoint> load_judged_values(Records& records, const std::string& metric,
@@ -44,8 +44,8 @@ void check_one_station(const std::vector<TrendPoint>& points) {
   for (const TrendPoint& point : points) {
     if (point.station == points.front().station) continue;
     throw std::invalid_argument(
-        fmt::format("there are runs of {} and of {}: say of which with "
-                    "--of-station, or of all with --of-station any",
+        fmt::format("there are runs of {} and of {}: select a station with --of-station, or use "
+                    "--of-station any",
                     points.front().station, point.station));
   }
 }
@@ -77,7 +77,7 @@ std::vector<StudyValue> select_study_values(const std::vector<TrendPoint>& point
     if (!runs.contains(unit)) unknown.append(unknown.empty() ? "" : ", ").append(unit);
   }
   if (!unknown.empty()) {
-    throw std::invalid_argument("no judged run that has the figure is of: " + unknown);
+    throw std::invalid_argument("no judged run with this metric is of: " + unknown);
   }
   std::vector<StudyValue> values;
   for (const TrendPoint& point : points) {
@@ -102,7 +102,7 @@ void check_runs_share_no_images(Records& records, const std::vector<TrendPoint>&
       if (!repeats_images(*run, earlier) && !repeats_images(earlier, *run)) continue;
       throw std::invalid_argument(
           fmt::format("runs {} and {} of camera {} have the same images, which is no repetition: "
-                      "take new images, or void one of the two",
+                      "use new images, or void one of them",
                       earlier.run, run->run, point.camera));
     }
     runs->second.push_back(std::move(*run));

@@ -130,7 +130,7 @@ std::vector<std::string> describe_progress(const Unit& unit, StationStep step) {
 std::string describe_next_action(const Unit& unit, StationStep step) {
   const UnitStep& state = unit.step(step);
   if (state.result && !state.result->ok()) {
-    return state.result->why + "; add images, or empty the step's folder and take them anew";
+    return state.result->why + "; add images, or empty the folder of the step and repeat it";
   }
   switch (step) {
     case StationStep::boards:
@@ -138,13 +138,13 @@ std::string describe_next_action(const Unit& unit, StationStep step) {
     case StationStep::rotation: {
       const TurnMap turn = compute_unit_turn_map(unit);
       if (!std::ranges::all_of(turn.heights, &TurnMap::Height::is_complete)) {
-        return "turn the camera on its spot to the next missing angle";
+        return "turn the camera in place to the next missing angle";
       }
-      return turn.heights.empty() ? "take captures on one spot, turning the camera once around"
+      return turn.heights.empty() ? "take captures at one position, turning the camera once around"
                                   : "move the camera to the next height and turn it once around";
     }
     case StationStep::dispersion:
-      return "take captures at the station, turning the camera all around";
+      return "take captures at the reference point, turning the camera all around";
     case StationStep::check:
       return "take captures at the known points";
   }

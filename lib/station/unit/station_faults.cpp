@@ -218,8 +218,9 @@ std::string describe(const CommonOffset& offset) {
       "y {:+.1f} mm): {}",
       offset.captures, offset_mm.norm(), offset.in_camera ? "camera" : "room", offset_mm.x(),
       offset_mm.y(),
-      offset.in_camera ? "it is loose in its housing or on its mount, or another camera took them"
-                       : "the known points or the lamps have moved");
+      offset.in_camera
+          ? "it is loose in its housing or on its mount, or the captures are of another camera"
+          : "the known points or the lamps have moved");
 }
 
 std::string describe_lens_fault(std::span<const Frame> frames, const LampMap& map,
@@ -241,8 +242,8 @@ std::string describe_lens_fault(std::span<const Frame> frames, const LampMap& ma
                        camera.center_px().y());
   };
   return fmt::format(
-      "the lamps are seen through another lens than the boards: they show {}, the boards {}; are "
-      "all images of this unit, or has its lens moved?",
+      "lamps and boards are imaged by different lenses: the lamps fit {}, the boards {}; are all "
+      "images of this unit, or has its lens moved?",
       words(unconstrained.camera), words(calibration.camera));
 }
 
@@ -257,8 +258,7 @@ std::string find_other_focal_length(const PlacedCaptures& captures, const Placed
   const double sd_m = std::hypot(heights->sd_m, reference_heights->sd_m);
   if (std::abs(difference_m) <= std::max(min_difference_m, sigmas * sd_m)) return "";
   return fmt::format(
-      "its focal length differs, by heights that are off by {:+.1f} mm, in dispersion by {:+.1f} "
-      "mm",
+      "its focal length differs: the heights have an error of {:+.1f} mm, in dispersion {:+.1f} mm",
       mm_per_m * heights->median_m, mm_per_m * reference_heights->median_m);
 }
 

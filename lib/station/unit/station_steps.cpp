@@ -61,8 +61,8 @@ LampCaptures make_lamp_captures(const StationConfig& config, const Calibration& 
 std::string places_problem(std::size_t known, std::size_t captures, int wanted) {
   if (known > 0 && known >= std::min(captures, static_cast<std::size_t>(wanted))) return "";
   return fmt::format(
-      "nothing tells where {} of the {} captures are: captures.csv or truth.csv of the step "
-      "should, with x_m and y_m of each",
+      "{} of the {} captures have no position: add x_m and y_m to captures.csv or truth.csv of the "
+      "step",
       captures - known, captures);
 }
 
@@ -149,7 +149,7 @@ StepResult solve_boards(const StationConfig& config, const std::string& camera_i
 StepResult solve_rotation(const StationConfig& config, const Calibration& calibration,
                           const std::vector<Frame>& frames) {
   return with_step_name(
-      "the turn on the spot",
+      "the rotation in place",
       fail_if_inconsistent(config, frames,
                            solve_rotation(make_lamp_captures(config, calibration, frames),
                                           RotationMethod::axis, {})));

@@ -75,11 +75,10 @@ std::vector<Cause> find_problems(const Unit& unit, StationStep step) {
   if (failed) causes.push_back({fmt::format("{}: {}", to_string(step), state.result->why)});
   const bool is_explained = failed || !refused.text.empty();
   if (state.sufficient || (is_explained && unit.ended().empty())) return causes;
-  causes.push_back(
-      {unit.ended().empty()
-           ? fmt::format("{}: not enough images, or too much alike ({})", to_string(step), count)
-           : fmt::format("{}: {} before there was enough ({})", to_string(step), unit.ended(),
-                         count)});
+  causes.push_back({unit.ended().empty() ? fmt::format("{}: too few images, or too much alike ({})",
+                                                       to_string(step), count)
+                                         : fmt::format("{}: {} before there was enough ({})",
+                                                       to_string(step), unit.ended(), count)});
   return causes;
 }
 

@@ -186,7 +186,7 @@ void reject_used_images(
     if (!image.refused.empty()) continue;
     const std::string run = find_golden_run(image.sha256);
     if (run.empty()) continue;
-    record.invalidate(fmt::format("image {}/{} was used in golden run {}: measure it anew",
+    record.invalidate(fmt::format("image {}/{} was used in golden run {}: measure it again",
                                   image.step, image.name, run));
     return;
   }

@@ -67,7 +67,7 @@ bool WatchedRun::read_state() {
   run_ = state->substr(0, state->find('\n'));
   if (!is_run_id(run_)) {
     throw InputError(folder_ / kState,
-                     "holds no name of a run: remove it, then its images are of a new run");
+                     "contains no id of a run: remove it to start a new run with its images");
   }
   return state->ends_with(fmt::format("\n{}\n", kKept));
 }
@@ -94,8 +94,8 @@ void WatchedRun::begin(Spool& spool) {
   }
   if (!finished_ && is_stored) {
     throw InputError(
-        folder_, fmt::format("run {} is kept, but its record cannot be read ({}): "
-                             "begin again when it can, or move the folder away",
+        folder_, fmt::format("run {} is stored, but its record cannot be read ({}): repeat when it "
+                             "can, or move the folder away",
                              run_,
                              spool.last_offline_reason().empty() ? "the records do not have it"
                                                                  : spool.last_offline_reason()));

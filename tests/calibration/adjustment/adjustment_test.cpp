@@ -109,7 +109,7 @@ TEST(AdjustCaptures, KeepsOtherLampsExactWhenOneMoved) {
   for (std::size_t i = 0; i < 8; ++i) {
     EXPECT_THAT(survey.misplaced(i, found.refined), IsNear(Eigen::Vector3d(0, 0, 0), 1e-7));
   }
-  EXPECT_THAT(found.notes, testing::Contains(HasSubstr("0 known places")));
+  EXPECT_THAT(found.notes, testing::Contains(HasSubstr("0 known positions")));
 }
 
 TEST(AdjustCaptures, ReportsMissingSecondHeight) {

@@ -432,7 +432,7 @@ TEST_F(ReadCameraFormats, ReturnsValidRegionOfCameramodel) {
   const auto with = [&](const std::string& region) {
     return std::string(text).replace(from, to - from, region);
   };
-  EXPECT_THAT(refusal(with("[]")), testing::HasSubstr("the lens is known nowhere"));
+  EXPECT_THAT(refusal(with("[]")), testing::HasSubstr("so the lens has no valid region"));
   EXPECT_THAT(refusal(with("[[1, 2], [3, 4], [1, 2]]")), testing::HasSubstr("three pixels"));
   EXPECT_THAT(refusal(with("[[1, 2], [3, x]]")), testing::HasSubstr("should be numbers"));
   EXPECT_EQ(read(with("((1, 2), (300, 4), (30, 400))")).region.size(), 3U);

@@ -87,7 +87,7 @@ TEST(FitLensModel, ConvertsToSplinedLensAndBack) {
 TEST(FitLensModel, RecommendsFinerGridWhenGridIsTooWide) {
   const auto expect_other = [](const Camera& camera, const SplineGrid& grid) {
     const std::string words =
-        "the control points of " + to_string(grid) + " are too few where the lens sees, ";
+        "the control points of " + to_string(grid) + " do not cover the field of view, ";
     std::string said;
     try {
       fit_lens_model(camera, lens_model_for(grid));
@@ -115,7 +115,7 @@ TEST(FitLensModel, RecommendsFinerGridWhenGridIsTooWide) {
 
 TEST_F(ReadAnyCamera, RejectsUnknownFormatsAndModels) {
   EXPECT_THAT(refusal("a: 1\n"), testing::HasSubstr("camera.txt: "));
-  EXPECT_THAT(refusal("[1, 2]\n"), testing::HasSubstr("holds no camera"));
+  EXPECT_THAT(refusal("[1, 2]\n"), testing::HasSubstr("contains no camera"));
   EXPECT_THAT(refusal("{ 'lensmodel': 'LENSMODEL_CAHVOR', 'imagersize': [1, 2] }"),
               testing::HasSubstr("has lens model LENSMODEL_CAHVOR; the models are"));
   EXPECT_THAT(refusal("{ 'lensmodel': 'LENSMODEL_PINHOLE', 'imagersize': [10, 20], "

@@ -121,8 +121,8 @@ TEST(DescribeLensChoice, ExplainsFisheyeBeyondRightAngle) {
   const LensChoice choice{
       LensModel::fisheye, {{LensModel::opencv4}, {LensModel::fisheye, 0.0512}}, 1.7};
   EXPECT_EQ(describe(choice),
-            "OPENCV_FISHEYE, 0.051 px rms in views left out; the board is seen up to 97 degrees "
-            "off the axis, where no LENSMODEL_OPENCVn has rays");
+            "OPENCV_FISHEYE, 0.051 px rms in views left out; the board is visible up to 97 degrees "
+            "off axis, where no LENSMODEL_OPENCVn has rays");
 }
 
 TEST(DescribeLensChoice, ListsModelsWithoutLens) {

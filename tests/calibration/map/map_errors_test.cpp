@@ -144,7 +144,7 @@ TEST_F(FindMapErrors, DetectsMirroredMapOfLargeRoom) {
   }
   EXPECT_EQ(found(), "");
   for (Lamp& lamp : map.lamps) lamp.position_m.y() *= -1;
-  EXPECT_THAT(found(), HasSubstr("the lamp map looks mirrored"));
+  EXPECT_THAT(found(), HasSubstr("the lamp map seems to be mirrored"));
   for (Lamp& lamp : map.lamps) {
     lamp.position_m.x() = random.uniform(0, rows * distance_m);
     lamp.position_m.y() = random.uniform(0, rows * distance_m);
@@ -205,7 +205,7 @@ TEST_F(FindMapErrors, DetectsSwappedLamps) {
     map = rig.map;
     std::swap(place(static_cast<std::size_t>(first)), place(static_cast<std::size_t>(second)));
     EXPECT_THAT(found(), HasSubstr("lamps " + std::to_string(first + 1) + " and " +
-                                   std::to_string(second + 1) + " look swapped"));
+                                   std::to_string(second + 1) + " seem to be swapped"));
   }
 }
 
@@ -215,7 +215,7 @@ TEST_F(FindMapErrors, DetectsSwappedLampsOfFour) {
       0.5;  // a rectangle's mirror image is an exchange of its corners
   use_lamps(4);
   std::swap(place(0), place(2));
-  EXPECT_THAT(found(), HasSubstr("lamps 1 and 3 look swapped"));
+  EXPECT_THAT(found(), HasSubstr("lamps 1 and 3 seem to be swapped"));
 }
 
 /// No similarity takes a square to its mirror image.

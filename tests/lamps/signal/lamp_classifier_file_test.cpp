@@ -57,7 +57,7 @@ TEST(ReadLampClassifier, ThrowsForInvalidFile) {
               HasSubstr("bad.yaml:3: features: should be [log_period_lines"));
   EXPECT_THAT(refusal("2.5, ", ""), HasSubstr("bad.yaml:4: mean"));
   EXPECT_THAT(refusal("0.0055", "-1"), HasSubstr("bad.yaml:5: scale: should be positive"));
-  EXPECT_THAT(refusal("id: 8", "id: 3"), HasSubstr("bad.yaml:8: lamps[1]: id 3 stands twice"));
+  EXPECT_THAT(refusal("id: 8", "id: 3"), HasSubstr("bad.yaml:8: lamps[1]: id 3 occurs twice"));
   EXPECT_THAT(refusal("examples", "frames"), HasSubstr("bad.yaml:7: lamps[0]"));
   EXPECT_THAT(refusal("[0, 4, 0, -0.45]", "[0, -4, 0, -0.45]"), HasSubstr("covariance: is not a"));
   EXPECT_THAT(refusal("[0, 4, 0, -0.45]", "[0, 4, 0, 0.45]"), HasSubstr("covariance: is not a"));

@@ -97,9 +97,9 @@ TEST(FindAmbiguousLamps, RequiresLargerDifferenceForFewerLines) {
 TEST(ExplainMissingRoom, NamesTheRoomsOfLampsWithOneFrequency) {
   LampMapFile lamps{"lamps.yaml", {{lamp(1, 2000), lamp(2, 2500), lamp(7, 2010)}}, {"b", "b", "a"}};
   const std::string message = explain_missing_room(lamps, "--room");
-  EXPECT_EQ(message,
-            "lamps 1 and 7 share a frequency in two rooms: choose a room by --room; the map has: "
-            "a, b");
+  EXPECT_EQ(
+      message,
+      "lamps 1 and 7 share a frequency in two rooms: choose a room with --room; the map has: a, b");
   lamps.map.lamps[2].frequency_hz = 3000;
   EXPECT_EQ(explain_missing_room(lamps, "--room"), "");
 }

@@ -105,7 +105,7 @@ void expect_ambiguous(const std::vector<double>& seen_hz, const LampMap& map) {
   for (const double frequency_hz : seen_hz) lights.push_back({1 / (frequency_hz * kTrue_s), {}});
   const auto result = find_row_time(lights, map);
   EXPECT_FALSE(result.found);
-  EXPECT_THAT(result.problem, HasSubstr("add captures that show more lamps, or a table"));
+  EXPECT_THAT(result.problem, HasSubstr("add captures with more lamps, or a table"));
 }
 
 TEST(ChooseRowTime, ReturnsProblemWhenAmbiguous) {

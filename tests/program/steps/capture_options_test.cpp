@@ -23,7 +23,7 @@ TEST(CheckEvery, ThrowsWithoutVideo) {
   check_every(1, {"boards"});
   check_every(5, {"boards", "boards.mp4"});
   EXPECT_EQ(rejection_message<std::invalid_argument>([] { check_every(5, {"boards"}); }),
-            "--every is for videos, and there is none");
+            "--every: there is no video; leave it out");
 }
 
 }  // namespace

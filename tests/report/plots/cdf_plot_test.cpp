@@ -15,7 +15,7 @@ TEST(CdfPlot, HasStepForEachErrorAndMarksP50AndP90) {
   const Drawing drawing = make_drawing(plot);
   EXPECT_THAT(drawing.commands, HasSubstr("0 0 \n1 25 \n2 50 \n3 75 \n4 100 \n"));
   EXPECT_THAT(drawing.commands, HasSubstr("2 50 \n4 90 \n"));
-  EXPECT_THAT(drawing.commands, Not(HasSubstr("off the picture")));
+  EXPECT_THAT(drawing.commands, Not(HasSubstr("outside the plot")));
   const std::string svg = render_svg(drawing);
   EXPECT_THAT(svg, HasSubstr("<title>cdf</title>"));
   EXPECT_THAT(svg, HasSubstr("it's: p50 2 mm, p90 4 mm"));
@@ -25,7 +25,7 @@ TEST(CdfPlot, ReportsClippedLargestError) {
   std::vector<double> errors_m(100, 0.001);
   errors_m[50] = 1;
   const CdfPlot plot{"a", {{"b", errors_m, 0.001, 0.001}}};
-  EXPECT_THAT(make_drawing(plot).commands, HasSubstr("the largest, 1000 mm, is off the picture"));
+  EXPECT_THAT(make_drawing(plot).commands, HasSubstr("the largest, 1000 mm, is outside the plot"));
 }
 
 TEST(CdfPlot, KeepsLargestOfManyErrors) {

@@ -114,7 +114,7 @@ TEST(Certificate, ContainsDataOfRecord) {
 
 TEST(Certificate, ContainsPrintErrorOfBoard) {
   EXPECT_THAT(make_certificate(certified_run(), measured()),
-              HasSubstr("The board and the known points are taken as exact"));
+              HasSubstr("The board and the known points are assumed to be exact"));
   RunRecord record = certified_run();
   record.metrics.push_back({"board_print_px", "px", 0.0625, {}, Direction::at_most});
   EXPECT_THAT(make_certificate(record, measured()),
@@ -137,7 +137,7 @@ TEST(Certificate, ThrowsForGoldenInvalidOrEditedRuns) {
   };
   RunRecord golden = certified_run();
   golden.kind = "golden";
-  EXPECT_THAT(refusal(golden), HasSubstr("is of the golden unit"));
+  EXPECT_THAT(refusal(golden), HasSubstr("is a run of the golden unit"));
   RunRecord invalid = certified_run();
   invalid.set_verdict({{"lamp 5 is loose", false}});
   EXPECT_THAT(refusal(invalid),
@@ -147,7 +147,7 @@ TEST(Certificate, ThrowsForGoldenInvalidOrEditedRuns) {
   EXPECT_THAT(refusal(changed), HasSubstr("it was changed by hand: it has no certificate"));
   RunRecord without = certified_run();
   without.calibration.clear();
-  EXPECT_THAT(refusal(without), HasSubstr("came to no calibration"));
+  EXPECT_THAT(refusal(without), HasSubstr("has no calibration"));
 }
 
 }  // namespace

@@ -110,7 +110,7 @@ TEST_F(GoldenProblem, IgnoresLimitsExpiredBeforeVerdict) {
   EXPECT_THAT(problem(), StartsWith("2 units since"));
   EXPECT_EQ(at_verdict(), "");
   config.lamps.lamps.push_back({1, {0, 0, 2}, make_disc(0.18), 1600, 0.5});
-  EXPECT_THAT(at_verdict(), StartsWith("what measures in station.yaml"));
+  EXPECT_THAT(at_verdict(), StartsWith("station.yaml or a file that it names was changed"));
   note("golden", "FAIL");
   EXPECT_THAT(at_verdict(), StartsWith("the golden unit failed"));
 }
@@ -118,7 +118,7 @@ TEST_F(GoldenProblem, IgnoresLimitsExpiredBeforeVerdict) {
 TEST_F(GoldenProblem, ReportsFailedGoldenUnit) {
   note("golden", "PASS");
   note("golden", "FAIL");
-  EXPECT_THAT(problem(), StartsWith("the golden unit failed (run RUN): mend the station"));
+  EXPECT_THAT(problem(), StartsWith("the golden unit failed (run RUN): repair the station"));
   note("golden", "INVALID");
   EXPECT_THAT(problem(), StartsWith("the golden unit failed"));
 }
@@ -131,10 +131,10 @@ TEST_F(GoldenProblem, ReportsChangedMeasuringSetup) {
   EXPECT_EQ(problem(), "");
   config.lamps.lamps.push_back({1, {0, 0, 2}, make_disc(0.18), 1600, 0.5});
   EXPECT_EQ(problem(),
-            "what measures in station.yaml or a file that it names was changed since the golden "
-            "unit was measured (run RUN): 'vlp-station verify' is due");
+            "station.yaml or a file that it names was changed in a way that affects measurements "
+            "after the golden unit was measured (run RUN): 'vlp-station verify' is due");
   note("unit", "FAIL");
-  EXPECT_THAT(problem(), StartsWith("what measures in station.yaml"));
+  EXPECT_THAT(problem(), StartsWith("station.yaml or a file that it names was changed"));
   config.lamps.lamps.clear();
   EXPECT_EQ(problem(), "") << "as it was again";
   config.lamps.lamps.push_back({1, {0, 0, 2}, make_disc(0.18), 1600, 0.5});
@@ -163,17 +163,17 @@ TEST_F(GoldenProblem, ReportsDamagedNote) {
   for (const std::string text :
        {"", "RUN", "RUN PASS\n", "RUN PASS 2026-01-01T00:00:00Z", "RUN PASS "}) {
     folder.file(name, text);
-    EXPECT_THAT(problem(), StartsWith("what the golden unit said is not known")) << text;
+    EXPECT_THAT(problem(), StartsWith("the result of the golden unit is unknown")) << text;
   }
   folder.file(name, "RUN PASS " + now_utc() + "\n");  // note of an older program
   EXPECT_EQ(problem(),
-            "with which lamp map the golden unit was measured is not known (run RUN): 'vlp-station "
-            "verify' is due");
+            "the lamp map with which the golden unit was measured is unknown (run RUN): "
+            "'vlp-station verify' is due");
   folder.file(name, "RUN PASS " + now_utc() + " aa\nunit\nun");
   EXPECT_THAT(problem(), HasSubstr("is the file cut short?"));
   std::filesystem::remove(file);
   std::filesystem::create_directory(file);
-  EXPECT_THAT(problem(), HasSubstr("what the golden unit said is not known"));
+  EXPECT_THAT(problem(), HasSubstr("the result of the golden unit is unknown"));
 }
 
 TEST_F(GoldenProblem, RejectsSymbolicLinkAsNote) {

@@ -184,7 +184,7 @@ TEST_F(KnownRunsTest, VoidRunRenamesCalibrationOfPassedRun) {
   const std::string second = keep(2);
   KnownRuns records(config.records);
   EXPECT_THAT(void_run(records, second, "Ann", "wrong serial").files_problem,
-              HasSubstr("keep their names: the same command with --station of station-1"));
+              HasSubstr("keep their names: use the same command with --station of station-1"));
 }
 
 TEST_F(KnownRunsTest, VoidRunCompletesVoidingByRecordsAlone) {

@@ -104,7 +104,7 @@ TEST(PublishRun, ThrowsForDifferentCalibration) {
   const fs::path results = publish_run(record, {}, folder / "results");
   const auto expect_refused = [&] {
     EXPECT_THAT(rejection_message([&] { publish_run(record, {}, folder / "results"); }),
-                HasSubstr("calibration.yaml: is not what the record has: move it away"));
+                HasSubstr("calibration.yaml: differs from the record: move it away"));
   };
   const fs::path file = folder.file((results / "calibration.yaml").string(), "another\n");
   expect_refused();

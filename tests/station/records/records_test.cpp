@@ -292,7 +292,7 @@ void check_later_version(const std::string& where) {
   const std::string before = read_state(where);
   EXPECT_THAT(
       rejection_message([&] { Records records(where); }),
-      HasSubstr(": holds records of version 99, this program knows those up to " +
+      HasSubstr(": contains records of version 99, this program supports versions up to " +
                 std::to_string(kSchemaVersion) + ": use the newer vlp-station that wrote them"));
   EXPECT_EQ(read_state(where), before);
 }

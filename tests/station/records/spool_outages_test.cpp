@@ -56,7 +56,8 @@ TEST(Spool, LimitsWaitForLockedFile) {
   Spool spool(folder / "spool", where);
   spool.keep(numbered_run(1));
   EXPECT_LT(measure_seconds([&] { spool.deliver(); }), 15);
-  EXPECT_THAT(spool.state(), AllOf(StartsWith("kept here, 1 waiting"), HasSubstr("locked")));
+  EXPECT_THAT(spool.state(),
+              AllOf(StartsWith("runs are queued in the spool, 1 waiting"), HasSubstr("locked")));
   folder.file("done", "");
   other.join();
   Spool(folder / "spool", where).deliver();
@@ -147,23 +148,26 @@ TEST(Spool, DistinguishesRefusedFromUnreachableServer) {
     spool.deliver();
     return spool.state();
   };
-  const std::string refuses = "the server of the records answers, but refuses 'records' as it is: ";
+  const std::string refuses =
+      "the server of the records answers, but refuses 'records' of station.yaml: ";
   const std::string wrong_password = state_with("wrong", "postgres", 1);
-  EXPECT_THAT(wrong_password, AllOf(StartsWith("kept here, 1 waiting: "), HasSubstr(refuses),
-                                    HasSubstr("password authentication failed for user \"vlp\""),
-                                    Not(HasSubstr("wrong")), Not(HasSubstr("\n"))));
+  EXPECT_THAT(wrong_password,
+              AllOf(StartsWith("runs are queued in the spool, 1 waiting: "), HasSubstr(refuses),
+                    HasSubstr("password authentication failed for user \"vlp\""),
+                    Not(HasSubstr("wrong")), Not(HasSubstr("\n"))));
   EXPECT_THAT(state_with("right", "nowhere", 2),
-              AllOf(StartsWith("kept here, 1 waiting: "), HasSubstr(refuses),
+              AllOf(StartsWith("runs are queued in the spool, 1 waiting: "), HasSubstr(refuses),
                     HasSubstr("database \"nowhere\" does not exist")));
   EXPECT_THAT(state_with("right", "postgres?sslmode=require", 3),
-              AllOf(StartsWith("kept here, 2 waiting: "), HasSubstr(refuses),
+              AllOf(StartsWith("runs are queued in the spool, 2 waiting: "), HasSubstr(refuses),
                     HasSubstr("server does not support SSL, but SSL was required")));
   // Waiting runs are delivered with the right password.
-  EXPECT_THAT(state_with("right", "postgres", 4), StartsWith("1 here for other records"));
+  EXPECT_THAT(state_with("right", "postgres", 4), StartsWith("1 queued for another database"));
   EXPECT_THAT(whole_runs(server.uri()), SizeIs(3));
   server.stop();
   EXPECT_THAT(state_with("right", "postgres", 5),
-              AllOf(StartsWith("kept here, 1 waiting: "), HasSubstr("cannot be reached")));
+              AllOf(StartsWith("runs are queued in the spool, 1 waiting: "),
+                    HasSubstr("cannot be reached")));
 }
 
 /// Operators need not understand SQL.
@@ -217,14 +221,15 @@ TEST(Spool, DeliversThroughTls) {
   EXPECT_EQ(state_with("sslmode=require"), "");
   EXPECT_EQ(state_with("sslmode=verify-full&sslrootcert=" + server.certificate().string()), "");
   EXPECT_THAT(whole_runs(server.uri()), SizeIs(2));
-  const std::string refuses = "answers, but refuses 'records' as it is: ";
-  EXPECT_THAT(state_with("sslmode=disable"), AllOf(StartsWith("kept here, 1 waiting: "),
-                                                   HasSubstr(refuses), HasSubstr("no encryption")));
+  const std::string refuses = "answers, but refuses 'records' of station.yaml: ";
+  EXPECT_THAT(state_with("sslmode=disable"),
+              AllOf(StartsWith("runs are queued in the spool, 1 waiting: "), HasSubstr(refuses),
+                    HasSubstr("no encryption")));
   // Certificate of another server.
   const PostgresServer other("right", PostgresServer::Tls::required);
   ASSERT_NE(other.uri(), "");
   EXPECT_THAT(state_with("sslmode=verify-full&sslrootcert=" + other.certificate().string()),
-              AllOf(StartsWith("kept here, 2 waiting: "), HasSubstr(refuses),
+              AllOf(StartsWith("runs are queued in the spool, 2 waiting: "), HasSubstr(refuses),
                     HasSubstr("certificate verify failed")));
   EXPECT_EQ(state_with("sslmode=require"), "");
   EXPECT_THAT(whole_runs(server.uri()), SizeIs(5));
@@ -299,13 +304,13 @@ TEST(Spool, KeepsRunsWhenServerStops) {
   server.stop();
   running.keep(numbered_run(-1));
   running.deliver();
-  EXPECT_THAT(running.state(), AllOf(StartsWith("kept here, 1 waiting: "),
+  EXPECT_THAT(running.state(), AllOf(StartsWith("runs are queued in the spool, 1 waiting: "),
                                      HasSubstr("server of the records cannot be reached")));
   Spool begun = spool();
   begun.prepare();
   begun.keep(numbered_run(-2));
   begun.deliver();
-  EXPECT_THAT(begun.state(), StartsWith("kept here, 2 waiting: "));
+  EXPECT_THAT(begun.state(), StartsWith("runs are queued in the spool, 2 waiting: "));
   server.start();
   deliver_to(2);
 
@@ -321,11 +326,11 @@ TEST(Spool, KeepsRunsWhenServerStops) {
   EXPECT_LT(measure_seconds([&] { connected.deliver(); }), 1);
   EXPECT_FALSE(connected.find("another"));
   EXPECT_THAT(connected.last_offline_reason(), HasSubstr("has not answered for 2 s"));
-  EXPECT_THAT(connected.state(),
-              AllOf(StartsWith("kept here, 1 waiting: "), HasSubstr("has not answered for 2 s")));
+  EXPECT_THAT(connected.state(), AllOf(StartsWith("runs are queued in the spool, 1 waiting: "),
+                                       HasSubstr("has not answered for 2 s")));
   Spool fresh = spool();
   EXPECT_LT(measure_seconds([&] { fresh.prepare(); }), 8);
-  EXPECT_THAT(fresh.state(), StartsWith("kept here, 1 waiting: "));
+  EXPECT_THAT(fresh.state(), StartsWith("runs are queued in the spool, 1 waiting: "));
   server.thaw();
   deliver_to(3);
   // Once, even if several programs wait.
@@ -334,8 +339,8 @@ TEST(Spool, KeepsRunsWhenServerStops) {
   server.freeze();
   for (int i = 4; i < 10; ++i) several.keep(numbered_run(-i));
   EXPECT_LT(measure_seconds([&] { several.deliver(); }), 5);
-  EXPECT_THAT(several.state(),
-              AllOf(StartsWith("kept here, 6 waiting: "), HasSubstr("has not answered for 2 s")));
+  EXPECT_THAT(several.state(), AllOf(StartsWith("runs are queued in the spool, 6 waiting: "),
+                                     HasSubstr("has not answered for 2 s")));
   server.thaw();
   deliver_to(9);
 

@@ -131,10 +131,12 @@ TEST(Spool, KeepsRunsUntilRecordsAreOnline) {
   const std::string where = (folder / "away/records.db").string();
   Spool spool(folder / "spool", where);
   spool.prepare();
-  EXPECT_THAT(spool.state(), AllOf(StartsWith("runs are kept here: "), HasSubstr("records.db")));
+  EXPECT_THAT(spool.state(),
+              AllOf(StartsWith("runs are queued in the spool: "), HasSubstr("records.db")));
   for (int i = 0; i < 3; ++i) spool.keep(numbered_run(i));
   spool.deliver();
-  EXPECT_THAT(spool.state(), AllOf(StartsWith("kept here, 3 waiting: "), HasSubstr("records.db")));
+  EXPECT_THAT(spool.state(), AllOf(StartsWith("runs are queued in the spool, 3 waiting: "),
+                                   HasSubstr("records.db")));
   EXPECT_EQ(spool.find(numbered_run(1).run)->camera, "camera-1");
   EXPECT_FALSE(spool.find("another"));
   // Checks continue with the locally known runs.
@@ -238,7 +240,7 @@ TEST(Spool, KeepsEventsOfRun) {
   spool.keep(run);
   EXPECT_THAT(list_open_hooks(spool, "station-1"), IsEmpty());
   spool.deliver();
-  EXPECT_THAT(spool.state(), StartsWith("kept here, 1 waiting"));
+  EXPECT_THAT(spool.state(), StartsWith("runs are queued in the spool, 1 waiting"));
   ASSERT_THAT(spool.waiting(), SizeIs(1));
   EXPECT_THAT(spool.waiting()[0].events, SizeIs(3));
   EXPECT_THAT(spool.find(run.run)->events, SizeIs(3));
@@ -270,8 +272,9 @@ TEST(Spool, DeliversDespiteInvalidFiles) {
   Spool other(folder / "spool", where);
   other.keep(numbered_run(2));
   other.deliver();
-  EXPECT_THAT(other.state(), AllOf(StartsWith("kept here, 1 waiting: "), HasSubstr("records.db"),
-                                   HasSubstr("; "), HasSubstr("0.json: is no run")));
+  EXPECT_THAT(other.state(),
+              AllOf(StartsWith("runs are queued in the spool, 1 waiting: "),
+                    HasSubstr("records.db"), HasSubstr("; "), HasSubstr("0.json: is no run")));
 }
 
 TEST(Spool, RetriesUnreadableFile) {
@@ -286,7 +289,8 @@ TEST(Spool, RetriesUnreadableFile) {
   folder.file("spool/1.json", text);
   EXPECT_THAT(spool.waiting(), SizeIs(1));
   EXPECT_EQ(spool.find_owner("digest-1-7", "b"), (ImageOwner{"camera-1", numbered_run(1).run}));
-  EXPECT_THAT(spool.state(), AllOf(StartsWith("kept here, 1 waiting"), Not(HasSubstr("1.json"))));
+  EXPECT_THAT(spool.state(), AllOf(StartsWith("runs are queued in the spool, 1 waiting"),
+                                   Not(HasSubstr("1.json"))));
 }
 
 TEST(Spool, StoresRunsInRecordsIfFolderCannotBeWritten) {
@@ -298,9 +302,9 @@ TEST(Spool, StoresRunsInRecordsIfFolderCannotBeWritten) {
   spool.keep(numbered_run(1));
   EXPECT_THAT(whole_runs(where), SizeIs(1));
   Spool neither(folder / "spool", (folder / "away/records.db").string());
-  EXPECT_THAT(
-      rejection_message([&] { neither.keep(numbered_run(2)); }),
-      AllOf(HasSubstr("spool: neither here can a run be kept"), HasSubstr("away/records.db")));
+  EXPECT_THAT(rejection_message([&] { neither.keep(numbered_run(2)); }),
+              AllOf(HasSubstr("spool: a run can be stored neither in the spool"),
+                    HasSubstr("away/records.db")));
 }
 
 TEST(Spool, DeliversRunsToTheirRecords) {
@@ -311,7 +315,7 @@ TEST(Spool, DeliversRunsToTheirRecords) {
   of_a.keep(numbered_run(1));
   of_b.prepare();
   EXPECT_THAT(whole_runs(b), IsEmpty());
-  EXPECT_THAT(of_b.state(), AllOf(StartsWith("1 here for other records"), HasSubstr("a.db")));
+  EXPECT_THAT(of_b.state(), AllOf(StartsWith("1 queued for another database"), HasSubstr("a.db")));
   EXPECT_THAT(of_b.waiting(), IsEmpty());
   EXPECT_TRUE(of_b.find(numbered_run(1).run)) << "a run is not judged twice for that";
   EXPECT_EQ(of_b.find_owner("digest-1-7", "b"), (ImageOwner{"camera-1", numbered_run(1).run}));
@@ -352,7 +356,7 @@ TEST(Spool, DoesNotDeliverToOtherMachinesDatabase) {
   Spool here(folder / "spool", where);
   here.prepare();
   EXPECT_THAT(whole_runs(where), IsEmpty());
-  EXPECT_EQ(here.state(), "1 here for other records, such as another:" + where);
+  EXPECT_EQ(here.state(), "1 queued for another database, such as another:" + where);
   on_another_machine([&] { Spool(folder / "spool", where).deliver(); });
   EXPECT_THAT(whole_runs(where), SizeIs(1));
   EXPECT_EQ(here.state(), "");
@@ -373,7 +377,7 @@ TEST(Spool, KeepsSecondVerdictOfRun) {
   spool.keep(again);
   spool.keep(numbered_run(2));
   spool.deliver();
-  EXPECT_THAT(spool.state(), AllOf(StartsWith("kept here, 1 waiting: "),
+  EXPECT_THAT(spool.state(), AllOf(StartsWith("runs are queued in the spool, 1 waiting: "),
                                    HasSubstr("has another run " + again.run)));
   EXPECT_THAT(whole_runs(where), SizeIs(2));
   EXPECT_EQ(Records(where).find(again.run)->ended_utc, numbered_run(1).ended_utc);
@@ -387,7 +391,7 @@ TEST(Spool, CreatesDatabaseOnlyInPrepare) {
   spool.keep(numbered_run(1));
   spool.deliver();
   EXPECT_FALSE(spool.find("another"));
-  EXPECT_THAT(spool.state(), AllOf(StartsWith("kept here, 1 waiting: "),
+  EXPECT_THAT(spool.state(), AllOf(StartsWith("runs are queued in the spool, 1 waiting: "),
                                    HasSubstr("records.db: there are no records")));
   EXPECT_FALSE(fs::exists(where));
   Spool(folder / "spool", where).prepare();

@@ -176,7 +176,7 @@ TEST(ChartAlarms, AppliesAllRulesOfSet) {
   }
   EXPECT_THAT(names, ElementsAre("western-electric-1", "nelson-1", "ewma"));
   EXPECT_THAT(rejection_message<std::invalid_argument>([&] { find_alarms(values, {"western"}); }),
-              HasSubstr("there is no rule western; there are western-electric-1 to -4"));
+              HasSubstr("there is no rule western; the rules are western-electric-1 to -4"));
 }
 
 TEST(ChartAlarms, ReturnsNoneForEqualValues) {

@@ -91,7 +91,7 @@ TEST(RunMetric, ThrowsWithListOfMetricsForUnknownName) {
             "figure 'halves_px' is now called 'split_half_px'");
   EXPECT_THAT([] { find_run_metric("rms_um"); },
               testing::ThrowsMessage<std::invalid_argument>(
-                  AllOf(HasSubstr("there is no figure rms_um"), HasSubstr("rms_px"))));
+                  AllOf(HasSubstr("there is no metric rms_um"), HasSubstr("rms_px"))));
 }
 
 /// sample() has the same images in each run.

@@ -36,7 +36,7 @@ TEST_F(LampFaults, ReportsSwappedLamps) {
       const auto faults = describe_lamp_faults(frames, swapped, calibration);
       ASSERT_EQ(faults.size(), 1u) << a << " " << b;
       EXPECT_THAT(faults[0], HasSubstr(std::to_string(map.lamps[a].id) + " and " +
-                                       std::to_string(map.lamps[b].id) + " look swapped"));
+                                       std::to_string(map.lamps[b].id) + " seem to be swapped"));
     }
   }
 }
@@ -58,7 +58,7 @@ TEST_F(LampFaults, ReportsUndetectedLamp) {
     std::erase_if(frame.detections, [&](const Detection& lamp) { return lamp.lamp == id; });
   }
   EXPECT_THAT(describe_missing_lamps(frames, map),
-              ElementsAre(HasSubstr("lamp " + std::to_string(id) + " is never seen")));
+              ElementsAre(HasSubstr("lamp " + std::to_string(id) + " is never visible")));
   EXPECT_THAT(describe_lamp_faults(frames, map, calibration), IsEmpty())
       << "it does not contradict the map";
   EXPECT_THAT(describe_missing_lamps(std::span(frames).first(2), map), IsEmpty())
@@ -125,7 +125,7 @@ TEST_F(PlaceFault, ReportsSingleWrongPosition) {
     wrong.at(frames[which].image).y_m.value() += 0.02;
     EXPECT_THAT(describe_place_fault(frames, map, calibration, wrong),
                 testing::AllOf(testing::StartsWith(frames[which].image + " was not taken"),
-                               HasSubstr("20.0 mm off, others 0.3 mm")));
+                               HasSubstr("20.0 mm, that of others 0.3 mm")));
   }
 }
 
@@ -137,8 +137,8 @@ TEST_F(PlaceFault, ReportsSeveralWrongPositions) {
   EXPECT_THAT(describe_place_fault(frames, map, calibration, wrong),
               testing::Eq("captures " + frames[0].image + " to " + frames[4].image + ", " +
                           frames[9].image +
-                          " are off by up to 52.0 mm, the others by 0.3 mm: taken elsewhere than "
-                          "their table says, or by another camera"));
+                          " have errors up to 52.0 mm, the others 0.3 mm: taken at other positions "
+                          "than those in their table, or by another camera"));
 }
 
 /// If half or more are wrong, the others are not reliable.
@@ -199,10 +199,9 @@ TEST_F(LensFault, ReportsLensEstimatedFromLamps) {
       lens[2] += off_px;
       lens[3] -= off_px;
       const std::string fault = describe_lens_fault(frames, map, calibration);
-      EXPECT_THAT(fault,
-                  AllOf(StartsWith("the lamps are seen through another lens than the boards"),
-                        HasSubstr(fmt::format("the boards a focal length of {:.1f} px",
-                                              std::sqrt(lens[0] * lens[1])))))
+      EXPECT_THAT(fault, AllOf(StartsWith("lamps and boards are imaged by different lenses"),
+                               HasSubstr(fmt::format("the boards a focal length of {:.1f} px",
+                                                     std::sqrt(lens[0] * lens[1])))))
           << focal << " " << off_px;
       const std::string before = "they show a focal length of ";
       const auto at = fault.find(before);
@@ -271,7 +270,7 @@ TEST_F(OtherCamera, IsReportedForDifferentFocalLength) {
   intrinsics[1] *= 0.99;
   set_camera(Lens(calibration.camera.lens_model, intrinsics), Eigen::Matrix3d::Identity());
   EXPECT_THAT(find_other_focal_length(check, reference, map, calibration),
-              HasSubstr("its focal length differs, by heights that are off by "));
+              HasSubstr("its focal length differs: the heights have an error of "));
   reference.places.clear();
   EXPECT_EQ(find_other_focal_length(check, reference, map, calibration), "")
       << "no heights to compare";

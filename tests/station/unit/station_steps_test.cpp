@@ -38,7 +38,7 @@ TEST_F(StationSteps, FailForTooFewKnownPositions) {
               HasSubstr("1 of the 36 captures"));
   config.sufficient.check_captures = 35;
   EXPECT_TRUE(check_fixes(config, calibration, frames, places).ok());
-  EXPECT_THAT(check_fixes(config, calibration, {}, places).why, HasSubstr("nothing tells"));
+  EXPECT_THAT(check_fixes(config, calibration, {}, places).why, HasSubstr("have no position"));
 }
 
 /// Lamps below their heights in the map: horizontal positions are right, heights are wrong.

@@ -37,7 +37,7 @@ TEST_F(UnitTest, StartsWithBoards) {
   EXPECT_EQ(unit.current(), StationStep::boards);
   EXPECT_FALSE(unit.calibration());
   EXPECT_THAT(find_causes(unit),
-              ElementsAre(Field(&Cause::text, HasSubstr("boards: not enough images"))));
+              ElementsAre(Field(&Cause::text, HasSubstr("boards: too few images"))));
   EXPECT_EQ(decide_verdict(find_causes(unit)), Verdict::invalid);
 }
 
@@ -227,7 +227,7 @@ TEST_F(UnitTest, ReportContainsVerdict) {
   EXPECT_THAT(find_verdict_problem(record),
               HasSubstr("rms_px is 0.5 px, at most 0.3 px is asked for"));
   EXPECT_THAT(make_unit_report(record, "", {}),
-              AllOf(HasSubstr("NO VERDICT</strong><p>the record says PASS, but rms_px"),
+              AllOf(HasSubstr("NO VERDICT</strong><p>the record has PASS, but rms_px"),
                     Not(HasSubstr("<strong>PASS"))));
   for (const ScreenLine& line : make_verdict_screen(record)) {
     EXPECT_THAT(line.text, Not(testing::StartsWith("PASS")));
